@@ -129,6 +129,8 @@ size_t context_surface_defines(const struct render_context *context, struct gpu_
         {features->textures && exact, "HAS_TEXTURES"},
         {features->bump && exact, "HAS_BUMP"},
         {features->textures && exact && context->scene->has_spheres, "HAS_SPHERES"},
+        {!features->glass, "NO_GLASS"},
+        {!features->blend, "NO_BLEND"},
         {features->volume, "HAS_VOLUME"},
         {features->specular, "HAS_SPECULAR"},
         {features->clearcoat, "HAS_CLEARCOAT"},

@@ -97,7 +97,7 @@ bool context_upload_uniforms(struct render_context *context, struct error *error
 uint64_t context_device_bytes(const struct render_context *context);
 /* For passes that read hits (common/material.glsl): at most CONTEXT_SURFACE_DEFINES to `defines`. Returns how
  * many. */
-#define CONTEXT_SURFACE_DEFINES 14
+#define CONTEXT_SURFACE_DEFINES 16
 size_t context_surface_defines(const struct render_context *context, struct gpu_define *defines);
 /* The same, with the scene, the frame's uniforms, and the rays, hits, paths and hit list of the current wave. */
 void context_bind_hits(struct render_context *context);

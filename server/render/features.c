@@ -37,6 +37,8 @@ struct scene_features scene_features_of(const struct scene *scene)
         features.clear |= is_clear(material);
         features.anisotropy |= material->anisotropy > 0.0f;
         features.specular |= has_specular(material);
+        features.glass |= material->transmission > 0.0f;
+        features.blend |= material->alpha_mode == ALPHA_BLEND;
         features.volume |= material->transmission > 0.0f && material->attenuation_distance > 0.0f;
         features.clearcoat |= material->clearcoat > 0.0f;
         features.sheen |= material->sheen[0] > 0.0f || material->sheen[1] > 0.0f || material->sheen[2] > 0.0f;

@@ -14,6 +14,8 @@ struct scene_features {
     bool area_lights;          /* some light is a rectangle or a sphere */
     bool anisotropy;           /* some material has a grain */
     bool specular;             /* some material's mirror differs from what Fresnel's equations say */
+    bool glass;                /* some material lets light through */
+    bool blend;                /* some is blended by its alpha */
     bool volume;               /* some body of glass absorbs light */
     bool clearcoat;            /* some material is varnished */
     bool sheen;                /* some is cloth */

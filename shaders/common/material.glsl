@@ -7,7 +7,8 @@
 // Software GL runs both sides of every branch, so features that the scene lacks are left out by defines, and all
 // textures of a material are sampled in one place, in a loop.
 //
-// Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR the mirror of some
+// Defines: NO_GLASS no material lets light through; NO_BLEND none is blended;
+// HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR the mirror of some
 // dielectric differs from what Fresnel's equations say; HAS_VOLUME some body of glass absorbs light; HAS_CLEARCOAT some
 // surface is varnished; HAS_IRIDESCENCE some has a thin film; HAS_SHEEN some is cloth; HAS_DIFFUSE_TRANSMISSION some scatters
 // light to its other side; HAS_DISPERSION some glass splits colours; HAS_THIN_WALLS some has no body; HAS_ANISOTROPY some material
@@ -78,6 +79,9 @@ bool is_thin(surface s)
 // Whether it is glass, seen from inside of its body.
 bool in_glass(surface s)
 {
+#ifdef NO_GLASS
+    return false;
+#endif
     return s.inside && s.transmission > 0.0 && !is_thin(s);
 }
 
@@ -358,8 +362,15 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
     if (!is_stored)
         apply_textures(s, colour, h, m, uv01, detail.footprint);
 #endif
+#ifdef NO_GLASS
+    s.transmission = 0.0; // as it is: now the compiler knows
+#endif
     s.base = clamp(colour.rgb, vec3(0.0), vec3(1.0));
-    s.alpha = (m.flags & MATERIAL_ALPHA_BLEND) != 0u ? clamp(colour.a, 0.0, 1.0) : 1.0;
+    s.alpha = 1.0;
+#ifndef NO_BLEND
+    if ((m.flags & MATERIAL_ALPHA_BLEND) != 0u)
+        s.alpha = clamp(colour.a, 0.0, 1.0);
+#endif
     if (s.inside) {
         s.geometric = -s.geometric;
         s.normal = -s.normal;

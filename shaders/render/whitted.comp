@@ -23,6 +23,9 @@ uniform uint first_ray, batch_rays; // a light each
 // GL skips it for a group of hits that sends nothing on.
 const uint SENDS_STRAIGHT = 1u, SENDS_COAT = 2u, SENDS_MIRRORED = 4u, SENDS_BENT = 8u;
 
+// Where ambient light comes from: one loop for the same reason.
+const uint FROM_AROUND = 1u, FROM_MIRRORED = 2u, FROM_BEHIND = 4u, FROM_COAT = 8u;
+
 struct sent {
     uint which;
     vec3 straight, mirrored, bent; // directions
@@ -59,8 +62,9 @@ void add_children(uint j, path parent, surface s, float distance_, sent on)
     }
 }
 
-// Returns the number of the batch's live shadow rays.
-uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, float NoV, vec3 weight,
+// Returns the number of the batch's live shadow rays. `asks`: whether there are any; their places are written all the same,
+// here, as each store is code.
+uint ask_for_lights(uint j, bool asks, path parent, surface s, split parts, vec3 view, float NoV, vec3 weight,
                     float distance_)
 {
     vec3 origin = off_surface(s, distance_, s.geometric);
@@ -71,24 +75,21 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
     uint alive = 0u;
     for (uint i = 0u; i < batch_rays; i++) {
         uint index = first_ray + i;
-        vec2 u = vec2(0.5);
+        vec3 from = origin, arriving = vec3(0.0);
+        light_sample sampled = light_sample(vec3(0.0), 0.0, vec3(0.0));
+        if (asks) {
+            vec2 u = vec2(0.5);
 #ifdef HAS_AREA_LIGHTS
-        u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ index), sample_);
+            u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ index), sample_);
 #endif
-        vec3 from = origin;
-        light_sample sampled = light_seen(s, distance_, index, u, from);
-        vec3 sent = reflected(s, parts, view, NoV, sampled.direction, light_shine(index, s.roughness));
-        vec3 arriving = weight * (sent * sampled.irradiance);
+            sampled = light_seen(s, distance_, index, u, from);
+            vec3 sent = reflected(s, parts, view, NoV, sampled.direction, light_shine(index, s.roughness));
+            arriving = weight * (sent * sampled.irradiance);
+        }
         if (add_shadow_ray(i * wave.hits.count + j, parent, from, sampled.direction, sampled.distance_, arriving))
             alive++;
     }
     return alive;
-}
-
-void no_lights(uint j)
-{
-    for (uint i = 0u; i < batch_rays; i++)
-        no_shadow_ray(i * wave.hits.count + j);
 }
 
 vec3 shade(surface s, split parts, vec3 direction, vec3 weight, inout sent on)
@@ -121,12 +122,35 @@ vec3 shade(surface s, split parts, vec3 direction, vec3 weight, inout sent on)
     if (through)
         on.which |= sends(SENDS_BENT, on.bent_weight);
 #endif
-    vec3 ambient = (parts.scattered + parts.again + sheen_of(parts)) * environment_irradiance(s.normal) +
-                   mirror * (1.0 - parts.mirror_ray) * environment_irradiance(on.mirrored);
-    ambient += passed_of(parts) * environment_irradiance(-s.normal);
-#ifdef HAS_CLEARCOAT
-    ambient += (parts.coat.mirrors - coat_ray) * environment_irradiance(on.coat);
+    vec3 blurred = mirror * (1.0 - parts.mirror_ray), ambient = vec3(0.0);
+    uint from = FROM_AROUND | (max_component(blurred) > 0.0 ? FROM_MIRRORED : 0u);
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    from |= FROM_BEHIND;
 #endif
+#ifdef HAS_CLEARCOAT
+    from |= FROM_COAT;
+#endif
+    for (; from != 0u; from &= from - 1u) {
+        uint which = from & -from;
+        vec3 about = s.normal, share = parts.scattered + parts.again + sheen_of(parts);
+        if (which == FROM_MIRRORED) {
+            about = on.mirrored;
+            share = blurred;
+        }
+#ifdef HAS_DIFFUSE_TRANSMISSION
+        if (which == FROM_BEHIND) {
+            about = -s.normal;
+            share = passed_of(parts);
+        }
+#endif
+#ifdef HAS_CLEARCOAT
+        if (which == FROM_COAT) {
+            about = on.coat;
+            share = vec3(parts.coat.mirrors - coat_ray);
+        }
+#endif
+        ambient += share * environment_irradiance(about);
+    }
     return weight * (s.emission + s.occlusion * ambient);
 }
 
@@ -157,10 +181,7 @@ void main()
         add_children(j, p, s, h.distance, on);
 #endif
     }
-    uint shadows = 0u;
-    if (s.unlit || s.alpha <= 0.0 || in_glass(s))
-        no_lights(j);
-    else
-        shadows = ask_for_lights(j, p, s, parts, view, NoV, weight * s.alpha, h.distance);
+    bool asks = !(s.unlit || s.alpha <= 0.0 || in_glass(s));
+    uint shadows = ask_for_lights(j, asks, p, s, parts, view, NoV, weight * s.alpha, h.distance);
     note_children(j, first, shadows);
 }
