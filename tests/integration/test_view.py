@@ -361,7 +361,7 @@ class WithoutAWindow(Viewer):
         for options, variables, expected in (([], {}, ("ldc", "aces", 200)),
                                              (["--tracer", "bvh", "--size", "320x180"], {}, ("bvh", "aces", 320)),
                                              ([], {"FARLIGHT_TRACER": "abuffer"}, ("abuffer", "aces", 200)),
-                                             (["--state", "none"], {}, ("bvh", "neutral", 1280)),
+                                             (["--state", "none", "--scale", "8"], {}, ("bvh", "neutral", 1280 // 8)),
                                              (["--aperture", "0.01", "--integrator", "distributed"], {}, ("ldc", "aces", 200))):
             (self.folder / "replay.json").write_text(json.dumps(events))
             result = self.expect(farlight("view", *model, "--samples", "1", "--state", state, *options,
@@ -480,7 +480,7 @@ class MadeHere(Viewer):
     def test_views_come_faster_than_pictures_of_a_slow_daemon_and_end_in_its_own(self):
         """Path tracing with many samples a frame takes many frames of a display, on any machine of today."""
         slow = ["--integrator", "path", "--samples", "16", "--pass-samples", "16"]
-        moves = [{"mouse": "move", "x": 30 + step, "y": 45, "after": 0.02} for step in range(1, 101)]
+        moves = [{"mouse": "move", "x": 30 + 2 * step, "y": 45, "after": 0.02} for step in range(1, 51)]
         events = [rest(1), {"state": "first"}, drag(30, 45, 0, 0)[0], *moves, {"state": "moving"},
                   {"mouse": "up", "button": "left", "x": 130, "y": 45}, rest(16), {"state": "rested"}, *HIDE,
                   {"screenshot": "rested.png"}]
