@@ -413,15 +413,16 @@ def error_of(rows, true):
 
 class MadeHere(Viewer):
     """Views that the viewer makes while the camera moves."""
+    SAMPLES = 2  # of the pictures that they are made from, and of those that they are held against
 
     def moved_while_lost(self, name, *options, size, before=()):
         """A view from beside the last picture, made when the daemon is gone: nothing newer can come. Its state, the rows of the
         last picture and of the view without the middle, in which the viewer says what has happened."""
-        events = [*before, rest(8), *HIDE, {"screenshot": "before.png"}, {"state": "before"}, {"wait": "lost"},
+        events = [*before, rest(self.SAMPLES), *HIDE, {"screenshot": "before.png"}, {"state": "before"}, {"wait": "lost"},
                   *drag(160, 90, 6, 2), {"wait": "camera"}, {"state": "after"}, {"screenshot": f"{name}.png"}]
         with Daemon() as daemon:
-            process = self.start(events, "--headless", "--server", daemon.address, "--views", "on", *options, scene="cornell.glb",
-                                 size=size)
+            process = self.start(events, "--headless", "--server", daemon.address, "--views", "on", "--samples", str(self.SAMPLES),
+                                 *options, scene="cornell.glb", size=size)
             self.assertIn("before", process.stdout.readline())
             daemon.stop(signal.SIGKILL)
             state = self.end(process)["after"]
@@ -432,7 +433,7 @@ class MadeHere(Viewer):
         """The rows of the true picture, without the middle."""
         camera = [f"--{name}={','.join(f'{x:.9g}' for x in state[key])}" for name, key in (("eye", "eye"), ("look-at", "look_at"))]
         result = farlight("render", bundled_scenes() / "cornell.glb", "--samples", "1", "-q", "-o", self.folder / "true.png", "--size",
-                          f"{size[0]}x{size[1]}", "--samples", "8", "--integrator", "whitted", "--progressive", *camera, "--fov",
+                          f"{size[0]}x{size[1]}", "--samples", self.SAMPLES, "--integrator", "whitted", "--progressive", *camera, "--fov",
                           f"{math.degrees(state['fov_y']):.9g}", *options)
         self.expect(result, 0)
         rows = read_png(self.folder / "true.png")[2]
