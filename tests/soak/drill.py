@@ -117,7 +117,7 @@ class Drill:
         self.scene = self.folder / "scene.nff"
         self.scene.write_text(SCENE)
         self.environment = {**farlight_test.private_daemon(), MARK: str(self.folder),
-                            "XDG_CACHE_HOME": str(self.folder / "cache")}
+                            "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(self.folder / "cache"))}
         self.counts = collections.Counter()
         self.services, self.whole, self.whole_s = {}, {}, {}
         for kind in KINDS:
