@@ -197,6 +197,13 @@ static inline double seen_texels_between(const struct seen *seen, double from, d
 
 /* ---- surfaces ---- */
 
+/* hypot() guards against squares beyond a double's range, which no scene's are, and costs a tenth of the time.
+ */
+static inline double seen_length(double x, double y)
+{
+    return sqrt(x * x + y * y);
+}
+
 static inline void seen_triangle(struct seen *seen, size_t i)
 {
     const double(*corner)[3] = (const double(*)[3])seen->triangles[i];
@@ -224,7 +231,7 @@ static inline void seen_triangle(struct seen *seen, size_t i)
             n[k] /= length;
         /* By how much a texel may be off across it, a unit of depth. */
         const double off =
-            SEEN_TEXELS * seen->view->texel * hypot(twin_dot(n, seen->axes[0]), twin_dot(n, seen->axes[1]));
+            SEEN_TEXELS * seen->view->texel * seen_length(twin_dot(n, seen->axes[0]), twin_dot(n, seen->axes[1]));
         const double z = off * twin_dot(seen->axes[2], o), dz = off * twin_dot(seen->axes[2], d);
         seen_clip(&wide, twin_dot(n, o) + z, twin_dot(n, d) + dz);
         seen_clip(&narrow, twin_dot(n, o) - z, twin_dot(n, d) - dz);
@@ -265,13 +272,13 @@ static inline bool seen_crosses(const struct seen *seen, const struct seen_meeti
     for (int v = 0; v < 3; v++) {
         double n[3];
         twin_cross(n, corner[v], corner[(v + 1) % 3]);
-        const double across = hypot(twin_dot(n, meeting->axes[0]), twin_dot(n, meeting->axes[1]));
+        const double across = seen_length(twin_dot(n, meeting->axes[0]), twin_dot(n, meeting->axes[1]));
         if (side * twin_dot(n, p) + off * across * z < 0)
             return false;
     }
     for (int k = 0; k < 3; k++)
         apart[k] = meeting->normal[k] / meeting->height - normal[k] / height;
-    const double slope = hypot(twin_dot(apart, meeting->axes[0]), twin_dot(apart, meeting->axes[1]));
+    const double slope = seen_length(twin_dot(apart, meeting->axes[0]), twin_dot(apart, meeting->axes[1]));
     return fabs(twin_dot(apart, p) / z) < off * slope;
 }
 
