@@ -49,6 +49,7 @@ struct layer_walk {
     float u_before;            // where it was last before the layer
     float u_since;             // since when it is behind it; NEVER: it is not
     float u_behind;            // where it came behind it for more than a texel
+    float u_last;              // where it was behind it last, or came before it
     float u_fill;              // where it was last before the first layer that it came behind: before the background
     uint fill_layer;           // that layer
     float u_beside;            // where it last met a plane at an edge, but none of the primitives there
@@ -222,6 +223,7 @@ void begin_layer(uint layer, float u, int level, inout layer_walk walk)
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
     walk.is_before = walk.is_behind = walk.was_close = false;
+    walk.u_last = 0.0;
     walk.u_before = walk.u_since = walk.u_behind = walk.u_beside = NEVER;
 }
 
@@ -281,6 +283,7 @@ void note_side(node_passage p, inout layer_walk walk)
     walk.is_before = p.gap_out <= 0.0;
     walk.is_behind = !walk.is_before;
     walk.was_close = abs(p.gap_out) <= p.reach;
+    walk.u_last = max(p.gap_in, p.gap_out) > 0.0 ? p.u_out : walk.u_last;
     if (walk.is_before) {
         walk.u_before = mix(walk.u, p.u_out, 0.99);
         walk.u_since = NEVER;
@@ -552,6 +555,9 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
     if (walk.layer == 0u)
         seen.ends_behind = walk.is_behind;
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
+        // Before this layer it is before all that come behind it. Edges of these may be off by its own way.
+        float own_way = QUADTREE_OWN_WAY * min(abs(walk.inverse.x), abs(walk.inverse.y));
+        walk.u_end = min(walk.u_end, walk.u_last + own_way);
         begin_layer(walk.layer + 1u, walk.u_behind, LEVEL_AT_SURFACES, walk);
         seen.layers = max(seen.layers, walk.layer + 1u);
         return true;
@@ -578,6 +584,8 @@ bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
             ends = meet_in(r, p, walk, found);
             SHORTEN(walk, found);
             if (walk.u_end < p.u_out) {
+                // Also behind a plane that it meets from its back: a node may be as large as all that it hides.
+                walk.u_last = p.gap_in > 0.0 ? walk.u_end : walk.u_last;
                 walk.u = walk.u_end;
             } else {
                 note_side(p, walk);
