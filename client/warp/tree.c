@@ -12,6 +12,7 @@
 /* As in nodes.comp. */
 #define ROUNDING 2.384e-7f
 #define SLOPE_ROUNDING 9.766e-4f
+#define NO_LIMIT 3.4e38f
 #define SLOPE_STEP (6.104e-5f / QUADTREE_SLOPE_SCALE)
 
 /* ---- memory ---- */
@@ -197,6 +198,7 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
     const float child_error[4] = {upper_errors[0], upper_errors[1], lower_errors[0], lower_errors[1]};
     const float h = terms->h;
     float w4[4], sx[4], sy[4], error[4], reach[4];
+    uint32_t gaps = 0; /* the sign bit, if there are some */
     int all_planes = 1, all_something = 1, any_something = 0;
     for (int i = 0; i < 4; i++) {
         w4[i] = plane_w(head[i]);
@@ -209,6 +211,7 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
         all_planes &= node_is_plane(head[i]);
         all_something &= w4[i] > 0;
         any_something |= w4[i] > 0;
+        gaps |= node_is_plane(head[i]) ? (w4[i] > 0 ? 0 : NODE_NOTHING) : tail[i] & NODE_NOTHING;
     }
     /* Least squares of w at the four centres. */
     const uint32_t flag = (head[0] | head[1] | head[2] | head[3]) & 1u;
@@ -224,14 +227,18 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
                  (h * (magnitude(slope_x - sx[i]) + magnitude(slope_y - sy[i])) + error[i]);
         /* Also over the planes below, which rays are tested against. */
         high[i] = node_is_plane(head[i]) ? w4[i] + reach[i] + error[i] : float_from_bits(head[i]);
-        low[i] = node_is_plane(head[i]) ? w4[i] - reach[i] - error[i] : float_from_bits(tail[i]);
+        /* A surface goes on by up to a texel into a gap beside it. Seen on edge, its slopes are not known. */
+        const float steepness = magnitude(sx[i]) + magnitude(sy[i]), beside = steepness > 0 ? steepness : NO_LIMIT;
+        const float own_low = w4[i] - reach[i] - error[i] - (gaps ? beside : 0);
+        low[i] = node_is_plane(head[i]) ? own_low : magnitude(float_from_bits(tail[i]));
+        low[i] = w4[i] > 0 ? low[i] : NO_LIMIT; /* a gap */
     }
     const float w_max = w + 2 * h * (magnitude(slope_x) + magnitude(slope_y)) + terms->tolerance;
     const float worst = max_of_4(off) + ROUNDING * w_max;
     const int merges = all_planes & all_something & (worst <= tolerance_of(terms, w_max));
     const int is_plane = merges | (all_planes & !any_something);
     node[0] = is_plane ? merged_head : bits_of(max_of(max_of_4(high), 0));
-    node[1] = is_plane ? merged_tail : bits_of(max_of(min_of_4(low), 0));
+    node[1] = is_plane ? merged_tail : bits_of(max_of(min_of_4(low), 0)) | gaps;
     *node_error = merges ? worst : 0;
 }
 

@@ -106,6 +106,7 @@ LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet
     const float gap_out = gap + growth * w_out, slack = slack_at(ground, w_plane);
     const uint32_t is_plane = mask_of((int32_t)head < 0), is_last = mask_of(w_out <= w_end);
     const uint32_t is_behind_plane = is_plane & mask_of(gap_in > slack);
+    /* A box with gaps has less than 0. */
     const uint32_t is_behind = is_behind_plane | (~is_plane & mask_of(w < float_from_bits(tail) - slack));
     /* The surface that nothing lies behind is met, however planes are rounded. */
     const uint32_t crosses = mask_of(gap_in >= 0) | mask_of(gap_out >= 0) | (is_last & mask_of(gap_out >= -slack));

@@ -20,7 +20,8 @@
  *   nodes    RG32UI texel buffer: slice after slice, level after level, row after row. A node is one of
  *     plane  x: sign bit set; w at the node's centre without its lowest bit; lowest bit: a texel beside it, or one
  * of its own, holds a surface that does not go on from this one (the paper's flag O) y: slopes of w per texel
- * along x (low half) and y, times QUADTREE_SLOPE_SCALE, half floats box    x: greatest w, y: least w, both floats
+ * along x (low half) and y, times QUADTREE_SLOPE_SCALE, half floats box    x: greatest w, y: least w, both floats;
+ * sign bit of y set: there are gaps, where nothing is, and y is the least w of surfaces, up to a texel beside them
  *   Where nothing is there is a plane of w = 0: no ray reaches it.
  *   Behind all nodes, for each face: x: the greatest w of its first layer; y unused */
 #ifndef FARLIGHT_SHADERS_QUADTREE_LAYOUT_H
@@ -57,6 +58,8 @@ SHARED_SIZE(quadtree_uniforms, 384)
 /* What a frame's rays of one kind came to. */
 struct quadtree_counts {
     uint rays;
+    /* Of shadow rays that do not end behind the first layer also what passed by gaps and may have been behind
+     * there. */
     uint behind_first, behind_second; /* that were behind the first layer somewhere, and the second */
     uint behind_last;                 /* that found nothing before they came behind the last one */
     uint outside;                     /* that found nothing in what the view sees, and left it */

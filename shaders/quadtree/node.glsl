@@ -90,13 +90,26 @@ uvec2 plane_node(float w, vec2 slopes, bool at_edge)
 
 // ---- boxes ----
 
+// Greatest and least w of what there is.
+vec2 box_range_of_surfaces(uvec2 node)
+{
+    return uintBitsToFloat(node & 0x7fffffffu);
+}
+
+// Whether there is nothing somewhere.
+bool box_has_gaps(uvec2 node)
+{
+    return int(node.y) < 0;
+}
+
 // Greatest and least w.
 vec2 box_range(uvec2 node)
 {
-    return uintBitsToFloat(node);
+    return box_has_gaps(node) ? vec2(uintBitsToFloat(node.x), 0.0) : uintBitsToFloat(node);
 }
 
-uvec2 box_node(float w_max, float w_min)
+// Of surfaces.
+uvec2 box_node(float w_max, float w_min, bool has_gaps)
 {
-    return floatBitsToUint(vec2(w_max, w_min)) & 0x7fffffffu;
+    return floatBitsToUint(vec2(w_max, w_min)) & 0x7fffffffu | uvec2(0u, has_gaps ? 0x80000000u : 0u);
 }

@@ -26,6 +26,7 @@ layout(binding = IMAGE_QUADTREE_ERRORS, r32f) writeonly uniform imageBuffer made
 uniform uint level;
 uniform uint first_item; // of the dispatch
 
+const float FLOAT_MAX = 3.4e38;
 // Of w, for what rounds where a plane is made and evaluated.
 const float ROUNDING = 2.384e-7; // 2^-22
 // Half a step of half floats, or one if a device cuts off, as a share of a slope; and of the smallest ones.
@@ -215,8 +216,14 @@ void main()
     if (!merges) {
         // Also over the planes below, which rays are tested against.
         vec4 upper = mix(uintBitsToFloat(four.head), w4 + reach + four.error, is_plane);
-        vec4 lower = mix(uintBitsToFloat(four.tail), w4 - reach - four.error, is_plane);
-        node = box_node(max(max_of(upper), 0.0), max(min_of(lower), 0.0));
+        bvec4 is_gap = mix(bvec4(false), not(is_something), is_plane);
+        bool has_gaps = any(mix(lessThan(ivec4(four.tail), ivec4(0)), is_gap, is_plane));
+        // A surface goes on by up to a texel into a gap beside it. Seen on edge, its slopes are not known.
+        vec4 steepness = abs(sx) + abs(sy);
+        vec4 beside = has_gaps ? mix(steepness, vec4(FLOAT_MAX), equal(steepness, vec4(0.0))) : vec4(0.0);
+        vec4 lower = mix(uintBitsToFloat(four.tail & 0x7fffffffu), w4 - reach - four.error - beside, is_plane);
+        lower = mix(lower, vec4(FLOAT_MAX), is_gap);
+        node = box_node(max(max_of(upper), 0.0), max(min_of(lower), 0.0), has_gaps);
         error = 0.0;
     }
     imageStore(made_nodes, int(node_index(slice, level, place)), uvec4(node, 0u, 0u));

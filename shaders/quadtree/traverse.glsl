@@ -46,6 +46,7 @@ struct layer_walk {
     int level;
     bool is_before, is_behind; // neither: it has just begun
     bool was_close;            // to the plane that it left last
+    bool hits_alone;           // count for it, and not where it is behind the layer and meets nothing
     float u_before;            // where it was last before the layer
     float u_since;             // since when it is behind it; NEVER: it is not
     float u_behind;            // where it came behind it for more than a texel
@@ -62,6 +63,7 @@ struct node_passage {
     bool is_plane;
     float u_out, w_out;
     float gap_in, gap_out; // how far the surface is before the ray there, in w: above 0 the ray is behind it
+    bool skips_gaps; // of a box: a ray that is behind all surfaces in it passes it, though before nothing somewhere
     float reach; // of a plane: a ray that is farther from it than this meets nothing of the surface within a texel
 };
 
@@ -244,7 +246,11 @@ node_passage look(layer_walk walk)
     p.w_out = walk.s.from.z + walk.s.along.z * p.u_out;
     vec2 slopes = plane_slopes(p.node), centre = node_centre(uint(walk.level), uvec2(walk.cell));
     float w = plane_w(p.node) + dot(slopes, walk.s.from.xy - centre), growth = dot(slopes, walk.s.along.xy);
-    vec2 range = box_range(p.node), of_ray = vec2(min(w_in, p.w_out), max(w_in, p.w_out));
+    // Not just behind a surface: whether the ray stays there, or has passed its edge, the next texels say.
+    bool is_undecided = walk.was_close || walk.u_since < walk.u_behind;
+    p.skips_gaps = walk.hits_alone && !is_undecided && !p.is_plane && box_has_gaps(p.node);
+    vec2 range = p.skips_gaps ? box_range_of_surfaces(p.node) : box_range(p.node);
+    vec2 of_ray = vec2(min(w_in, p.w_out), max(w_in, p.w_out));
     float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0; // of a box; 0: in it
     p.gap_in = p.is_plane ? w + growth * walk.u - w_in : gap;
     p.gap_out = p.is_plane ? w + growth * p.u_out - p.w_out : gap;
@@ -281,7 +287,7 @@ void go_down(inout layer_walk walk)
 void note_side(node_passage p, inout layer_walk walk)
 {
     walk.is_before = p.gap_out <= 0.0;
-    walk.is_behind = !walk.is_before;
+    walk.is_behind = !walk.is_before && !p.skips_gaps;
     walk.was_close = abs(p.gap_out) <= p.reach;
     walk.u_last = max(p.gap_in, p.gap_out) > 0.0 ? p.u_out : walk.u_last;
     if (walk.is_before) {
@@ -361,6 +367,8 @@ bool walk_on(inout layer_walk walk, out node_passage p)
 // What is known of a ray in all faces.
 struct view_walk {
     float t_last;    // how far along the ray something may be that the view sees
+    float t_leaves;  // where it leaves the last face that it passes, or ends in it; -1: it passes none
+    uint last_face;
     vec4 begins;     // where it comes into the faces 0 to 3 that it has not been in yet; FLOAT_MAX: never
     vec2 begins_4_5; // and into the others
     vec2 t_face;     // where it is in the face, of which there is one
@@ -480,7 +488,10 @@ void begin_faces(trace_ray r, float t_end, inout view_walk seen)
         vec2 t = clip_to_face(origin, direction, t_ray);
         seen.t_face = t;
         clip_to_surfaces(w, origin, direction, t);
-        float begin = t.x < t.y && w > 0.0 ? t.x : FLOAT_MAX;
+        bool passes = t.x < t.y && w > 0.0;
+        seen.last_face = passes && t.y > seen.t_leaves ? face : seen.last_face;
+        seen.t_leaves = passes ? max(seen.t_leaves, t.y) : seen.t_leaves;
+        float begin = passes ? t.x : FLOAT_MAX;
         seen.begins = mix(seen.begins, vec4(begin), equal(uvec4(0u, 1u, 2u, 3u), uvec4(face)));
         seen.begins_4_5 = mix(seen.begins_4_5, vec2(begin), equal(uvec2(4u, 5u), uvec2(face)));
     }
@@ -552,8 +563,6 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
         seen.t_unknown = walk.s.t_from;
         seen.has_left = true;
     }
-    if (walk.layer == 0u)
-        seen.ends_behind = walk.is_behind;
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
         // Before this layer it is before all that come behind it. Edges of these may be off by its own way.
         float own_way = QUADTREE_OWN_WAY * min(abs(walk.inverse.x), abs(walk.inverse.y));
@@ -598,6 +607,17 @@ bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
     return ends;
 }
 
+// Whether the ray is behind what the view sees first where it ends.
+bool ends_behind_first(trace_ray r, view_walk seen)
+{
+    vec3 from_eye = r.origin - quadtree.eye_world.xyz;
+    vec3 end = face_vector(seen.last_face, from_eye + seen.t_leaves * r.direction);
+    vec3 place = face_place(end, face_q(end));
+    uvec2 texel = uvec2(clamp(place.xy, vec2(0.0), vec2(quadtree.width, quadtree.height) - 1.0));
+    uvec2 node = texelFetch(quadtree_nodes, int(node_index(FACE(seen.last_face) * quadtree.layers, 0u, texel))).xy;
+    return seen.t_leaves >= 0.0 && plane_w(node) + dot(plane_slopes(node), place.xy - node_centre(0u, texel)) > place.z;
+}
+
 // True: the ray ends before its end. Three loops in one another: software GL runs the code of both sides of a branch for
 // all rays side by side, so that what is done once for a layer would be paid for at each step.
 bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
@@ -605,6 +625,12 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
     layer_walk walk;
     walk.offered = vec2(-1.0);
     begin_faces(r, NEAREST(found, r), seen);
+    seen.ends_behind = ends_behind_first(r, seen);
+#ifdef ANY_HIT
+    walk.hits_alone = !seen.ends_behind;
+#else
+    walk.hits_alone = false;
+#endif
     bool ends = false, has_layer = false;
     for (int i = 0; i < LAYERS_MAX; i++) {
         if (!has_layer && !begin_face(r, found, walk, seen))
@@ -619,8 +645,8 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 
 view_walk begin_view_walk(trace_ray r)
 {
-    return view_walk(last_distance(r), vec4(FLOAT_MAX), vec2(FLOAT_MAX), vec2(1.0, 0.0), 1e30, 1u, false, false, false,
-                     0.0, 0u, ivec2(-1));
+    return view_walk(last_distance(r), -1.0, 0u, vec4(FLOAT_MAX), vec2(FLOAT_MAX), vec2(1.0, 0.0), 1e30, 1u, false,
+                     false, false, 0.0, 0u, ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)

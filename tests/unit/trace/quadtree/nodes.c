@@ -32,7 +32,7 @@ static const char probe[] =
     "    uvec2 given = uvec2(0x80000000u | i << 15u, halves.x | halves.y << 16u);\n"
     "    vec2 slopes = plane_slopes(given);\n"
     "    uvec2 plane = plane_node(plane_w(given), slopes, (i & 1u) != 0u);\n"
-    "    uvec2 box = box_node(plane_w(given), 0.5 * plane_w(given));\n"
+    "    uvec2 box = box_node(plane_w(given), 0.5 * plane_w(given), (i & 2u) != 0u);\n"
     "    results[3u * i] = uvec4(floatBitsToUint(slopes), plane);\n"
     "    results[3u * i + 1u] = uvec4(box, uint(node_is_plane(plane)), uint(node_is_plane(box)));\n"
     "    results[3u * i + 2u] = uvec4(node_index(i % 7u, i % 8u, uvec2(i % 11u, i % 5u)),\n"
@@ -57,9 +57,10 @@ static void expect_case(const struct quadtree_uniforms *u, uint32_t i, const uin
     if (plane.w == plane.w) {
         const struct tree_box box = tree_box_of(&result[4]);
         assert_true(box.w_max == plane.w);
-        assert_true(box.w_min == plane.w / 2 || plane.w < 1e-37);
+        assert_true(box.w_least == plane.w / 2 || plane.w < 1e-37);
+        assert_true(box.has_gaps == (i >> 1 & 1));
         assert_true(!tree_is_plane(&result[4]) && result[7] == 0);
-        assert_true(result[10] == result[4] && result[11] == result[5]);
+        assert_true(tree_float(result[10]) == box.w_max && tree_float(result[11]) == box.w_min);
     }
     assert_int_equal(result[8], tree_index(u, i % 7, i % 8, i % 11, i % 5));
 }
@@ -264,7 +265,8 @@ static struct tree_box leaf_range(const struct layers *layers, uint32_t slice, u
 {
     const struct tree_plane plane = tree_plane_of(node_at(layers, slice, 0, x, y));
     const double reach = (fabs(plane.slope_x) + fabs(plane.slope_y)) / 2;
-    return (struct tree_box){.w_max = plane.w + reach, .w_min = fmax(plane.w - reach, 0)};
+    return (struct tree_box){
+        .w_max = plane.w + reach, .w_min = fmax(plane.w - reach, 0), .has_gaps = !(plane.w > 0)};
 }
 
 TEST(a_box_has_all_that_is_below_it_and_a_plane_has_the_flags_of_its_leaves)
@@ -272,6 +274,7 @@ TEST(a_box_has_all_that_is_below_it_and_a_plane_has_the_flags_of_its_leaves)
     struct layers layers;
     layers_init(&layers, curved_scene(), &usual);
     const struct quadtree_uniforms *u = &layers.store.uniforms;
+    uint32_t with_gaps = 0, without = 0;
     for (uint32_t slice = 0; slice < u->layers; slice++)
         for (uint32_t i = 0; i < u->width * u->height; i++) {
             const uint32_t x = i % u->width, y = i / u->width;
@@ -289,8 +292,13 @@ TEST(a_box_has_all_that_is_below_it_and_a_plane_has_the_flags_of_its_leaves)
                 above_box = true;
                 assert_true(box.w_max >= leaf.w_max);
                 assert_true(box.w_min <= leaf.w_min);
+                assert_true(leaf.has_gaps ? box.has_gaps : box.w_least <= leaf.w_min);
+                with_gaps += box.has_gaps;
+                without += !box.has_gaps;
             }
         }
+    print_message("boxes above leaves: %u with gaps, %u without\n", with_gaps, without);
+    assert_true(with_gaps > 1000 && without > 1000);
     layers_finish(&layers);
 }
 

@@ -16,6 +16,8 @@ struct tree_plane {
 };
 struct tree_box {
     double w_max, w_min;
+    bool has_gaps;
+    double w_least; /* of surfaces */
 };
 
 static inline double tree_float(uint32_t bits)
@@ -48,7 +50,9 @@ static inline struct tree_plane tree_plane_of(const uint32_t node[2])
 
 static inline struct tree_box tree_box_of(const uint32_t node[2])
 {
-    return (struct tree_box){tree_float(node[0]), tree_float(node[1])};
+    const bool has_gaps = node[1] >> 31;
+    const double least = tree_float(node[1] & 0x7fffffff);
+    return (struct tree_box){tree_float(node[0]), has_gaps ? 0 : least, has_gaps, least};
 }
 
 static inline uint32_t tree_level_first(const struct quadtree_uniforms *u, uint32_t level)
