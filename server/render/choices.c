@@ -9,7 +9,7 @@
  * fill itself. What takes long is traced in parts (wave_trace.h), but where tracers are compared. */
 #define SLICE_RAYS_SOFTWARE (1u << 15)
 #define SLICE_RAYS_COMPARED (1u << 14)
-/* On a GPU a slice is as large as it can do in a step (slices_ahead.h), if the buffers of its waves take no more
+/* On a GPU a slice is as large as its time allows (slices_ahead.h), if the buffers of its waves take no more
  * than this part of the device's memory; the second, where that is not known. */
 #define SLICE_RAYS_HARDWARE (1u << 20)
 #define SLICE_RAYS_UNTOLD (1u << 18)
