@@ -51,6 +51,11 @@
 /* The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
  * curved surface. */
 #define LDC_SLACK 0.05f
+/* The maximum deviation of a plane from its sample's depth within its texel and the slack: half a cell and the
+ * slack along u, the same along v, at the maximum slope, 1 / AXES_OVERLAP. */
+#define LDC_SPAN ((1.0f + 2.0f * LDC_SLACK) / AXES_OVERLAP)
+/* The rounding error of depths and positions, in cells: some units in the last place of 4096. */
+#define LDC_ROUNDING 0.002f
 /* That of the planes of closest hits, which are verified with triangles (ldc/exact.glsl): between planes that end
  * nearer, rays pass where surfaces bend. On a dragon of 48,000 triangles at 1024 cells 0.05 lets one ray in 300
  * through, 0.25 one in 1300, 0.5 one in 2400, 1 one in 2800. */

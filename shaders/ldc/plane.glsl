@@ -3,12 +3,6 @@
 #include "ldc/layout.h"
 #include "common/math.glsl"
 
-// The maximum deviation of a plane from its sample's depth within its texel and the slack: half a cell and the slack
-// along u, the same along v, at the maximum slope, 1 / AXES_OVERLAP.
-const float LDC_SPAN = (1.0 + 2.0 * LDC_SLACK) / AXES_OVERLAP;
-// The rounding error of depths and positions, in cells: some units in the last place of 4096.
-const float LDC_ROUNDING = 0.002;
-
 // Not unit: for ratios.
 vec3 direction_from_octahedral(uint bits)
 {

@@ -8,6 +8,7 @@
 #include "trace/raster/reach.h"
 
 #include <epoxy/gl.h>
+#include <stdlib.h>
 
 #define CELL_NODE_BYTES (4 * sizeof(uint32_t))
 #define ENTRY_BYTES (4 * sizeof(uint32_t))
@@ -120,6 +121,12 @@ static bool fill_further(struct ldc_cells *cells, struct error *error)
     return pass_further(cells, "CELLS_FURTHER", error);
 }
 
+static bool fill_by_host(struct ldc_cells *cells, struct error *error)
+{
+    cells->next = reach;
+    return ldc_cells_host_fill(cells, error);
+}
+
 static bool fill_first(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
@@ -141,6 +148,12 @@ static bool count_entries(struct ldc_cells *cells, struct error *error)
     return reserve_entries(cells, error);
 }
 
+static bool count_by_host(struct ldc_cells *cells, struct error *error)
+{
+    cells->next = fill_by_host;
+    return ldc_cells_host_count(cells, error) && reserve_entries(cells, error);
+}
+
 static bool mark_cells(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
@@ -151,16 +164,13 @@ static bool mark_cells(struct ldc_cells *cells, struct error *error)
     return cells_pass(cells, "CELLS_MARK", store->cubes[cells->which].sample_count, error);
 }
 
-static bool place_blocks(struct ldc_cells *cells, struct error *error)
+/* Room for what nodes found in them, which is known now. */
+static bool reserve_blocks(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
     struct ldc_cube *cube = &store->cubes[cells->which];
-    struct ldc_cell_counts *counts = &cells->counts;
+    const struct ldc_cell_counts *counts = &cells->counts;
     const uint64_t nodes = node_count(cells);
-    bind_nodes(cells, GL_RGBA32UI);
-    if (!cells_pass(cells, "CELLS_PLACE", nodes, error))
-        return false;
-    gpu_buffer_read(store->device, &cells->counter, 0, counts, sizeof(*counts));
     for (int k = 0; k < 3; k++) {
         cube->lower_cells[k] = counts->blocks ? counts->lower_nodes[k] << LDC_NODE_SHIFT : 0;
         cube->upper_cells[k] = counts->blocks ? (counts->upper_nodes[k] + 1) << LDC_NODE_SHIFT : 0;
@@ -168,8 +178,17 @@ static bool place_blocks(struct ldc_cells *cells, struct error *error)
     if (!ldc_levels_reserve(store, cells->which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
         return false;
     clear_nodes(store, cube->first_node + nodes, counts->blocks);
-    cells->next = counts->blocks > 0 ? mark_cells : reach;
+    cells->next = counts->blocks == 0 ? reach : cells->by_host ? count_by_host : mark_cells;
     return true;
+}
+
+static bool place_blocks(struct ldc_cells *cells, struct error *error)
+{
+    bind_nodes(cells, GL_RGBA32UI);
+    if (!cells_pass(cells, "CELLS_PLACE", node_count(cells), error))
+        return false;
+    gpu_buffer_read(cells->store->device, &cells->counter, 0, &cells->counts, sizeof(cells->counts));
+    return reserve_blocks(cells, error);
 }
 
 static bool mark_blocks(struct ldc_cells *cells, struct error *error)
@@ -182,7 +201,9 @@ static bool mark_blocks(struct ldc_cells *cells, struct error *error)
         return false;
     clear_nodes(store, cube->first_node, nodes);
     if (cube->sample_count == 0)
-        return true;
+        return reserve_blocks(cells, error);
+    if (cells->by_host)
+        return ldc_cells_host_blocks(cells, error) && reserve_blocks(cells, error);
     bind_samples(cells);
     bind_nodes(cells, GL_R32UI);
     return cells_pass(cells, "CELLS_BLOCKS", cube->sample_count, error);
@@ -208,17 +229,25 @@ static bool list_samples(struct ldc_cells *cells, struct error *error)
 
 static bool begin(struct ldc_cells *cells, struct error *error)
 {
-    cells->next = cells->store->cubes[cells->which].sample_count > 0 ? list_samples : mark_blocks;
+    const bool listed = cells->store->cubes[cells->which].sample_count > 0 && !cells->by_host;
+    cells->next = listed ? list_samples : mark_blocks;
     return gpu_buffer_upload(cells->store->device, &cells->counter, &cells->counts, sizeof(cells->counts), error);
 }
 
 /* ---- the whole ---- */
 
-void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned which, uint32_t grid)
+void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned which, uint32_t grid,
+                     bool on_device)
 {
     struct ldc_cube *cube = &store->cubes[which];
     *cells = (struct ldc_cells){
-        .store = store, .which = which, .grid = grid, .next = begin, .counts.lower_nodes = {grid, grid, grid, 0}};
+        .store = store,
+        .which = which,
+        .grid = grid,
+        .next = begin,
+        .counts.lower_nodes = {grid, grid, grid, 0},
+        .by_host = store->device->facts.software && !on_device,
+    };
     cube->first_entry = cube->entry_count = 0;
     for (unsigned i = 0; i < which; i++)
         if (store->cubes[i].resolution)
@@ -238,5 +267,7 @@ void ldc_cells_finish(struct ldc_cells *cells)
         gpu_buffer_finish(cells->store->device, &cells->counter);
         gpu_buffer_finish(cells->store->device, &cells->list);
     }
+    free(cells->spans);
+    free(cells->further);
     *cells = (struct ldc_cells){0};
 }

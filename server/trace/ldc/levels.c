@@ -134,7 +134,7 @@ static void begin_cube(struct ldc_levels *levels, unsigned which)
         return;
     levels->layout = ldc_level_layout_of(store, cube->resolution, levels->options);
     if (levels->layout.cells)
-        ldc_cells_begin(&levels->cells, store, which, levels->layout.grid);
+        ldc_cells_begin(&levels->cells, store, which, levels->layout.grid, levels->options->bench.ldc_on_device);
 }
 
 /* A unit of the cube in hand. */

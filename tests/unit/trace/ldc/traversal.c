@@ -348,6 +348,69 @@ TEST(what_shares_cells_is_in_each_of_them_once)
     fixture_finish(&fixture);
 }
 
+/* What the cells of a cube hold, in an order in which places do not matter: of each the samples as its list has
+ * them, and where it is. */
+static uint32_t list_cells(struct fixture *fixture, unsigned which, uint32_t (*listed)[4], uint32_t listed_max)
+{
+    const struct ldc_store *store = &fixture->store;
+    const struct ldc_cube *cube = &store->cubes[which];
+    const uint32_t node_total = cube->first_node + cube->node_count;
+    const uint32_t entry_total = cube->first_entry + cube->entry_count;
+    uint32_t(*nodes)[4] = malloc(node_total * sizeof(*nodes)),
+    (*entries)[4] = malloc(entry_total * sizeof(*nodes));
+    const uint32_t grid = (cube->resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
+    uint32_t count = 0;
+    gpu_buffer_read(device, &store->nodes, 0, nodes, node_total * sizeof(*nodes));
+    gpu_buffer_read(device, &store->entries, 0, entries, entry_total * sizeof(*entries));
+    for (uint32_t node = 0; node < grid * grid * grid; node++) {
+        const uint32_t *of_node = nodes[cube->first_node + node];
+        for (uint32_t part = 0, block = of_node[2]; part < 64; part++) {
+            if ((of_node[part / 32] >> part % 32 & 1u) == 0)
+                continue;
+            for (uint32_t cell = 0, first = nodes[block][2]; cell < 64; cell++) {
+                if ((nodes[block][cell / 32] >> cell % 32 & 1u) == 0)
+                    continue;
+                uint32_t at = first++;
+                do {
+                    assert_true(at < entry_total && count < listed_max);
+                    memcpy(listed[count], entries[at], sizeof(listed[count]));
+                    listed[count++][1] = node << 12 | part << 6 | cell;
+                    at = entries[at][1];
+                } while (at != 0);
+            }
+            block++;
+        }
+    }
+    free(nodes);
+    free(entries);
+    return count;
+}
+
+TEST(host_and_device_make_the_same_cells)
+{
+    const struct tracer_options by_host = {.ldc = {0}}, on_device = {.bench = {.ldc_on_device = 1}};
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    start_samples(&fixture.samples[LDC_CUBE_STATIC], 70, 4, -2, -2, -2);
+    add_soup(&fixture.samples[LDC_CUBE_STATIC], 60, 0.8f, 31);
+    start_samples(&fixture.samples[LDC_CUBE_DYNAMIC], 97, 4, -2, -2, -2);
+    add_sphere(&fixture.samples[LDC_CUBE_DYNAMIC], (const float[3]){0.2f, 0.1f, -0.3f}, 1.4f, 20, 0);
+    add_soup(&fixture.samples[LDC_CUBE_DYNAMIC], 60, 0.8f, 32);
+    for (unsigned which = 0; which < LDC_CUBES_MAX; which++) {
+        build(&fixture, &by_host);
+        const uint32_t entries = fixture.store.cubes[which].entry_count;
+        uint32_t(*host)[4] = malloc(entries * sizeof(*host)), (*shaders)[4] = malloc(entries * sizeof(*shaders));
+        assert_int_equal(list_cells(&fixture, which, host, entries), entries);
+        build(&fixture, &on_device);
+        assert_int_equal(fixture.store.cubes[which].entry_count, entries);
+        assert_int_equal(list_cells(&fixture, which, shaders, entries), entries);
+        assert_memory_equal(host, shaders, entries * sizeof(*host));
+        free(host);
+        free(shaders);
+    }
+    fixture_finish(&fixture);
+}
+
 /* Blocks over more samples than software GL lets a loop go round, and what is last of them is the only thing that
  * is far. */
 TEST(blocks_of_many_layers_hold_all_of_them)

@@ -22,6 +22,7 @@ static const struct form {
 } forms[] = {
     {"cells", {.ldc = {0}}},
     {"cells, 4 rays", {.ldc = {.rays = 4}}},
+    {"cells, by the device", {.bench = {.ldc_on_device = 1}}},
     {"pyramid", {.ldc = {.levels = LDC_LEVELS_PYRAMID}}},
     {"pyramid, 4 rays, layers one by one",
      {.ldc = {.levels = LDC_LEVELS_PYRAMID, .rays = 4}, .bench = {.ldc_layers_together = 1}}},
