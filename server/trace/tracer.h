@@ -32,7 +32,7 @@ struct tracer_bench {
     uint32_t naive_tests, bvh_elements; /* of a ray in a dispatch, of bvh on a GPU; 0: as many as it may have */
     uint32_t reference_rays;            /* in a call of Embree; 0: chosen; 1, 4, 8, 16 */
     uint32_t ldc_layers_together;       /* of a texel, tested at once; 0: chosen; 1, 4 */
-    uint32_t ldc_on_device;             /* 1: shaders make its cells on software GL, too */
+    uint32_t ldc_on_device;             /* 1: shaders make samples and cells on software GL, too */
     uint32_t ldc_count_steps;           /* 1: hits hold counts of the traversal (shaders/ldc/cube.glsl) */
     uint32_t abuffer_count_steps;       /* likewise */
     uint32_t abuffer_on_device;         /* 1: its runs are sorted by shaders on software GL, too */

@@ -122,7 +122,7 @@ SHARED_SIZE(ldc_build_counts, 48)
  *   places     R32UI, one per texel with more fragments than slots: the place of the first of the others
  *   fragments  RGBA32UI, those others in the order of their arrival: texel, number in the texel, depth, id
  *   found      R32UI, one per texel: layers peeled so far
- *   visible    RGBA32UI, one per sample: texel, depth, id, 0
+ *   surface    of the cube: until sample.comp writes it, of each sample: texel, as in `occupied`, depth, id, 0
  *   peeled     RGBA32UI, two per peeled sample: the words of `surface`; those of `primitives`, 0, 0 */
 /* clang-format on */
 
@@ -137,7 +137,6 @@ SHARED_SIZE(ldc_build_counts, 48)
 #define IMAGE_LDC_FOUND 2
 #define IMAGE_LDC_TEXELS 2
 #define IMAGE_LDC_QUADS 3
-#define IMAGE_LDC_VISIBLE 4
 #define IMAGE_LDC_PEELED_SURFACE 3
 #define IMAGE_LDC_GEOMETRY 0
 #define IMAGE_LDC_SURFACE 5
@@ -148,7 +147,6 @@ SHARED_SIZE(ldc_build_counts, 48)
 #define UNIT_LDC_PLACES UNIT_TRACER_1
 #define UNIT_LDC_FRAGMENTS UNIT_TRACER_2 /* in the passes of lists */
 #define UNIT_LDC_FOUND UNIT_TRACER_2     /* in those of peeling */
-#define UNIT_LDC_VISIBLE UNIT_TRACER_3
 #define UNIT_LDC_DRAWN UNIT_TRACER_4
 #define UNIT_LDC_LAYER UNIT_TRACER_5
 #define UNIT_LDC_OCCUPIED UNIT_TRACER_6

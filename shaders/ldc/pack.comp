@@ -14,11 +14,9 @@ uniform uint layers_max;                            // at most 255
 layout(binding = UNIT_LDC_FOUND) uniform usamplerBuffer found;
 layout(binding = UNIT_LDC_PEELED_SURFACE) uniform usamplerBuffer peeled;
 layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
-layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
 layout(binding = IMAGE_LDC_PRIMITIVES, rg32ui) writeonly uniform uimageBuffer primitives_out;
-#else
-layout(binding = IMAGE_LDC_VISIBLE, rgba32ui) writeonly uniform uimageBuffer visible;
 #endif
+layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
 layout(binding = IMAGE_LDC_TEXELS, rgba32ui) writeonly uniform uimageBuffer texels_out;
 layout(binding = IMAGE_LDC_QUADS, rgba32f) writeonly uniform imageBuffer quads_out;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
@@ -107,7 +105,7 @@ void emit(run r, uint kept, uint sample_, uint quad)
         imageStore(surface_out, int(sample_ + taken), texelFetch(peeled, place));
         imageStore(primitives_out, int(sample_ + taken), texelFetch(peeled, place + 1));
 #else
-        imageStore(visible, int(sample_ - first_sample + taken), uvec4(r.bits, fragment, 0u));
+        imageStore(surface_out, int(sample_ + taken), uvec4(r.bits, fragment, 0u));
 #endif
         taken++;
         if (part == 3u || taken == kept)

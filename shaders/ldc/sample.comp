@@ -8,10 +8,9 @@
 uniform uint sample_count, first_sample; // of the cube
 uniform uint drawn_count;
 
-layout(binding = UNIT_LDC_VISIBLE) uniform usamplerBuffer visible;
 layout(binding = UNIT_LDC_DRAWN) uniform usamplerBuffer drawn;
 layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
-layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
+layout(binding = IMAGE_LDC_SURFACE, rgba32ui) uniform uimageBuffer surface_; // what is to be sampled, then its words
 layout(binding = IMAGE_LDC_PRIMITIVES, rg32ui) writeonly uniform uimageBuffer primitives_out;
 
 // The entry of `drawn` of an id.
@@ -32,7 +31,7 @@ void main()
     uint k = item_index();
     if (k >= sample_count)
         return;
-    uvec4 found = texelFetch(visible, int(k));
+    uvec4 found = imageLoad(surface_, int(first_sample + k));
     uvec4 of = drawn_of(found.z);
     vec2 middle = vec2(found.x & 4095u, found.x >> 12 & 4095u) + 0.5;
     uvec2 geometry_words;
@@ -40,6 +39,6 @@ void main()
     point p = make_point(of.z, found.z - of.y, of.w, int(found.x >> 24), middle, uintBitsToFloat(found.y));
     describe(p, geometry_words, surface_words);
     imageStore(geometry_out, int(first_sample + k), uvec4(geometry_words, 0u, 0u));
-    imageStore(surface_out, int(first_sample + k), surface_words);
+    imageStore(surface_, int(first_sample + k), surface_words);
     imageStore(primitives_out, int(first_sample + k), uvec4(primitive_words(p), 0u, 0u));
 }

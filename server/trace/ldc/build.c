@@ -20,14 +20,14 @@ struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *
     return builder;
 }
 
-#define BUFFER_COUNT 12
+#define BUFFER_COUNT 11
 
 static void list_buffers(struct ldc_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
 {
-    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts,  &builder->occupied,   &builder->ordered,
-                                            &builder->places,  &builder->fragments,  &builder->found,
-                                            &builder->visible, &builder->build,      &builder->histogram,
-                                            &builder->peeled,  &builder->draw.drawn, &builder->draw.commands};
+    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts,     &builder->occupied,     &builder->ordered,
+                                            &builder->places,     &builder->fragments,    &builder->found,
+                                            &builder->build,      &builder->histogram,    &builder->peeled,
+                                            &builder->draw.drawn, &builder->draw.commands};
     for (size_t i = 0; i < BUFFER_COUNT; i++)
         buffers[i] = all[i];
 }
@@ -80,8 +80,12 @@ bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
+    const size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
+    if (ldc_host_is_used(task))
+        return ldc_host_give_places(task, error);
     const struct gpu_program *program = ldc_use(device, "ldc/places.comp", error);
-    if (!program)
+    if (!program || !gpu_buffer_reserve(device, &builder->places, texel_numbers, error) ||
+        !gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error))
         return false;
     gpu_buffer_clear(device, &builder->build, 0);
     gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
@@ -149,8 +153,6 @@ static bool begin(struct ldc_task *task, struct error *error)
     return ldc_store_grow(device, &task->store->texels, (uint64_t)task->cube->first_texel * LDC_TEXEL_BYTES,
                           texels * LDC_TEXEL_BYTES, error) &&
            gpu_buffer_reserve(device, &builder->counts, texel_numbers, error) &&
-           gpu_buffer_reserve(device, &builder->places, texel_numbers, error) &&
-           gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error);
 }
 

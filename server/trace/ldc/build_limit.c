@@ -6,7 +6,7 @@
 
 #include <epoxy/gl.h>
 
-#define BINS 256 /* shaders/ldc/histogram.comp */
+#define BINS LDC_HISTOGRAM_BINS
 /* Buffers that grow take half as much again. */
 #define GROWTH(bytes) ((bytes) + (bytes) / 2)
 
@@ -22,10 +22,9 @@ static bool fits_device(const struct ldc_task *task, uint64_t samples, uint64_t 
     const struct ldc_store *store = task->store;
     uint64_t texels_max = device->facts.texture_buffer_texels_max;
     uint64_t present = (uint64_t)store->geometry.capacity_bytes + store->surface.capacity_bytes +
-                       store->primitives.capacity_bytes + store->quads.capacity_bytes +
-                       task->builder->visible.capacity_bytes;
+                       store->primitives.capacity_bytes + store->quads.capacity_bytes;
     uint64_t all_samples = task->cube->first_sample + samples, all_quads = task->cube->first_quad + quads;
-    uint64_t bytes = sample_bytes(all_samples, all_quads) + samples * LDC_VISIBLE_BYTES;
+    uint64_t bytes = sample_bytes(all_samples, all_quads);
     if (all_samples > texels_max || all_quads > texels_max || all_quads > LDC_QUADS_MAX)
         return false;
     if (task->slots == 0) /* peeled: they will be in `ordered` and `peeled` */
@@ -42,6 +41,8 @@ static bool fits(const struct ldc_task *task, uint64_t samples, uint64_t quads)
 
 static bool read_histogram(struct ldc_task *task, uint32_t texels_with[BINS], struct error *error)
 {
+    if (ldc_host_is_used(task))
+        return ldc_host_histogram(task, texels_with, error);
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const struct gpu_program *program = ldc_use(device, "ldc/histogram.comp", error);

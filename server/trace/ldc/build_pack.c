@@ -19,9 +19,7 @@ static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, str
            ldc_store_grow(device, &store->surface, (uint64_t)cube->first_sample * LDC_SURFACE_BYTES,
                           ((uint64_t)cube->first_sample + samples) * LDC_SURFACE_BYTES, error) &&
            ldc_store_grow(device, &store->primitives, (uint64_t)cube->first_sample * LDC_PRIMITIVE_BYTES,
-                          ((uint64_t)cube->first_sample + samples) * LDC_PRIMITIVE_BYTES, error) &&
-           (task->peeled ||
-            gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * LDC_VISIBLE_BYTES, error));
+                          ((uint64_t)cube->first_sample + samples) * LDC_PRIMITIVE_BYTES, error);
 }
 
 /* As if nothing were there. */
@@ -65,7 +63,6 @@ static bool sample(struct ldc_task *task, struct error *error)
         device, &(struct gpu_program_source){.compute = "ldc/sample.comp", .defines = defines}, error);
     if (!program)
         return false;
-    gpu_buffer_bind_texels(device, &task->builder->visible, UNIT_LDC_VISIBLE, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, &task->builder->draw.drawn, UNIT_LDC_DRAWN, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
     gpu_buffer_bind_image(device, &task->store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
@@ -85,7 +82,8 @@ static bool settle(struct ldc_task *task, struct error *error)
 {
     struct ldc_cube *cube = task->cube;
     task->next = NULL;
-    ldc_read_counts(task);
+    if (!ldc_host_is_used(task))
+        ldc_read_counts(task);
     if (!task->peeled && task->counts.samples > 0 && !sample(task, error))
         return false;
     cube->sample_count = task->counts.samples;
@@ -99,6 +97,8 @@ static bool settle(struct ldc_task *task, struct error *error)
 static bool pack(struct ldc_task *task, struct error *error)
 {
     task->next = settle;
+    if (ldc_host_is_used(task))
+        return ldc_host_pack(task, error);
     struct gpu_device *device = task->builder->device;
     struct ldc_builder *builder = task->builder;
     struct ldc_store *store = task->store;
@@ -111,11 +111,9 @@ static bool pack(struct ldc_task *task, struct error *error)
         gpu_buffer_bind_texels(device, &builder->found, UNIT_LDC_FOUND, GL_R32UI);
         gpu_buffer_bind_texels(device, &builder->peeled, UNIT_LDC_PEELED_SURFACE, GL_RGBA32UI);
         gpu_buffer_bind_image(device, &store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
-        gpu_buffer_bind_image(device, &store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
         gpu_buffer_bind_image(device, &store->primitives, IMAGE_LDC_PRIMITIVES, GL_RG32UI);
-    } else {
-        gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
     }
+    gpu_buffer_bind_image(device, &store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
     ldc_bind_runs(task, program);
     gpu_buffer_bind_image(device, &store->texels, IMAGE_LDC_TEXELS, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &store->quads, IMAGE_LDC_QUADS, GL_RGBA32F);
@@ -131,6 +129,7 @@ static bool pack(struct ldc_task *task, struct error *error)
 bool ldc_pack(struct ldc_task *task, struct error *error)
 {
     task->next = pack;
-    clear_texels(task);
+    if (!ldc_host_is_used(task) || task->counts.samples_max == 0)
+        clear_texels(task);
     return reserve(task, task->counts.samples_max, task->counts.quads_max, error);
 }

@@ -38,7 +38,7 @@ struct ldc_builder {
     struct ldc_task task;
     struct axes_draw draw;
     /* ldc/layout.h */
-    struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, build, histogram;
+    struct gpu_buffer counts, occupied, ordered, places, fragments, found, build, histogram;
     struct gpu_buffer peeled;
     /* Peeling: geometry of the layer that is drawn and of the one before it, by turns. */
     struct gpu_texture layers[2], layer_surface, depth;
@@ -48,6 +48,8 @@ struct ldc_builder {
     uint32_t primitives_a_unit; /* to be drawn; 0: not known yet */
     uint32_t fragments_max;     /* for which there is room in `fragments` */
 };
+
+#define LDC_HISTOGRAM_BINS 256 /* shaders/ldc/histogram.comp */
 
 enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
 
@@ -74,6 +76,13 @@ bool ldc_limit(struct ldc_task *task, struct error *error);
 /* build_pack.c. This unit and those after it: from `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
 
+/* build_host.c. On software GL, with lists, in place of places.comp, histogram.comp, sort.comp and pack.comp: with
+ * the same results but for the order of texels, and without `occupied`. What is counted is in task->counts. */
+bool ldc_host_is_used(const struct ldc_task *task);
+bool ldc_host_give_places(struct ldc_task *task, struct error *error);
+bool ldc_host_histogram(struct ldc_task *task, uint32_t texels_with[LDC_HISTOGRAM_BINS], struct error *error);
+bool ldc_host_pack(struct ldc_task *task, struct error *error);
+
 /* What a program that has ldc/sample.glsl needs to know of the scene; ends with {0}. */
 #define LDC_SAMPLE_DEFINES_MAX 5
 void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[LDC_SAMPLE_DEFINES_MAX]);
@@ -85,7 +94,6 @@ void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[L
 #define LDC_PRIMITIVE_BYTES 8
 #define LDC_PEELED_BYTES 32
 #define LDC_ORDERED_BYTES 8
-#define LDC_VISIBLE_BYTES 16
 
 /* build.c. The compute program, without defines, is made current. */
 const struct gpu_program *ldc_use(struct gpu_device *device, const char *path, struct error *error);

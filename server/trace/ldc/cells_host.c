@@ -54,13 +54,17 @@ static float reach_of(uint32_t normal_bits, uint32_t axis)
     return (reach < LDC_SPAN ? reach : LDC_SPAN) + LDC_ROUNDING;
 }
 
+static uint32_t cell_at(float depth, float last_cell)
+{
+    return (uint32_t)(depth > 0 ? depth < last_cell ? depth : last_cell : 0);
+}
+
 static uint32_t span_of(const struct host_pass *pass, const uint32_t geometry[2])
 {
     const float reach = reach_of(geometry[1], pass->axis), last_cell = (float)(pass->cube->resolution - 1);
     float depth;
     memcpy(&depth, &geometry[0], sizeof(depth));
-    const uint32_t first = (uint32_t)fminf(fmaxf(depth - reach, 0), last_cell);
-    const uint32_t last = (uint32_t)fminf(fmaxf(depth + reach, 0), last_cell);
+    const uint32_t first = cell_at(depth - reach, last_cell), last = cell_at(depth + reach, last_cell);
     return first | (last - first + 1) << SPAN_COUNT_SHIFT;
 }
 
