@@ -99,6 +99,12 @@ static bool reach(struct ldc_cells *cells, struct error *error)
     return raster_reach_pass(store->device, &nodes, pass, 0, (uint32_t)node_count(cells), error);
 }
 
+static bool reach_by_host(struct ldc_cells *cells, struct error *error)
+{
+    cells->next = NULL;
+    return ldc_cells_host_reach(cells, error);
+}
+
 /* Entries of cells that have one already. */
 static bool pass_further(struct ldc_cells *cells, const char *stage, struct error *error)
 {
@@ -123,7 +129,7 @@ static bool fill_further(struct ldc_cells *cells, struct error *error)
 
 static bool fill_by_host(struct ldc_cells *cells, struct error *error)
 {
-    cells->next = reach;
+    cells->next = reach_by_host;
     return ldc_cells_host_fill(cells, error);
 }
 
@@ -269,5 +275,6 @@ void ldc_cells_finish(struct ldc_cells *cells)
     }
     free(cells->spans);
     free(cells->further);
+    free(cells->sides);
     *cells = (struct ldc_cells){0};
 }

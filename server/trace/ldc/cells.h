@@ -32,7 +32,9 @@ struct ldc_cells {
     struct gpu_buffer list, counter;
     struct ldc_cell_counts counts;
     bool by_host;
-    uint32_t *spans, *further; /* private to cells_host.c: of each sample; of each row of nodes in an image */
+    /* private to cells_host.c: of each sample; of each row of nodes in an image; of each node */
+    uint32_t *spans, *further;
+    uint8_t *sides;
 };
 
 /* Begins to write nodes, blocks and entries of cube `which`, whose samples are there, and where in it cells hold
@@ -52,5 +54,7 @@ void ldc_cells_finish(struct ldc_cells *cells);
 bool ldc_cells_host_blocks(struct ldc_cells *cells, struct error *error);
 bool ldc_cells_host_count(struct ldc_cells *cells, struct error *error);
 bool ldc_cells_host_fill(struct ldc_cells *cells, struct error *error);
+/* In place of raster/reach.comp; empty nodes are clear. */
+bool ldc_cells_host_reach(struct ldc_cells *cells, struct error *error);
 
 #endif

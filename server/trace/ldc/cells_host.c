@@ -265,3 +265,82 @@ bool ldc_cells_host_fill(struct ldc_cells *cells, struct error *error)
 {
     return with_buffers(cells, fill_cells, error);
 }
+
+/* ---- the empty space around empty nodes ---- */
+
+/* Nodes of all octants of directions: the sides of the empty cubes that begin there, with a border beyond the
+ * grid, where all is empty. */
+struct host_reach {
+    const struct host_pass *pass;
+    uint8_t *sides;
+};
+
+static uint8_t *sides_of(const struct host_reach *reach, uint32_t octant)
+{
+    const size_t row = (size_t)reach->pass->cells->grid + 1;
+    return &reach->sides[octant * row * row * row];
+}
+
+/* Of a node whose coordinates count along the octant, from where its directions come. */
+static uint32_t node_along(uint32_t grid, uint32_t octant, const uint32_t at[3])
+{
+    uint32_t place[3];
+    for (int k = 0; k < 3; k++)
+        place[k] = octant >> k & 1u ? grid - 1 - at[k] : at[k];
+    return (place[2] * grid + place[1]) * grid + place[0];
+}
+
+static uint8_t smaller(uint8_t a, uint8_t b)
+{
+    return a < b ? a : b;
+}
+
+/* A cube is one larger than the smallest of the seven that begin beside it. */
+static void reach_along(void *context, uint32_t octant)
+{
+    const struct host_reach *reach = context;
+    const uint32_t grid = reach->pass->cells->grid, row = grid + 1, plane = row * row;
+    uint8_t *sides = sides_of(reach, octant);
+    memset(sides, BLOCK_REACH_MAX, (size_t)plane * row);
+    for (uint32_t z = grid; z-- > 0;)
+        for (uint32_t y = grid; y-- > 0;)
+            for (uint32_t x = grid; x-- > 0;) {
+                const uint32_t node = node_along(grid, octant, (const uint32_t[3]){x, y, z});
+                uint8_t *here = &sides[z * plane + y * row + x], side = here[1];
+                for (uint32_t k = 0; k < 2; k++)
+                    side = smaller(side, smaller(here[row + k], smaller(here[plane + k], here[plane + row + k])));
+                side = (uint8_t)(side < BLOCK_REACH_MAX ? side + 1u : BLOCK_REACH_MAX);
+                *here = parts_of(reach->pass->nodes[reach->pass->cube->first_node + node]) == 0 ? side : 0;
+            }
+}
+
+static void write_reaches(const struct host_reach *reach)
+{
+    const uint32_t grid = reach->pass->cells->grid, row = grid + 1;
+    for (uint32_t octant = 0; octant < 8; octant++) {
+        const uint8_t *sides = sides_of(reach, octant);
+        for (uint32_t z = 0; z < grid; z++)
+            for (uint32_t y = 0; y < grid; y++)
+                for (uint32_t x = 0; x < grid; x++) {
+                    const uint32_t node = node_along(grid, octant, (const uint32_t[3]){x, y, z});
+                    const uint32_t side = sides[(z * row + y) * row + x];
+                    reach->pass->nodes[reach->pass->cube->first_node + node][2] |= side << 4 * octant;
+                }
+    }
+}
+
+static void reach(struct host_pass *pass)
+{
+    const struct host_reach all = {pass, pass->cells->sides};
+    parallel_run(parallel_processors(), 8, reach_along, (void *)&all);
+    write_reaches(&all);
+}
+
+bool ldc_cells_host_reach(struct ldc_cells *cells, struct error *error)
+{
+    const size_t row = (size_t)cells->grid + 1;
+    cells->sides = malloc(8 * row * row * row);
+    if (!cells->sides)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the nodes of a layered depth cube");
+    return with_buffers(cells, reach, error);
+}

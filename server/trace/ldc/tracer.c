@@ -19,7 +19,8 @@
 #include <string.h>
 
 /* Where no resolution was asked for: the maximum, and the samples that a pixel of the picture is worth. To build
- * one takes some five times as long as bvh takes for a ray, and a pixel has 16 rays and more. */
+ * one takes about as long as bvh takes for a ray (software GL: 0.35 microseconds of a processor), and a pixel has
+ * 16 rays and more. */
 #define RESOLUTION_USUAL 1024u
 #define SAMPLES_PER_PIXEL 4.0
 
