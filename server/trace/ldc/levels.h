@@ -7,8 +7,9 @@
  * 1024: blocks of 8 0.15, of 32 0.19, a pyramid of 2 x 2 children 0.25, of 4 x 4 0.29, of 8 x 8 0.26, cells 4.1.
  * Image by image a ray visits 130 nodes and 54 texels, whose depths it meets but whose planes it misses; by cells,
  * for all images at once, it visits 16 nodes and blocks and 3 cells, and ends with the first intersection. For
- * that cells take 0.2 seconds to build where a pyramid takes 0.02, and 16 bytes for each cell that a sample's
- * plane passes, about two per sample. The paper's test, a tolerance, takes a pyramid: cells are of planes.
+ * that cells take 0.2 seconds to build by shaders, and about half of that by the host, where a pyramid takes 0.02;
+ * and 16 bytes for each cell that a sample's plane passes, about two per sample. The paper's test, a tolerance,
+ * takes a pyramid: cells are of planes.
  */
 #ifndef FARLIGHT_TRACE_LDC_LEVELS_H
 #define FARLIGHT_TRACE_LDC_LEVELS_H
