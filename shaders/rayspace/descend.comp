@@ -38,26 +38,21 @@ bundle bundle_at(uint node)
 
 #ifndef RAYSPACE_FLAT
 
-bool holds_primitives(uint link)
-{
-    return is_leaf(link) && link >> BVH_LEAF_KIND_SHIFT != BVH_LEAF_INSTANCE;
-}
-
 // Whether the node of a pair is to be divided, rather than the element.
 bool divides_node(uint level, bundle node, uint link, bounds b)
 {
     if (level == 0u)
         return false;
     if (is_leaf(link))
-        return holds_primitives(link);
+        return !is_instance(link);
     float width = node.radius + distance(b.centre, node.centre) * node.tangent;
     return node.secant == 0.0 || width * split_factor > b.radius;
 }
 
 // Whether a ray that meets the element goes on alone, as a pair of a ray and a leaf does (rayspace/subtree.glsl).
-bool is_for_one_ray(tree_place tree, uint element, uint link)
+bool is_for_one_ray(bool is_top, uint element, uint link)
 {
-    return is_leaf(link) ? holds_primitives(link) : !tree.is_top && link - element <= RAYSPACE_SUBTREE_MAX;
+    return is_leaf(link) ? !is_instance(link) : !is_top && link - element <= RAYSPACE_SUBTREE_MAX;
 }
 
 uint after(uint element, uint link)
@@ -106,13 +101,15 @@ void take(uvec4 pair)
     uint link = pair.y, next = 0u, end = 0u;
 #else
     b = bundle_at(pair.x);
+    if (b.end < 0.0)
+        return;
     tree_place tree = tree_of(pair.z);
     tree_element element = element_at(tree, pair.y);
     bounds bounds_ = bounds_of(tree, element);
     uint link = element.link, next = pair.y + 1u, end = link;
-    bool itself = again || (level == 0u && is_for_one_ray(tree, pair.y, link));
+    bool itself = again || (level == 0u && is_for_one_ray(tree.is_top, pair.y, link));
     bool by_node = itself || divides_node(level, b, link, bounds_);
-    if (!by_node && is_leaf(link)) { // an instance: its tree's root is the one child
+    if (!by_node && is_leaf(link)) { // the only instance of a scene: its tree's root is the one child
         made.z = link & BVH_LEAF_FIRST_MASK;
         tree = tree_of(made.z);
         next = 0u;
@@ -142,7 +139,14 @@ void take(uvec4 pair)
             link = element.link;
             next = after(next, link);
         }
-        bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u && is_for_one_ray(tree, one.y, link);
+        bool is_top = tree.is_top;
+        if (is_instance(link)) { // its tree's root is as large, and has its turn at once
+            one.yz = uvec2(0u, link & BVH_LEAF_FIRST_MASK);
+            is_top = false;
+            if (!root_link_of(one.z, link))
+                continue;
+        }
+        bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u && is_for_one_ray(is_top, one.y, link);
 #else
         bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u;
 #endif

@@ -119,3 +119,20 @@ bool is_leaf(uint link)
 {
     return link >> BVH_LEAF_KIND_SHIFT != 0u;
 }
+
+bool is_instance(uint link)
+{
+    return link >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_INSTANCE;
+}
+
+// Of the root of an instance's tree; false: the tree is empty.
+bool root_link_of(uint instance_index, out uint link)
+{
+    uvec4 place = texelFetch(tree_transforms, int(instance_index) * BVH_TRANSFORM_TEXELS + 5);
+#ifdef RAYSPACE_PACKED
+    link = texelFetch(tree_elements, int(place.x)).w;
+#else
+    link = texelFetch(tree_elements, 2 * int(place.x)).w;
+#endif
+    return place.y > 0u;
+}

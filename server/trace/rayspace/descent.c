@@ -12,6 +12,7 @@
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <string.h>
 
 /* Pairs of a stack: so many a ray, within bounds. */
 #define PAIRS_A_RAY 8u
@@ -21,6 +22,9 @@
 /* See shaders/rayspace/control.comp: a pass of one pair leaves four more behind, at each of some hundred levels.
  */
 #define PAIRS_RESERVED (1u << 12)
+/* The descent begins with so many nodes at most, or all rays of a small wave: a pass of few pairs takes as long as
+ * one of hundreds, and so does a level of few nodes. */
+#define SEEDS_MAX 256u
 #define ITEMS_MAX (1u << 20) /* of a batch */
 #define ROUNDS 1u
 /* Where the host does not wait: passes that are queued for a round of the joint descent, whose two hierarchies
@@ -215,6 +219,26 @@ static bool test_discs(struct gpu_scene *scene, struct rayspace_state *state, st
     return true;
 }
 
+/* Nodes that all rays are in, each with all of the scene. Levels above theirs are not made. Where waves are queued
+ * ahead, how many rays there are is not known, and it is the one node of all. */
+static void put_seeds(struct rayspace_state *state, struct gpu_device *device, bool has_scene)
+{
+    struct rayspace_levels *levels = &state->levels;
+    const uint32_t fitting = at_most(at_most(SEEDS_MAX, pass_max(state, device)), state->capacity / PAIRS_A_RAY);
+    const uint32_t most = rayspace_is_ahead(state) ? 1 : fitting;
+    uint32_t seeds[SEEDS_MAX][4];
+    while (levels->top > 0 && levels->count[levels->top - 1] <= most)
+        levels->top--;
+    if (!has_scene)
+        return;
+    state->seeds = levels->count[levels->top];
+    for (uint32_t i = 0; i < state->seeds; i++) {
+        const uint32_t seed[4] = {levels->top << RAYSPACE_LEVEL_SHIFT | i, 0, RAYSPACE_TOP, 0};
+        memcpy(seeds[i], seed, sizeof(seed));
+    }
+    gpu_buffer_write(device, &state->stacks[0], 0, seeds, state->seeds * sizeof(seeds[0]));
+}
+
 bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                             struct error *error)
 {
@@ -233,12 +257,8 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
         return false;
     state->round = state->next_rank = state->seeds = 0;
     state->turn = false;
-    if (!is_flat(state) && rayspace->tree.top.element_count > 0) {
-        /* One pair: all rays, and all of the scene. */
-        const uint32_t root[4] = {state->levels.top << RAYSPACE_LEVEL_SHIFT, 0, RAYSPACE_TOP, 0};
-        gpu_buffer_write(device, &state->stacks[0], 0, root, sizeof(root));
-        state->seeds = 1;
-    }
+    if (!is_flat(state))
+        put_seeds(state, device, rayspace->tree.top.element_count > 0);
     return rayspace_order_rays(state, scene, error) && rayspace_nodes_build(state, scene, false, error);
 }
 

@@ -80,9 +80,13 @@ bool rayspace_order_reserve(struct rayspace_state *state, struct gpu_device *dev
 
 bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error)
 {
+    const struct rayspace_settings *settings = &state->base.options.rayspace;
+    /* Rays that are alone from the beginning have no order. */
+    if (state->levels.top == 0 && settings->sort != RAYSPACE_CHANCE_ON && settings->turn != RAYSPACE_CHANCE_ON)
+        return true;
     if (!sample(state, scene, error))
         return false;
-    if (state->base.options.rayspace.sort == RAYSPACE_CHANCE_OFF)
+    if (settings->sort == RAYSPACE_CHANCE_OFF)
         return true;
     if (!rayspace_is_ahead(state)) {
         gpu_buffer_read(scene->device, &state->control, 0, &state->told, sizeof(state->told));

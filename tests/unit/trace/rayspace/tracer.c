@@ -290,9 +290,9 @@ TEST(a_wave_that_is_queued_whole_has_its_answers_or_stops_its_slice)
         {0, 4, false, true},
         {0, 1, true, true},
         /* The passes of a round take too few pairs: what is left has its turn in the rounds that follow. */
-        {192, 1, false, false},
-        {192, 4, false, true},
-        {64, 4, false, false},
+        {96, 1, false, false},
+        {96, 4, false, true},
+        {32, 4, false, false},
         {64, 1, true, false},
     };
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
