@@ -13,12 +13,24 @@
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer tree_primitives;
 #endif
 
+#if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
+#define ASK_MATERIALS
+#endif
+
 // The ray of a pair in the pair's instance.
 struct leaf_ray {
     trace_ray world;
     object_ray object;
-    uint ray;
     uint instance_index, first_primitive;
+    uint first_rank; // of the instance
+};
+
+// Intersections whose materials are to be asked. Software GL runs the code that asks for all rays of a SIMD group, hit or
+// no hit: it stands outside of the loops over elements and primitives.
+struct noted_hits {
+    uint count;
+    candidate first;
+    float second; // distance of the far side of a sphere
 };
 
 uint triangle_tests = 0u, box_tests = 0u;
@@ -43,11 +55,17 @@ void offer(leaf_ray r, candidate hit, inout pair_answer found)
     offer_any(r.world, hit, found);
 }
 
+bool is_of_interest(leaf_ray r, float distance_, pair_answer found)
+{
+    return distance_ > r.world.t_min && distance_ < r.world.t_max;
+}
+
 #else
 
 struct pair_answer {
-    uint distance, rank; // of the pair's nearest hit: ordered_bits(), and RAYSPACE_NO_RANK
-    uint known;          // the distance of the ray's nearest hit so far, likewise
+    float distance; // of the pair's nearest hit
+    uint rank;      // RAYSPACE_NO_RANK: there is none
+    float known;    // the distance of the ray's nearest hit so far; that of its end
 };
 
 bool is_done(pair_answer found)
@@ -58,44 +76,69 @@ bool is_done(pair_answer found)
 // How far the ray needs to go on: hits at one distance count too, as ranks decide among them.
 float end_of(leaf_ray r, pair_answer found)
 {
-    float end = found.known == 0xffffffffu ? r.world.t_max : min(r.world.t_max, float_of_ordered(found.known));
-    return end + abs(end) * (PRUNE_SLACK - 1.0);
+    return found.known + abs(found.known) * (PRUNE_SLACK - 1.0);
+}
+
+bool is_of_interest(leaf_ray r, float distance_, pair_answer found)
+{
+    return distance_ > r.world.t_min && distance_ < r.world.t_max && distance_ <= found.known;
 }
 
 void offer(leaf_ray r, candidate hit, inout pair_answer found)
 {
-    uint distance_ = ordered_bits(hit.distance);
-    if (distance_ > found.known)
+    uint rank = r.first_rank + hit.primitive - r.first_primitive;
+    bool is_nearer = found.rank == RAYSPACE_NO_RANK || hit.distance < found.distance ||
+                     (hit.distance == found.distance && rank < found.rank);
+    if (!is_of_interest(r, hit.distance, found) || !is_nearer)
         return;
-    candidate best = candidate_none(r.world.t_max);
-    offer_closest(r.world, hit, best);
-    uint rank = first_rank_of(r.instance_index) + hit.primitive - r.first_primitive;
-    if (best.primitive == HIT_NO_PRIMITIVE || distance_ > found.distance ||
-        (distance_ == found.distance && rank > found.rank))
+#ifdef ASK_MATERIALS
+    if (is_cut_out(hit, r.world.origin, r.world.direction, time_of(r.world)))
         return;
-    found.distance = distance_;
-    found.rank = rank;
-    found.known = min(distance_, atomicMin(answers[r.ray].x, distance_));
+#endif
+    found = pair_answer(hit.distance, rank, hit.distance);
 }
 
 #endif
 
+void offer_or_note(leaf_ray r, candidate hit, inout pair_answer found, inout noted_hits noted)
+{
+#ifdef ASK_MATERIALS
+    if (!is_of_interest(r, hit.distance, found))
+        return;
+    if (noted.count == 0u)
+        noted.first = hit;
+    else
+        noted.second = hit.distance;
+    noted.count++;
+#else
+    offer(r, hit, found);
+#endif
+}
+
+// The first of the noted hits; the other one becomes the first.
+void settle_one(leaf_ray r, inout pair_answer found, inout noted_hits noted)
+{
+    offer(r, noted.first, found);
+    noted.first.distance = noted.second;
+    noted.count--;
+}
+
 #ifdef HAS_SPHERES
-void test_sphere(leaf_ray r, vec4 sphere, uint primitive, inout pair_answer found)
+void test_sphere(leaf_ray r, vec4 sphere, uint primitive, inout pair_answer found, inout noted_hits noted)
 {
     vec2 distances;
     if (!intersect_sphere(r.object.origin, r.object.direction, sphere.xyz, sphere.w, distances))
         return;
-    for (int side = 0; side < 2; side++)
-        offer(r, candidate(side == 0 ? distances.x : distances.y, primitive, r.instance_index, vec2(0.0)), found);
+    offer_or_note(r, candidate(distances.x, primitive, r.instance_index, vec2(0.0)), found, noted);
+    offer_or_note(r, candidate(distances.y, primitive, r.instance_index, vec2(0.0)), found, noted);
 }
 #endif
 
-void test_triangle(leaf_ray r, uint primitive, inout pair_answer found)
+void test_triangle(leaf_ray r, uint primitive, inout pair_answer found, inout noted_hits noted)
 {
     candidate hit;
     if (intersect_primitive(r.world, r.object, primitive, r.instance_index, hit))
-        offer(r, hit, found);
+        offer_or_note(r, hit, found, noted);
 }
 
 #ifdef RAYSPACE_FLAT
@@ -105,27 +148,31 @@ void test_pair(uvec4 pair, leaf_ray r, inout pair_answer found)
     geometry g = geometry_at(instance_at(r.instance_index).geometry);
     r.first_primitive = g.first_primitive;
     uint primitive = r.first_primitive + number_of_item(pair.y);
+    noted_hits noted;
+    noted.count = 0u;
     triangle_tests++;
 #ifdef HAS_SPHERES
     if (g.kind == GEOMETRY_SPHERES)
-        test_sphere(r, texelFetch(spheres, int(primitive)), primitive, found);
+        test_sphere(r, texelFetch(spheres, int(primitive)), primitive, found, noted);
     else
 #endif
-        test_triangle(r, primitive, found);
+        test_triangle(r, primitive, found, noted);
+    while (noted.count > 0u)
+        settle_one(r, found, noted);
 }
 
 #else
 
 // The primitive i in the order of the tree, which has a copy of its corners. As these are those of the shutter's opening,
 // a shape that moves takes the geometry's own.
-void test_in_order(leaf_ray r, subtree part, uint i, bool is_sphere, inout pair_answer found)
+void test_in_order(leaf_ray r, subtree part, uint i, bool is_sphere, inout pair_answer found, inout noted_hits noted)
 {
     triangle_tests++;
 #ifdef HAS_SPHERES
     if (is_sphere) {
         int texel = int(part.first_texel + i * BVH_SPHERE_TEXELS);
         vec4 sphere = uintBitsToFloat(texelFetch(tree_primitives, texel));
-        test_sphere(r, sphere, r.first_primitive + texelFetch(tree_primitives, texel + 1).x, found);
+        test_sphere(r, sphere, r.first_primitive + texelFetch(tree_primitives, texel + 1).x, found, noted);
         return;
     }
 #endif
@@ -133,35 +180,48 @@ void test_in_order(leaf_ray r, subtree part, uint i, bool is_sphere, inout pair_
     uvec4 first = texelFetch(tree_primitives, texel);
     uint primitive = r.first_primitive + first.w;
 #ifdef HAS_MOTION
-    test_triangle(r, primitive, found);
+    test_triangle(r, primitive, found, noted);
 #else
     vec3 b = uintBitsToFloat(texelFetch(tree_primitives, texel + 1).xyz);
     vec3 c = uintBitsToFloat(texelFetch(tree_primitives, texel + 2).xyz);
     candidate hit = candidate(0.0, primitive, r.instance_index, vec2(0.0));
     if (intersect_triangle(r.object.direction, uintBitsToFloat(first.xyz) - r.object.origin, b - r.object.origin,
                            c - r.object.origin, hit.distance, hit.barycentrics))
-        offer(r, hit, found);
+        offer_or_note(r, hit, found, noted);
 #endif
 }
 
-// All invocations of a SIMD group first find their leaf, then all test primitives.
+// All invocations of a SIMD group first find their leaf, then all test primitives, and then all ask materials.
 void test_pair(uvec4 pair, leaf_ray r, inout pair_answer found)
 {
     subtree part = subtree_of(r.instance_index, pair.y, r.object);
     r.first_primitive = part.first_primitive;
-    while (part.element < part.end) {
-        float end = end_of(r, found);
-        uint leaf = 0u;
-        while (leaf == 0u && part.element < part.end) {
-            leaf = test_element(part, r.world.t_min, end);
-            box_tests++;
+    noted_hits noted;
+    noted.count = 0u;
+    uint leaf = 0u, next = 0u, end = 0u; // primitives of the leaf
+    for (;;) {
+        while (noted.count == 0u && (next < end || part.element < part.end)) {
+            float ray_end = end_of(r, found);
+            while (next == end && part.element < part.end) {
+                leaf = test_element(part, r.world.t_min, ray_end);
+                if (leaf != 0u) {
+                    next = leaf & BVH_LEAF_FIRST_MASK;
+                    end = next + (leaf >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
+                }
+                box_tests++;
+            }
+            for (; next < end && noted.count == 0u; next++)
+                test_in_order(r, part, next, leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_SPHERES, found, noted);
+#ifndef ASK_MATERIALS
+            if (is_done(found))
+                part.element = part.end;
+#endif
         }
-        uint first = leaf & BVH_LEAF_FIRST_MASK;
-        uint count = leaf == 0u ? 0u : (leaf >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
-        for (uint i = 0u; i < count; i++)
-            test_in_order(r, part, first + i, leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_SPHERES, found);
+        if (noted.count == 0u)
+            break;
+        settle_one(r, found, noted);
         if (is_done(found))
-            part.element = part.end;
+            break;
     }
 }
 
@@ -171,7 +231,6 @@ leaf_ray leaf_ray_of(uvec4 pair, uint ray)
 {
     leaf_ray r;
     r.world = trace_ray_of(ray);
-    r.ray = ray;
 #ifdef RAYSPACE_FLAT
     r.instance_index = instance_of_item(pair.y);
 #else
@@ -179,6 +238,9 @@ leaf_ray leaf_ray_of(uvec4 pair, uint ray)
 #endif
     r.object = object_from_world_ray(r.world, r.instance_index);
     r.first_primitive = 0u;
+#ifndef ANY_HIT
+    r.first_rank = first_rank_of(r.instance_index);
+#endif
     return r;
 }
 
@@ -203,10 +265,15 @@ void test_leaf_any(uvec4 pair, uint ray)
         return;
     pair_answer found = vec3(0.0);
     test_pair(pair, r, found);
+#ifdef HAS_TRANSLUCENT
     uvec3 steps = uvec3(found);
     deepen(ray, 0u, steps.x);
     deepen(ray, 1u, steps.y);
     deepen(ray, 2u, steps.z);
+#else
+    if (found.x > 0.0)
+        answers[ray].xyz = uvec3(OPTICAL_DEPTH_MAX);
+#endif
 }
 
 #else
@@ -214,9 +281,13 @@ void test_leaf_any(uvec4 pair, uint ray)
 // The nearest hit: its distance, as ordered_bits(), and the rank. None where a nearer one of the ray is known.
 uvec2 test_leaf_closest(uvec4 pair, uint ray)
 {
-    pair_answer found = pair_answer(0xffffffffu, RAYSPACE_NO_RANK, answers[ray].x);
-    test_pair(pair, leaf_ray_of(pair, ray), found);
-    return uvec2(found.distance, found.rank);
+    leaf_ray r = leaf_ray_of(pair, ray);
+    pair_answer found = pair_answer(0.0, RAYSPACE_NO_RANK, distance_left(ray, r.world.t_max));
+    test_pair(pair, r, found);
+    uint distance_ = ordered_bits(found.distance);
+    if (found.rank != RAYSPACE_NO_RANK)
+        atomicMin(answers[ray].x, distance_);
+    return uvec2(distance_, found.rank);
 }
 
 #endif
