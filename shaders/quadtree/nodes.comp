@@ -16,6 +16,7 @@
 #ifdef NODES_OF_LEAVES
 layout(binding = UNIT_QUADTREE_PLANES) uniform usamplerBuffer planes;
 uniform uint slice;
+uniform uint first_column, first_row, columns, rows; // nodes that are made: below the others there is nothing
 #else
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer nodes;
 layout(binding = UNIT_QUADTREE_ERRORS) uniform samplerBuffer errors;
@@ -167,13 +168,15 @@ bool is_turned(vec2 centre, float h, float w, vec2 slopes, vec4 w4, vec4 sx, vec
 
 void main()
 {
-    uint item = first_item + item_index(), width = node_row(level), height = quadtree.padded_height >> level;
-    uvec2 place = uvec2(item % width, item / width);
+    uint item = first_item + item_index();
 #ifdef NODES_OF_LEAVES
-    if (place.y >= height)
+    if (item >= columns * rows)
         return;
+    uvec2 place = uvec2(first_column + item % columns, first_row + item / columns);
     children four = children_of(place);
 #else
+    uint width = node_row(level), height = quadtree.padded_height >> level;
+    uvec2 place = uvec2(item % width, item / width);
     uint slice = place.y / height;
     place.y -= slice * height;
     if (slice >= quadtree.faces * quadtree.layers)
