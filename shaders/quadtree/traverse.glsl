@@ -347,7 +347,10 @@ bool walk_on(inout layer_walk walk, out node_passage p)
         bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
         // Most rays that pass an edge are far behind or before both of its sides: not one in ten of them meets either.
         bool is_close = walk.was_close || abs(p.gap_in) <= p.reach;
-        meets = p.is_plane && (is_met(p) || is_other_side && is_close);
+        // Where a ray begins before a surface that goes on from texel to texel, and moves away from it, it meets none of it.
+        bool moves_away = !(walk.is_before || walk.is_behind) && p.gap_out <= p.gap_in && p.gap_in <= 0.0 &&
+                          !plane_is_at_edge(p.node);
+        meets = p.is_plane && (is_met(p) || is_other_side && is_close && !moves_away);
         if (meets)
             break;
         if (goes_down) {
