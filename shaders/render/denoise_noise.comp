@@ -35,11 +35,11 @@ float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
         bool counts = within(next, lower, upper);
         int place = place_of(counts ? next : pixel);
         guide other = guide_of_words(texelFetch(guides, place).xy);
-        float weight = counts && is_alike(own, other) ? 1.0 : 0.0;
+        float weight = !counts || other.nearness <= 0.0 ? 0.0 : is_alike(own, other) ? 1.0 : DENOISE_UNLIKE;
         sum += weight * min(taken_of_words(texelFetch(light, place)).x, DENOISE_CAP * white);
         count += weight;
     }
-    return min(DENOISE_CAP * sum / max(count, 1.0), DENOISE_CAP * white);
+    return count > 0.0 ? min(DENOISE_CAP * sum / count, DENOISE_CAP * white) : DENOISE_CAP * white;
 }
 
 float smaller(float a, float b)

@@ -44,6 +44,9 @@
 #define DENOISE_MIRROR_DOUBT 0.5f
 /* What is brighter than so many times what is around it, or than so much of white, is left out of the filter. */
 #define DENOISE_CAP 4.0f
+/* Of what is around it pixels that see another surface count so much less: where few see the same, all say what is
+ * usual. */
+#define DENOISE_UNLIKE 0.0625f
 /* What is that much brighter is a speck where pixels beside it have less than this share of what is left of it. */
 #define DENOISE_ALONE 0.5f
 /* So much of a speck is left out: it may be a light that few samples find, and partway is wrong least either way.
