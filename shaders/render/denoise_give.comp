@@ -4,7 +4,8 @@
 // What the filter has left out because it was much brighter than its surroundings stays where each half of the samples has
 // half of it, as the halves of few samples differ by as much, or a pixel beside it is as bright: a highlight. What one half
 // has alone is a speck, which is worth next to nothing where it was found (DeCoro, Weyrich, Rusinkiewicz. Density-based
-// Outlier Rejection in Monte Carlo Rendering. 2010, by neighbours and halves in place of all samples).
+// Outlier Rejection in Monte Carlo Rendering. 2010, by neighbours and halves in place of all samples); in mirrors and glass it is
+// as often a light that is smaller there than a pixel, which few samples find.
 //
 // Defines: HAS_REPROJECTED what pictures before have brought has moved it, too.
 
@@ -57,6 +58,7 @@ void main()
     if (!pixel_of_item(pixel))
         return;
     int place = place_of(pixel);
+    guide own = guide_of_words(texelFetch(guides, place).xy);
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
     float count = samples_of_slot(slot);
     vec4 sum = accumulation[slot];
@@ -68,8 +70,8 @@ void main()
     moved += vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x) - sum.rgb / (count * albedo);
 #else
     vec3 mean = sum.rgb / count;
-    moved -= DENOISE_SPECK_DOUBT * speck_of(mean - filtered * albedo, mean, albedo, slot, count) * is_alone(pixel, filtered) / albedo;
+    float believed = DENOISE_SPECK_DOUBT * (1.0 - DENOISE_MIRROR_DOUBT * own.share) * is_alone(pixel, filtered);
+    moved -= believed * speck_of(mean - filtered * albedo, mean, albedo, slot, count) / albedo;
 #endif
-    bool there = guide_of_words(texelFetch(guides, place).xy).nearness > 0.0;
-    denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
+    denoised[slot] = vec4(own.nearness > 0.0 ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
 }
