@@ -19,6 +19,43 @@
 /* Frames of a view of that size may take 5.4 MiB, of the 10 MiB that all may. */
 #define LESS_THAN_ALL_EDGE 448
 
+/* ---- a clock ----------------------------------------------------------------------------------------- */
+
+#define MS UINT64_C(1000000)
+
+static atomic_uint_fast64_t stopped_ns; /* 0: it goes, so far ahead of the machine's: */
+static atomic_uint_fast64_t ahead_ns;
+
+uint64_t __real_clock_now_ns(void);
+uint64_t __wrap_clock_now_ns(void);
+
+/* That of all tests of this program. Those here that judge what a link carries stop it, and say how long that
+ * takes: else it would be slower where other programs have the processors. */
+uint64_t __wrap_clock_now_ns(void)
+{
+    const uint64_t at_ns = atomic_load(&stopped_ns);
+    return at_ns ? at_ns : __real_clock_now_ns() + atomic_load(&ahead_ns);
+}
+
+static void stop_clock(void)
+{
+    atomic_store(&stopped_ns, clock_now_ns());
+}
+
+static void let_pass(uint64_t ns)
+{
+    atomic_fetch_add(&stopped_ns, ns);
+}
+
+/* What has passed is not taken back. */
+static void start_clock(void)
+{
+    const uint64_t at_ns = atomic_load(&stopped_ns), real_ns = __real_clock_now_ns();
+    if (at_ns > real_ns + atomic_load(&ahead_ns))
+        atomic_store(&ahead_ns, at_ns - real_ns);
+    atomic_store(&stopped_ns, 0);
+}
+
 /* ---- an engine --------------------------------------------------------------------------------------- */
 
 static struct {
@@ -54,6 +91,7 @@ static bool submit(void *context, struct engine_command *command, struct error *
 
 static struct engine_port engine_begin(void)
 {
+    start_clock();
     engine.commands = queue_create(ENGINE_PORT_EVENTS_MAX, false);
     atomic_store(&engine.gone, 0);
     return port_begin(submit);
@@ -665,9 +703,10 @@ TEST_WITH(a_frame_in_parts_comes_whole_if_nothing_overtakes_it, set_up_ungreeted
 TEST_WITH(frames_are_wished_in_parts_where_the_link_takes_long_for_them, set_up_ungreeted, tear_down)
 {
     struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_SEND_PARTS, 100);
+    stop_clock();
     say_frame(2, 0, 1);
     take_frame(2, 0);
-    usleep(100000);
+    let_pass(100 * MS);
     send_ack(0, true, false); /* so long it took, as far as the daemon knows */
     told_and_forgotten(ENGINE_JOB_CREDIT);
     assert_false(view_wishes_see(start->job.wishes).effort.parts);
@@ -707,8 +746,8 @@ SESSION_TEST(a_picture_at_rest_that_has_not_begun_is_dropped_when_motion_goes_on
 }
 
 /* A view that adapts, as fast as can be, whose first frame of 300 KB takes so long on its way. In 0.1 s that is a
- * link of 3 MB a second at most, or 3 KB in a millisecond. */
-static struct engine_command *start_view_on_a_slow_link(float margin, useconds_t way_us)
+ * link of 3 MB a second, or 3 KB in a millisecond. The clock stays where it is then. */
+static struct engine_command *start_view_on_a_slow_link(float margin, uint64_t way_ns)
 {
     open_scene(1, 1);
     struct message message = view_message(100);
@@ -720,16 +759,17 @@ static struct engine_command *start_view_on_a_slow_link(float margin, useconds_t
     send_message(2, 0, &message);
     struct engine_command *start = told(ENGINE_JOB_START);
     assert_true(start->job.adapt);
+    stop_clock();
     say_frame(2, 0, 1); /* moving */
     take_frame(2, 0);
-    usleep(way_us);
+    let_pass(way_ns);
     send_ack(0, true, false);
     return start;
 }
 
 SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
 {
-    struct engine_command *start = start_view_on_a_slow_link(0.0f, 100000);
+    struct engine_command *start = start_view_on_a_slow_link(0.0f, 100 * MS);
     told_credit(2, 2);
     say_frame(2, 1, 3);
     take_frame(2, 1);
@@ -739,6 +779,7 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     assert_true(effort.bytes < FRAME_BYTES);
     assert_false(effort.sparing);
     say_frame(2, 2, 2); /* at rest; 100 ms are not too long for it */
+    let_pass(100 * MS);
     send_ack(1, true, false);
     take_frame(2, 2);
     assert_false(view_wishes_see(start->job.wishes).effort.sparing);
@@ -799,7 +840,7 @@ SESSION_TEST(the_first_frame_that_moves_follows_what_those_at_rest_took)
 /* What is 3 KB a picture at 1000 a second is most of 300 at ten. */
 SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
 {
-    struct engine_command *start = start_view_on_a_slow_link(0.1f, 100000);
+    struct engine_command *start = start_view_on_a_slow_link(0.1f, 100 * MS);
     told_and_forgotten(ENGINE_JOB_CREDIT);
     say_frame(2, 1, 3);
     take_frame(2, 1);
@@ -810,7 +851,7 @@ SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
 /* 300 KB in 0.1 s: neither a picture of 300 KB with what it hides fits ten a second, nor one with its margin. */
 SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
 {
-    struct engine_command *start = start_view_on_a_slow_link(0.1f, 150000);
+    struct engine_command *start = start_view_on_a_slow_link(0.1f, 150 * MS);
     told_and_forgotten(ENGINE_JOB_CREDIT);
     say_frame(2, 1, 3);
     take_frame(2, 1);
