@@ -171,9 +171,11 @@ $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: IN
 $(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o $(B)/pic/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
-# Compiling tests takes longer than what they compute themselves. The other configurations have warnings that need the optimiser.
+# Compiling tests takes longer than what they compute themselves, but for brute force over triangles. The other configurations
+# have the warnings that need the optimiser.
 ifeq ($(config),release)
 $(addprefix $(B)/tests/,unit/%.o accuracy/%.o tracers/%.o harness/%.o): OPT += -O0
+$(B)/tests/unit/trace/%.o: OPT += -O2
 endif
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
 SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVER_LOADED_PKGS)))$(SERVER_CFLAGS)

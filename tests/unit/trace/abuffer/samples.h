@@ -263,33 +263,79 @@ struct exact_hit {
     size_t triangle;
 };
 
-static inline struct exact_hit abuffer_exact(const struct abuffer_samples *s, const double o[3], const double d[3],
-                                             double t_min, double t_max)
+/* So many triangles in a row lie in a ball, past which most rays go. */
+#define BALL_TRIANGLES ((size_t)16)
+
+struct abuffer_ball {
+    double centre[3], radius;
+};
+
+/* free() */
+static inline struct abuffer_ball *abuffer_balls(const struct abuffer_samples *s)
+{
+    const size_t count = (s->triangle_count + BALL_TRIANGLES - 1) / BALL_TRIANGLES;
+    struct abuffer_ball *balls = calloc(count + 1, sizeof(*balls));
+    for (size_t i = 0; balls && i < s->triangle_count; i++) {
+        struct abuffer_ball *ball = &balls[i / BALL_TRIANGLES];
+        if (i % BALL_TRIANGLES == 0) /* as good as any */
+            memcpy(ball->centre, s->triangles[i].corners[0], sizeof(ball->centre));
+        for (int c = 0; c < 3; c++) {
+            const double *p = s->triangles[i].corners[c];
+            const double away[3] = {p[0] - ball->centre[0], p[1] - ball->centre[1], p[2] - ball->centre[2]};
+            const double length = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]);
+            ball->radius = fmax(ball->radius, length + 1e-3); /* far more than is lost by rounding */
+        }
+    }
+    return balls;
+}
+
+static inline bool passes_ball(const struct abuffer_ball *ball, const double o[3], const double d[3])
+{
+    double across = 0, along = 0;
+    for (int k = 0; k < 3; k++) {
+        const int x = (k + 1) % 3, y = (k + 2) % 3;
+        const double part = (ball->centre[x] - o[x]) * d[y] - (ball->centre[y] - o[y]) * d[x];
+        across += part * part;
+        along += d[k] * d[k];
+    }
+    return across > ball->radius * ball->radius * along;
+}
+
+static inline void meet_triangle(const struct abuffer_samples *s, size_t i, const double o[3], const double d[3],
+                                 double t_min, double t_max, struct exact_hit *best)
+{
+    const struct abuffer_triangle *t = &s->triangles[i];
+    double slope = 0, height = 0;
+    for (int k = 0; k < 3; k++) {
+        slope += (double)t->unit[k] * d[k];
+        height += (double)t->unit[k] * (t->corners[0][k] - o[k]);
+    }
+    const double distance = height / slope;
+    if (!(distance > t_min && distance < t_max && distance < best->distance))
+        return;
+    for (int c = 0; c < 3; c++) {
+        const double *a = t->corners[c], *b = t->corners[(c + 1) % 3];
+        double inside = 0;
+        for (int k = 0; k < 3; k++) {
+            int x = (k + 1) % 3, y = (k + 2) % 3;
+            inside += (double)t->unit[k] * ((b[x] - a[x]) * (o[y] + distance * d[y] - a[y]) -
+                                            (b[y] - a[y]) * (o[x] + distance * d[x] - a[x]));
+        }
+        if (!(inside >= -1e-9))
+            return;
+    }
+    *best = (struct exact_hit){distance, slope, i};
+}
+
+/* Brute force, but for balls that the ray passes. */
+static inline struct exact_hit abuffer_exact(const struct abuffer_samples *s, const struct abuffer_ball *balls,
+                                             const double o[3], const double d[3], double t_min, double t_max)
 {
     struct exact_hit best = {.distance = INFINITY};
-    for (size_t i = 0; i < s->triangle_count; i++) {
-        const struct abuffer_triangle *t = &s->triangles[i];
-        double slope = 0, height = 0;
-        for (int k = 0; k < 3; k++) {
-            slope += (double)t->unit[k] * d[k];
-            height += (double)t->unit[k] * (t->corners[0][k] - o[k]);
-        }
-        const double distance = height / slope;
-        if (!(distance > t_min && distance < t_max && distance < best.distance))
-            continue;
-        bool in = true;
-        for (int c = 0; c < 3 && in; c++) {
-            const double *a = t->corners[c], *b = t->corners[(c + 1) % 3];
-            double inside = 0;
-            for (int k = 0; k < 3; k++) {
-                int x = (k + 1) % 3, y = (k + 2) % 3;
-                inside += (double)t->unit[k] * ((b[x] - a[x]) * (o[y] + distance * d[y] - a[y]) -
-                                                (b[y] - a[y]) * (o[x] + distance * d[x] - a[x]));
-            }
-            in = inside >= -1e-9;
-        }
-        if (in)
-            best = (struct exact_hit){distance, slope, i};
+    for (size_t first = 0; first < s->triangle_count; first += BALL_TRIANGLES) {
+        const size_t left = s->triangle_count - first, count = left < BALL_TRIANGLES ? left : BALL_TRIANGLES;
+        for (size_t i = 0; i < count && (i > 0 || !passes_ball(&balls[first / BALL_TRIANGLES], o, d)); i++)
+            meet_triangle(s, first + i, o, d, t_min, t_max, &best);
     }
     return best;
 }

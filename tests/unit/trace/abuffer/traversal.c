@@ -17,17 +17,19 @@ struct outcome {
 static double *exact_distances(const struct fixture *fixture, const struct ray *rays, uint32_t count)
 {
     double *distances = malloc(count * sizeof(*distances));
-    assert_non_null(distances);
+    struct abuffer_ball *balls = abuffer_balls(&fixture->samples);
+    assert_true(distances && balls);
     for (uint32_t i = 0; i < count; i++) {
         double from[3], along[3];
         for (int k = 0; k < 3; k++) {
             from[k] = (double)rays[i].origin_t_min[k];
             along[k] = (double)rays[i].direction_t_max[k];
         }
-        distances[i] = abuffer_exact(&fixture->samples, from, along, (double)rays[i].origin_t_min[3],
+        distances[i] = abuffer_exact(&fixture->samples, balls, from, along, (double)rays[i].origin_t_min[3],
                                      (double)rays[i].direction_t_max[3])
                            .distance;
     }
+    free(balls);
     return distances;
 }
 
