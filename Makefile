@@ -171,12 +171,6 @@ $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: IN
 $(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o $(B)/pic/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
-# Compiling tests takes longer than what they compute themselves, but for brute force over triangles. The other configurations
-# have the warnings that need the optimiser.
-ifeq ($(config),release)
-$(addprefix $(B)/tests/,unit/%.o accuracy/%.o tracers/%.o harness/%.o): OPT += -O0
-$(B)/tests/unit/trace/%.o: OPT += -O2
-endif
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
 SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVER_LOADED_PKGS)))$(SERVER_CFLAGS)
 CLIENT_CFLAGS = $(eval CLIENT_CFLAGS := $(call pkg_cflags,$(CLIENT_PKGS)))$(CLIENT_CFLAGS)
@@ -291,6 +285,10 @@ UNIT_TEST_SRC := $(filter-out tests/unit/bench/contest.c,$(UNIT_TEST_SRC))
 endif
 TEST_PROGRAMS := $(addprefix $(B)/tests/unit/,unit_tests media_tests fault_tests corpus_tests)
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE_LIBS) -lm
+# With the optimiser they take longer to compile than it saves when they run, but for brute force over triangles.
+ifneq ($(filter release sanitize,$(config)),)
+$(call obj,$(filter-out tests/unit/trace/%,$(call sources,tests/unit tests/accuracy tests/harness tests/tracers,c))): OPT += -O0
+endif
 $(TEST_PROGRAMS): $(B)/tests/harness/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
 $(B)/tests/unit/unit_tests: $(call obj,$(UNIT_TEST_SRC))
@@ -314,8 +312,8 @@ $(B)/tests/fuzz/kept_%.o: CPPFLAGS_ALL += -DLLVMFuzzerTestOneInput=fuzz_one_$*
 $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 	@mkdir -p $(@D)
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
-# The importer without its main() and its sandbox.
-READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(call obj,$(TEXTURE_CXX) $(ASSIMP_CXX))
+# The importer without its main() and its sandbox, with its modules as they are compiled for themselves.
+READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(patsubst %.cpp,$(B)/pic/%.opp,$(TEXTURE_CXX) $(ASSIMP_CXX))
 READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS) $(ASSIMP_PKGS))
 # What reads messages of the page of farlight-web.
 REQUEST_OBJ := $(call obj,client/web/address.c client/web/request.c)

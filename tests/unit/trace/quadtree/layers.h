@@ -164,7 +164,7 @@ static inline void see_triangle(struct layers *layers, uint32_t face, double cor
             int inside = 0;
             for (int k = 0; k < 3; k++)
                 point[k] = begin[k] + z * step[k];
-            for (int k = 0; k < 3; k++) {
+            for (int k = 0; k < 3 && inside == k; k++) {
                 double from[3], side[3];
                 for (int axis = 0; axis < 3; axis++)
                     from[axis] = point[axis] - corners[k][axis];
