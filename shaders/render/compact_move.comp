@@ -16,7 +16,7 @@ layout(std430, binding = BIND_CHILD_COUNTS) readonly buffer count_block { uint c
 layout(std430, binding = BIND_BLOCK_OFFSETS) readonly buffer offset_block { uvec2 block_offsets[]; };
 layout(binding = UNIT_MOVE_CHILDREN) uniform usamplerBuffer children;
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
-layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
+layout(std430, binding = BIND_PATHS) writeonly buffer path_block { uvec4 paths[]; }; // PATH_TEXELS each
 #ifdef HAS_TIMES
 layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float times[]; };
 #endif
@@ -39,16 +39,13 @@ void main()
     }
     for (uint i = 0u; i < count; i++) {
         int texel = int(j * children_a_hit + i) * CHILD_TEXELS;
-        uvec4 third = texelFetch(children, texel + 2), fourth = texelFetch(children, texel + 3);
-        uvec4 fifth = texelFetch(children, texel + 4);
-        vec3 weight = uintBitsToFloat(third.xyz);
-        float time = uintBitsToFloat(fourth.w);
         rays[place + i] = ray(uintBitsToFloat(texelFetch(children, texel)), uintBitsToFloat(texelFetch(children, texel + 1)));
-        paths[place + i] = path(weight.r, weight.g, weight.b, third.w, uintBitsToFloat(fourth.x),
-                                uintBitsToFloat(fourth.y), fourth.z, time, fifth.x, uintBitsToFloat(fifth.y),
-                                uintBitsToFloat(fifth.z), uintBitsToFloat(fifth.w));
+        uvec4 second = texelFetch(children, texel + 3);
+        paths[(place + i) * uint(PATH_TEXELS)] = texelFetch(children, texel + 2);
+        paths[(place + i) * uint(PATH_TEXELS) + 1u] = second;
+        paths[(place + i) * uint(PATH_TEXELS) + 2u] = texelFetch(children, texel + 4);
 #ifdef HAS_TIMES
-        times[place + i] = time;
+        times[place + i] = uintBitsToFloat(second.w);
 #endif
     }
 }
