@@ -1,57 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The frame's camera and the order of its pixels (shared/frame.h).
+// The frame's camera (shared/frame.h).
 
-#include "shared/frame.h"
-#include "common/math.glsl"
-
-layout(std140, binding = UNIFORM_FRAME) uniform frame_block { frame_uniforms frame_in_block; };
-#ifdef UNIFORMS_AT_START // server/gpu/uniforms.h
-#define COPY(member) f.member = at_start(frame_in_block.member)
-frame_uniforms frame_at_start()
-{
-    frame_uniforms f;
-    COPY(world_from_view[0]), COPY(world_from_view[1]), COPY(world_from_view[2]);
-    COPY(extent_near), COPY(far_width), COPY(eye_steps), COPY(eyes_middle), COPY(lens), COPY(environment_colour);
-    COPY(irradiance[0]), COPY(irradiance[1]), COPY(irradiance[2]), COPY(irradiance[3]), COPY(irradiance[4]);
-    COPY(irradiance[5]), COPY(irradiance[6]), COPY(irradiance[7]), COPY(irradiance[8]);
-    COPY(width), COPY(height), COPY(tiles_across), COPY(sample_index), COPY(sample_shift), COPY(environment_kind);
-    COPY(light_count), COPY(depth), COPY(seed), COPY(group_shift), COPY(view_width), COPY(view_height);
-    return f;
-}
-frame_uniforms frame = frame_at_start(); // but for what is found by an index
-#else
-#define frame frame_in_block
-#endif
-
-// Pixel of a slot: x to the right, y down. May lie outside the picture at its right and lower edges.
-uvec2 pixel_of_slot(uint slot)
-{
-    uint tile = slot >> 6, m = slot & 63u;
-    uvec2 in_tile = uvec2((m & 1u) | (m >> 1 & 2u) | (m >> 2 & 4u), (m >> 1 & 1u) | (m >> 2 & 2u) | (m >> 3 & 4u));
-    uint row = quotient(tile, frame.tiles_across);
-    return uvec2(tile - row * frame.tiles_across, row) * 8u + in_tile;
-}
-
-uint slot_of_pixel(uvec2 pixel)
-{
-    uvec2 tile = pixel >> 3, p = pixel & 7u;
-    uint m = (p.x & 1u) | (p.y & 1u) << 1 | (p.x & 2u) << 1 | (p.y & 2u) << 2 | (p.x & 4u) << 2 | (p.y & 4u) << 3;
-    return (tile.y * frame.tiles_across + tile.x) << 6 | m;
-}
-
-// The view of the picture that a pixel belongs to: its number from the left and from above.
-uvec2 view_of_pixel(uvec2 pixel)
-{
-    if (frame.view_width == frame.width && frame.view_height == frame.height)
-        return uvec2(0u);
-    return uvec2(quotient(pixel.x, frame.view_width), quotient(pixel.y, frame.view_height));
-}
-
-// A pixel within its view, which names its random numbers: they are those of a picture that shows the view alone.
-uvec2 pixel_in_view(uvec2 pixel)
-{
-    return pixel - view_of_pixel(pixel) * uvec2(frame.view_width, frame.view_height);
-}
+#include "common/slots.glsl"
 
 // How far a view's eye is from the camera's, in view space.
 vec2 eye_of_view(uvec2 view)
@@ -103,49 +53,6 @@ vec2 sample_place(uint i)
 {
     vec4 two = frame_in_block.sample_places[i >> 1];
     return (i & 1u) != 0u ? two.zw : two.xy;
-}
-
-// Shirley and Chiu. A Low Distortion Map Between Disk and Square. 1997. From [0, 1)^2 to the unit disc.
-vec2 disc_from_square(vec2 u)
-{
-    vec2 p = 2.0 * u - 1.0;
-    if (p.x == 0.0 && p.y == 0.0)
-        return vec2(0.0);
-    bool wide = abs(p.x) > abs(p.y);
-    float radius = wide ? p.x : p.y;
-    float angle = wide ? PI / 4.0 * (p.y / p.x) : PI / 2.0 - PI / 4.0 * (p.x / p.y);
-    return radius * vec2(cos(angle), sin(angle));
-}
-
-// Through a thin lens, which leads all rays of one point of the picture through one point of the plane in focus (Cook,
-// Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: where they meet it, on the unit disc.
-void camera_ray_lens(vec2 view_place, vec2 on_lens, out vec3 origin, out vec3 direction, out float t_min)
-{
-    vec2 place = view_place / vec2(frame.view_width, frame.view_height) * 2.0 - 1.0;
-    place *= vec2(frame.extent_near.x, -frame.extent_near.y);
-    float focus = frame.lens.y;
-    bool orthographic = frame.extent_near.w != 0.0;
-    vec3 on_view = vec3(frame.lens.x * on_lens + (orthographic ? place : vec2(0.0)), 0.0);
-    // towards the point in focus, as far as distance 1 along the view
-    vec3 towards = vec3((orthographic ? vec2(0.0) : place) - frame.lens.x * on_lens / focus, -1.0);
-    float stretch = length(towards);
-    origin = eye_world() + world_from_view_vector(on_view);
-    direction = world_from_view_vector(towards / stretch);
-    t_min = frame.extent_near.z * stretch;
-}
-
-float filter_place(int i)
-{
-    return frame_in_block.filter_places[i >> 2][i & 3];
-}
-
-// The offset of a sample from its pixel's centre, in pixels: server/render/pixel_filter.h.
-float filter_offset(float number)
-{
-    float side = 2.0 * number - 1.0, at = sqrt(1.0 - abs(side)) * 64.0;
-    int i = min(int(at), 63);
-    float place = mix(filter_place(i), filter_place(i + 1), at - float(i));
-    return side < 0.0 ? -place : place;
 }
 
 // Clip coordinates of a point so that a pixel's centre shows what camera_ray_through() sees through that place in it.

@@ -10,6 +10,7 @@
 #include "shared/hit.h"
 #include "common/motion.glsl"
 #include "common/texture.glsl"
+#include "common/unit.glsl"
 
 #ifdef HAS_EMITTERS
 

@@ -4,7 +4,7 @@
 
 #include "shared/bindings.h"
 #include "shared/sky.h"
-#include "common/camera.glsl"
+#include "common/frame.glsl"
 #include "common/math.glsl"
 
 // The default sky of a scene without any light; server/render/environment.c integrates the same.

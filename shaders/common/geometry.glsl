@@ -3,6 +3,7 @@
 // common/attributes.glsl.
 #include "shared/bindings.h"
 #include "shared/geometry.h"
+#include "common/affine.glsl"
 #include "common/tables.glsl"
 
 layout(binding = UNIT_TRIANGLES) uniform usamplerBuffer triangles;       // i0 i1 i2 material

@@ -7,6 +7,7 @@
 #include "common/attributes.glsl"
 #include "common/math.glsl"
 #include "common/texture.glsl"
+#include "common/unit.glsl"
 
 #ifdef HAS_BUMP
 // The derivatives of the position by the texture coordinates of a slot, world space, at a hit.

@@ -4,7 +4,7 @@
 // material's own values.
 #include "shared/surface_sample.h"
 #include "common/colour.glsl"
-#include "common/math.glsl"
+#include "common/unit.glsl"
 
 struct surface_sample {
     vec4 base_colour; // share, linear; alpha last

@@ -6,6 +6,7 @@
 // from texture coordinates; NO_DISCS: there are none.
 #include "common/attributes.glsl"
 #include "common/normals.glsl"
+#include "common/unit.glsl"
 
 layout(binding = UNIT_TANGENTS) uniform usamplerBuffer tangents; // octahedral
 

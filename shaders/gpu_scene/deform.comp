@@ -7,8 +7,10 @@
 //   HAS_NORMALS     the mesh has normals
 //   HAS_TANGENTS    and tangents
 #include "shared/bindings.h"
+#include "common/affine.glsl"
 #include "common/dispatch.glsl"
 #include "common/math.glsl"
+#include "common/unit.glsl"
 
 // At rest, of all meshes one after the other.
 layout(binding = UNIT_REST_POSITIONS) uniform samplerBuffer rest_positions;

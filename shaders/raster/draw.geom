@@ -14,6 +14,7 @@
 #include "raster/cube.glsl"
 #include "raster/face.glsl"
 #include "raster/image.glsl"
+#include "common/affine.glsl"
 #include "common/math.glsl"
 
 uniform float resolution; // cells along a side of the cube

@@ -2,6 +2,7 @@
 // A surface's orientation to the axes: FACE_* bits of raster/layout.h.
 #include "raster/layout.h"
 #include "common/math.glsl"
+#include "common/unit.glsl"
 
 // `unit` points to the outside.
 uint face_of(vec3 unit)

@@ -8,6 +8,7 @@
 #endif
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
+#include "common/unit.glsl"
 #include "rayspace/control.glsl"
 #include "rayspace/ray.glsl"
 

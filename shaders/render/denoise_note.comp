@@ -14,6 +14,7 @@
 //          FOLLOWS with it: of rays that surfaces have sent on.
 
 #include "shared/denoise.h"
+#include "common/camera.glsl"
 #include "common/scattering.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"

@@ -5,7 +5,7 @@
 //   DISPLAY_VALUES   what is summed is display values of no curve
 //   TONE_MAP         the curve, a number of common/tonemap.glsl; else there is none
 #include "shared/path.h"
-#include "common/camera.glsl"
+#include "common/slots.glsl"
 #include "common/tonemap.glsl"
 
 uniform float scale;          // exposure / samples

@@ -6,7 +6,7 @@
 #include "shared/path.h"
 #include "common/dispatch.glsl"
 #include "common/intersect.glsl"
-#include "common/math.glsl"
+#include "common/unit.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;

@@ -5,6 +5,7 @@
 // Defines: NEEDS_SURFACE albedo or normal are among them; those of common/material.glsl.
 
 #include "shared/layers.h"
+#include "common/camera.glsl"
 #include "render/shade.glsl"
 
 uniform uint ray_count;

@@ -11,6 +11,7 @@
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "shared/hit.h"
+#include "common/camera.glsl"
 #include "common/dispatch.glsl"
 #include "common/sample_place.glsl"
 #include "render/path_texels.glsl"
@@ -38,6 +39,37 @@ layout(std430, binding = BIND_HITS) writeonly buffer hit_block { uvec4 hits[]; }
 // A layer for each of the current samples. An image, as llvmpipe compiles later programs for the state of a sampler, too.
 layout(binding = IMAGE_VISIBLE, rg32ui) readonly uniform uimage2DArray visible_primitives;
 uniform uint first_row; // of the picture in them
+#endif
+
+#ifdef HAS_LENS
+// Shirley and Chiu. A Low Distortion Map Between Disk and Square. 1997. From [0, 1)^2 to the unit disc.
+vec2 disc_from_square(vec2 u)
+{
+    vec2 p = 2.0 * u - 1.0;
+    if (p.x == 0.0 && p.y == 0.0)
+        return vec2(0.0);
+    bool wide = abs(p.x) > abs(p.y);
+    float radius = wide ? p.x : p.y;
+    float angle = wide ? PI / 4.0 * (p.y / p.x) : PI / 2.0 - PI / 4.0 * (p.x / p.y);
+    return radius * vec2(cos(angle), sin(angle));
+}
+
+// Through a thin lens, which leads all rays of one point of the picture through one point of the plane in focus (Cook,
+// Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: where they meet it, on the unit disc.
+void camera_ray_lens(vec2 view_place, vec2 on_lens, out vec3 origin, out vec3 direction, out float t_min)
+{
+    vec2 place = view_place / vec2(frame.view_width, frame.view_height) * 2.0 - 1.0;
+    place *= vec2(frame.extent_near.x, -frame.extent_near.y);
+    float focus = frame.lens.y;
+    bool orthographic = frame.extent_near.w != 0.0;
+    vec3 on_view = vec3(frame.lens.x * on_lens + (orthographic ? place : vec2(0.0)), 0.0);
+    // towards the point in focus, as far as distance 1 along the view
+    vec3 towards = vec3((orthographic ? vec2(0.0) : place) - frame.lens.x * on_lens / focus, -1.0);
+    float stretch = length(towards);
+    origin = eye_world() + world_from_view_vector(on_view);
+    direction = world_from_view_vector(towards / stretch);
+    t_min = frame.extent_near.z * stretch;
+}
 #endif
 
 void main()

@@ -6,12 +6,12 @@
 
 #include "shared/path.h"
 #include "shared/ray.h"
-#include "common/camera.glsl"
 #include "common/cone.glsl"
 #include "common/dispatch.glsl"
 #include "common/grain.glsl"
 #include "common/material.glsl"
 #include "common/sequence.glsl"
+#include "common/slots.glsl"
 #include "render/path_texels.glsl"
 
 layout(local_size_x = 64) in;

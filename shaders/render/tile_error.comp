@@ -2,7 +2,7 @@
 // How far the pixels of each tile are off, in the mean: server/render/picture_noise.h.
 
 #include "shared/path.h"
-#include "common/camera.glsl"
+#include "common/slots.glsl"
 #include "common/dispatch.glsl"
 
 layout(local_size_x = 64) in;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The pixels of a slice's slots. Defines: HAS_TILES the picture has only some of the tiles of its view (shared/key_view.h).
 #include "shared/key_view.h"
-#include "common/camera.glsl"
+#include "common/slots.glsl"
 
 #ifdef HAS_TILES
 layout(binding = UNIT_KEY_TILES) uniform usamplerBuffer key_tiles;

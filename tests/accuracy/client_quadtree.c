@@ -136,7 +136,7 @@ static void look_by_client(struct sides *sides, const struct fl_warp_camera *cam
         fail_msg("%s: %s", error.field, error.text);
 }
 
-/* Pixels are numbered as in shaders/common/camera.glsl. */
+/* Pixels are numbered as in shaders/common/slots.glsl. */
 static void sort_into_rows(struct sides *sides, const vec4 *slots)
 {
     for (uint32_t slot = 0; slot < COUNT; slot++) {

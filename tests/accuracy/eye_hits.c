@@ -123,7 +123,7 @@ static void look_through(struct room *room, const struct eye *eye)
     frame->eyes_middle[0] = frame->eyes_middle[1] = (float)(eye->views - 1) / 2;
 }
 
-/* Of a pixel of the picture, as shaders/common/camera.glsl numbers them. */
+/* Of a pixel of the picture, as shaders/common/slots.glsl numbers them. */
 static struct ray ray_of(const struct frame_uniforms *frame, uint32_t slot)
 {
     const uint32_t tile = slot / 64, m = slot % 64;

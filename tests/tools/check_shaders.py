@@ -109,7 +109,7 @@ HAZARDS = [
 # Functions whose values several programs must agree on to the bit: what they compute with more than one rounding is
 # `precise`, in a statement of its own, as a compiler may fuse a product and a sum in one program and not in another.
 PRECISE = {
-    "common/math.glsl": ("affine_point", "affine_vector", "affine_covector"),
+    "common/affine.glsl": ("affine_point", "affine_vector", "affine_covector"),
     "common/intersect.glsl": ("intersect_triangle",),
     "raster/fragment.glsl": ("triangle_depth_cells", "chord_of_sphere", "intersection_of"),
 }

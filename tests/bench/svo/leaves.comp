@@ -2,7 +2,7 @@
 // From fragments to leaves: who is in each, and sums of where and how.
 // Define: SVO_PLANES
 #include "common/dispatch.glsl"
-#include "common/math.glsl"
+#include "common/unit.glsl"
 #include "svo/tree.glsl"
 
 layout(binding = UNIT_SVO_FRAGMENTS) uniform usamplerBuffer fragments;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A leaf's plane in 32 bits (svo/svo.h).
-#include "common/math.glsl"
+#include "common/unit.glsl"
 #include "svo/svo.h"
 
 const float PLANE_MAX = float((1 << (SVO_PLANE_BITS - 1)) - 1);

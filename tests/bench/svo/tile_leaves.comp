@@ -2,7 +2,7 @@
 // From fragments to leaves: who is in each, and the running average of its normals, which goes round until nobody else
 // has changed it meanwhile (Crassin and Green).
 #include "common/dispatch.glsl"
-#include "common/math.glsl"
+#include "common/unit.glsl"
 #include "svo/tiles.glsl"
 
 layout(binding = UNIT_SVO_FRAGMENTS) uniform usamplerBuffer fragments;

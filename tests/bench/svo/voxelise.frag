@@ -5,6 +5,7 @@
 // Defines: those of raster/fragment.glsl; SVO_PLANES; SVO_TILES
 
 #include "shared/bindings.h"
+#include "common/unit.glsl"
 #include "raster/fragment.glsl"
 #include "raster/image.glsl"
 #include "svo/svo.h"
