@@ -10,7 +10,7 @@ uniform uint texels_along; // a side of the images
 
 layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
 layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
-layout(std430, binding = BIND_LDC_HISTOGRAM) buffer histogram_block { uint texels_with[256]; };
+layout(std430, binding = BIND_LDC_HISTOGRAM) buffer histogram_block { uint texels_with[LDC_HISTOGRAM_BINS]; };
 
 void main()
 {
@@ -20,5 +20,5 @@ void main()
     uint bits = texelFetch(occupied, int(k)).x;
     uint texel = ((bits >> 24) * texels_along + (bits >> 12 & 4095u)) * texels_along + (bits & 4095u);
     uint count = texelFetch(counts, int(texel)).x;
-    atomicAdd(texels_with[count < 255u ? count : 255u], 1u);
+    atomicAdd(texels_with[min(count, LDC_HISTOGRAM_BINS - 1u)], 1u);
 }

@@ -54,6 +54,8 @@
 /* The maximum deviation of a plane from its sample's depth within its texel and the slack: half a cell and the
  * slack along u, the same along v, at the maximum slope, 1 / AXES_OVERLAP. */
 #define LDC_SPAN ((1.0f + 2.0f * LDC_SLACK) / AXES_OVERLAP)
+/* Texels by their numbers of fragments; the last bin has those with more, too. */
+#define LDC_HISTOGRAM_BINS 256u
 /* The rounding error of depths and positions, in cells: some units in the last place of 4096. */
 #define LDC_ROUNDING 0.002f
 /* That of the planes of closest hits, which are verified with triangles (ldc/exact.glsl): between planes that end

@@ -150,28 +150,24 @@ bool abuffer_host_runs(struct abuffer_task *task, uint32_t first, uint32_t end, 
     struct gpu_buffer *buffers[OPENED_BUFFERS];
     void *opened[OPENED_BUFFERS] = {0};
     struct abuffer_build_counts *counts = &task->counts;
-    int open = 0;
     list_opened(task, buffers);
-    while (open < OPENED_BUFFERS && (opened[open] = gpu_buffer_open(task->builder->device, buffers[open], error)))
-        open++;
-    if (open == OPENED_BUFFERS) {
-        struct host_runs runs = {.heads = opened[0],
-                                 .nodes = opened[1],
-                                 .texels = opened[2],
-                                 .samples = opened[3],
-                                 .ids = opened[4],
-                                 .deep = opened[5],
-                                 .first = first,
-                                 .end = end};
-        atomic_init(&runs.sample_count, counts->samples);
-        atomic_init(&runs.depth_max, counts->depth_max);
-        atomic_init(&runs.deep_count, counts->deep);
-        parallel_run(parallel_processors(), (end - first + PART_TILES - 1) / PART_TILES, do_part, &runs);
-        counts->samples = atomic_load(&runs.sample_count);
-        counts->depth_max = atomic_load(&runs.depth_max);
-        counts->deep = atomic_load(&runs.deep_count);
-    }
-    for (int i = 0; i < open; i++)
-        gpu_buffer_unmap(task->builder->device, buffers[i]);
-    return open == OPENED_BUFFERS;
+    if (!gpu_buffers_open(task->builder->device, buffers, OPENED_BUFFERS, opened, error))
+        return false;
+    struct host_runs runs = {.heads = opened[0],
+                             .nodes = opened[1],
+                             .texels = opened[2],
+                             .samples = opened[3],
+                             .ids = opened[4],
+                             .deep = opened[5],
+                             .first = first,
+                             .end = end};
+    atomic_init(&runs.sample_count, counts->samples);
+    atomic_init(&runs.depth_max, counts->depth_max);
+    atomic_init(&runs.deep_count, counts->deep);
+    parallel_run(parallel_processors(), (end - first + PART_TILES - 1) / PART_TILES, do_part, &runs);
+    counts->samples = atomic_load(&runs.sample_count);
+    counts->depth_max = atomic_load(&runs.depth_max);
+    counts->deep = atomic_load(&runs.deep_count);
+    gpu_buffers_close(task->builder->device, buffers, OPENED_BUFFERS);
+    return true;
 }

@@ -363,15 +363,12 @@ bool abuffer_host_draws(struct abuffer_task *task, const struct axes_pass *pass,
 {
     struct gpu_buffer *buffers[OPENED_BUFFERS];
     void *opened[OPENED_BUFFERS] = {0};
-    int open = 0;
     if (!has_any(&task->builder->draw)) /* perhaps the scene has no triangles, and no buffer of them */
         return true;
     list_opened(task, buffers);
-    while (open < OPENED_BUFFERS && (opened[open] = gpu_buffer_open(task->builder->device, buffers[open], error)))
-        open++;
-    if (open == OPENED_BUFFERS)
-        draw_parts(task, opened, pass, first, end);
-    for (int i = 0; i < open; i++)
-        gpu_buffer_unmap(task->builder->device, buffers[i]);
-    return open == OPENED_BUFFERS;
+    if (!gpu_buffers_open(task->builder->device, buffers, OPENED_BUFFERS, opened, error))
+        return false;
+    draw_parts(task, opened, pass, first, end);
+    gpu_buffers_close(task->builder->device, buffers, OPENED_BUFFERS);
+    return true;
 }

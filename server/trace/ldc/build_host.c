@@ -206,24 +206,22 @@ bool ldc_host_pack(struct ldc_task *task, struct error *error)
 {
     struct gpu_buffer *buffers[OPENED_BUFFERS];
     void *opened[OPENED_BUFFERS] = {0};
-    const int count = task->counts.samples_max > 0 ? list_opened(task, buffers) : 0;
-    int open = 0;
-    while (open < count && (opened[open] = gpu_buffer_open(task->builder->device, buffers[open], error)))
-        open++;
-    if (open == count && count > 0) {
-        struct host_pack pack = {.task = task,
-                                 .counts = opened[0],
-                                 .ordered = opened[1],
-                                 .texels = opened[2],
-                                 .quads = opened[3],
-                                 .surface = opened[4],
-                                 .places = opened[5]};
-        parallel_run(parallel_processors(), 3 * task->cube->resolution, do_row, &pack);
-        task->counts.samples = atomic_load(&pack.samples);
-        task->counts.quads = atomic_load(&pack.quad_count);
-        task->counts.samples_lost = atomic_load(&pack.samples_lost);
-    }
-    for (int i = 0; i < open; i++)
-        gpu_buffer_unmap(task->builder->device, buffers[i]);
-    return open == count;
+    if (task->counts.samples_max == 0)
+        return true;
+    const int count = list_opened(task, buffers);
+    if (!gpu_buffers_open(task->builder->device, buffers, count, opened, error))
+        return false;
+    struct host_pack pack = {.task = task,
+                             .counts = opened[0],
+                             .ordered = opened[1],
+                             .texels = opened[2],
+                             .quads = opened[3],
+                             .surface = opened[4],
+                             .places = opened[5]};
+    parallel_run(parallel_processors(), 3 * task->cube->resolution, do_row, &pack);
+    task->counts.samples = atomic_load(&pack.samples);
+    task->counts.quads = atomic_load(&pack.quad_count);
+    task->counts.samples_lost = atomic_load(&pack.samples_lost);
+    gpu_buffers_close(task->builder->device, buffers, count);
+    return true;
 }

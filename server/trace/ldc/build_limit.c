@@ -6,7 +6,6 @@
 
 #include <epoxy/gl.h>
 
-#define BINS LDC_HISTOGRAM_BINS
 /* Buffers that grow take half as much again. */
 #define GROWTH(bytes) ((bytes) + (bytes) / 2)
 
@@ -39,14 +38,14 @@ static bool fits(const struct ldc_task *task, uint64_t samples, uint64_t quads)
     return (allowed == 0 || sample_bytes(samples, quads) <= allowed) && fits_device(task, samples, quads);
 }
 
-static bool read_histogram(struct ldc_task *task, uint32_t texels_with[BINS], struct error *error)
+static bool read_histogram(struct ldc_task *task, uint32_t texels_with[LDC_HISTOGRAM_BINS], struct error *error)
 {
     if (ldc_host_is_used(task))
         return ldc_host_histogram(task, texels_with, error);
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const struct gpu_program *program = ldc_use(device, "ldc/histogram.comp", error);
-    if (!program || !gpu_buffer_reserve(device, &builder->histogram, BINS * sizeof(uint32_t), error))
+    if (!program || !gpu_buffer_reserve(device, &builder->histogram, LDC_HISTOGRAM_BINS * sizeof(uint32_t), error))
         return false;
     gpu_buffer_clear(device, &builder->histogram, 0);
     gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
@@ -55,13 +54,13 @@ static bool read_histogram(struct ldc_task *task, uint32_t texels_with[BINS], st
     gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
     gpu_uniform_uint(program, "texels_along", task->cube->resolution);
     gpu_dispatch(device, program, task->counts.occupied);
-    gpu_buffer_read(device, &builder->histogram, 0, texels_with, BINS * sizeof(uint32_t));
+    gpu_buffer_read(device, &builder->histogram, 0, texels_with, LDC_HISTOGRAM_BINS * sizeof(uint32_t));
     return true;
 }
 
 bool ldc_limit(struct ldc_task *task, struct error *error)
 {
-    uint32_t texels_with[BINS], layers;
+    uint32_t texels_with[LDC_HISTOGRAM_BINS], layers;
     if (task->counts.layers_needed <= task->layers_max &&
         fits(task, task->counts.samples_max, task->counts.quads_max))
         return true;
@@ -69,7 +68,7 @@ bool ldc_limit(struct ldc_task *task, struct error *error)
         return false;
     for (layers = task->layers_max; layers > 0; layers--) {
         uint64_t samples = 0, quads = 0;
-        for (uint32_t count = 1; count < BINS; count++) {
+        for (uint32_t count = 1; count < LDC_HISTOGRAM_BINS; count++) {
             uint32_t kept = count < layers ? count : layers;
             samples += (uint64_t)texels_with[count] * kept;
             quads += (uint64_t)texels_with[count] * ((kept + 3) / 4);

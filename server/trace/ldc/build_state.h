@@ -49,8 +49,6 @@ struct ldc_builder {
     uint32_t fragments_max;     /* for which there is room in `fragments` */
 };
 
-#define LDC_HISTOGRAM_BINS 256 /* shaders/ldc/histogram.comp */
-
 enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
 
 /* build_draw.c. Draws some of what is listed, from task->drawn on, which is 0 as a pass begins; when all is drawn,

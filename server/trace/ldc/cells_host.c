@@ -185,21 +185,17 @@ static bool with_buffers(struct ldc_cells *cells, void (*work)(struct host_pass 
     void *opened[OPENED_BUFFERS] = {0};
     struct gpu_device *device = cells->store->device;
     const int count = list_opened(cells->store, buffers);
-    int open = 0;
-    while (open < count && (opened[open] = gpu_buffer_open(device, buffers[open], error)))
-        open++;
-    if (open == count) {
-        struct host_pass pass = {.cells = cells,
-                                 .cube = &cells->store->cubes[cells->which],
-                                 .nodes = opened[0],
-                                 .texels = opened[1],
-                                 .geometry = opened[2],
-                                 .entries = opened[3]};
-        work(&pass);
-    }
-    for (int i = 0; i < open; i++)
-        gpu_buffer_unmap(device, buffers[i]);
-    return open == count;
+    if (!gpu_buffers_open(device, buffers, count, opened, error))
+        return false;
+    struct host_pass pass = {.cells = cells,
+                             .cube = &cells->store->cubes[cells->which],
+                             .nodes = opened[0],
+                             .texels = opened[1],
+                             .geometry = opened[2],
+                             .entries = opened[3]};
+    work(&pass);
+    gpu_buffers_close(device, buffers, count);
+    return true;
 }
 
 /* ---- what cells.c does with shaders elsewhere ---- */
