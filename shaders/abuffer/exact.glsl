@@ -128,8 +128,20 @@ void search_voxels(trace_ray r, inout voxel_traversal w, inout abuffer_found fou
 {
     while (w.s < w.s_end) {
         found_voxel here = next_voxel(w);
+#ifdef OFFERS_LATER
+        found.met.first = 0;
+        bool goes_on = here.what != 0u;
+        while (goes_on) {
+            found.met.count = 0;
+            search_planes(r, w, found, here);
+            offer_met(r, w, found);
+            found.met.first += MET_MAX;
+            goes_on = found.met.count > found.met.first;
+        }
+#else
         if (here.what != 0u)
             search_planes(r, w, found, here);
+#endif
     }
 }
 

@@ -14,6 +14,21 @@
 #define KEEPS_SAMPLE // the intersected sample is looked at again, behind the search
 #endif
 
+#if defined ANY_HIT && defined HAS_TRANSLUCENT && !defined ABUFFER_STEPS
+#define OFFERS_LATER // intersections in a part of a voxel are offered behind its search
+#endif
+
+#ifdef OFFERS_LATER
+// Software GL runs a loop's whole body in every round, and to look up what a surface lets pass takes longer than to
+// find it. So a search collects intersections; where a part of a voxel has more than MET_MAX, it is searched again.
+struct abuffer_met {
+    ivec4 samples;  // complements: the ray comes from behind
+    vec4 distances;
+    int first, count; // the first one that is collected; how many the part has
+};
+const int MET_MAX = 4;
+#endif
+
 // What a ray has found, and up to where it is still looking.
 struct abuffer_found {
     float end; // in lengths of the direction
@@ -21,6 +36,9 @@ struct abuffer_found {
     vec3 optical_depth;
 #ifdef HAS_TRANSLUCENT
     intersected_surfaces intersected;
+#endif
+#ifdef OFFERS_LATER
+    abuffer_met met;
 #endif
 #endif
 #ifdef KEEPS_SAMPLE
@@ -53,7 +71,9 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
 
 abuffer_found found_of(trace_ray r, vec3 optical_depth)
 {
-#ifdef HAS_TRANSLUCENT
+#ifdef OFFERS_LATER
+    return abuffer_found(r.t_max, optical_depth, intersected_nothing(), abuffer_met(ivec4(0), vec4(0.0), 0, 0));
+#elif defined HAS_TRANSLUCENT
     return abuffer_found(r.t_max, optical_depth, intersected_nothing());
 #elif defined KEEPS_SAMPLE
     return abuffer_found(r.t_max, optical_depth, -1, false);
@@ -84,3 +104,28 @@ void offer_at(trace_ray r, inout voxel_traversal w, inout abuffer_found found, i
     w.s_limit = found.end * w.ray.scale - w.ray.begin;
     w.s_end = w.s_end < w.s_limit ? w.s_end : w.s_limit;
 }
+
+#ifdef OFFERS_LATER
+
+void meet(inout abuffer_met met, int sample_index, float s, float side)
+{
+    bvec4 here = equal(ivec4(met.count - met.first), ivec4(0, 1, 2, 3));
+    met.samples = mix(met.samples, ivec4(side > 0.0 ? ~sample_index : sample_index), here);
+    met.distances = mix(met.distances, vec4(s), here);
+    met.count++;
+}
+
+// In the order in which they were found.
+void offer_met(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
+{
+    int left = min(found.met.count - found.met.first, MET_MAX);
+    while (left > 0) {
+        int index = found.met.samples.x;
+        offer_at(r, w, found, index < 0 ? ~index : index, found.met.distances.x, index < 0 ? 1.0 : -1.0);
+        found.met.samples = found.met.samples.yzww;
+        found.met.distances = found.met.distances.yzww;
+        left--;
+    }
+}
+
+#endif

@@ -63,7 +63,11 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
             bool is_met = intersects && from_middle.x <= 0.5 + w.beyond && from_middle.y <= 0.5 + w.beyond;
             if (is_one && !is_behind && is_met && s_plane > w.s_behind && s_plane < w.s_limit &&
                 (!only_leaning || leans(p))) {
+#ifdef OFFERS_LATER
+                meet(found.met, i, s_plane, side);
+#else
                 offer_at(r, w, found, i, s_plane, side);
+#endif
 #ifdef KEEPS_SAMPLE
                 found.is_within = from_middle.x <= 0.5 + ABUFFER_SLACK && from_middle.y <= 0.5 + ABUFFER_SLACK;
 #endif

@@ -69,13 +69,14 @@ bool abuffer_steps_of_voxels(const struct tracer_options *options)
 /* With N texels and V voxels along a side, and D samples in the longest list: a ray passes 12 V parts of voxels,
  * and with the voxels and blocks 16 V. In each part and image it begins with the texel where it enters, and passes
  * 2 N texels of each image on its way; a linear search looks up its steps, and settles a passage in each part. Two
- * samples of a column are one round. */
+ * samples of a column are one round. Two more of each part are those of what it collects for a shadow ray, and of
+ * the search itself (abuffer/exact.glsl). */
 uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store, const struct tracer_options *options)
 {
     const uint64_t parts = 12 * (uint64_t)store->voxels_along;
     const uint64_t columns = abuffer_is_linear(options) ? parts * (STEP_COLUMNS + PASSAGE_COLUMNS)
                                                         : 3 * (2 * (uint64_t)store->resolution + parts);
-    return parts + parts / 3 + columns * (SCAN_ROUNDS + store->depth_max / 2);
+    return 3 * parts + parts / 3 + columns * (SCAN_ROUNDS + store->depth_max / 2);
 }
 
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,

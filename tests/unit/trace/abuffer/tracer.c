@@ -123,6 +123,43 @@ static struct ray ray_off_the_rod(double radius, uint64_t *seed)
     return ray;
 }
 
+/* ---- sheets ---- */
+
+enum { SHEETS = 5, SHEET_RAYS = 64 };
+
+/* Square ones, each of which lets nine tenths of light through; they lie further apart than what counts as one
+ * surface (shaders/common/intersected.glsl), and all of them in one part of a voxel. */
+static struct scene *scene_of_sheets(double apart)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    float positions[4 * SHEETS][3];
+    uint32_t triangles[2 * SHEETS][3];
+    struct scene_material *film = test_material(&edits, 1, 0.4f, 0.5f, 0.6f);
+    film->alpha_mode = ALPHA_BLEND;
+    film->base_colour[3] = 0.1f;
+    for (uint32_t i = 0; i < SHEETS; i++) {
+        const uint32_t first = 4 * i;
+        for (uint32_t k = 0; k < 4; k++)
+            memcpy(positions[first + k], (float[3]){k & 1 ? 4 : -4, k & 2 ? 4 : -4, (float)(i * apart)},
+                   sizeof(positions[0]));
+        memcpy(triangles[2 * i], (uint32_t[3]){first, first + 1, first + 2}, sizeof(triangles[0]));
+        memcpy(triangles[2 * i + 1], (uint32_t[3]){first + 2, first + 1, first + 3}, sizeof(triangles[0]));
+    }
+    struct scene_mesh *mesh =
+        test_mesh(&edits, 1, (const float(*)[3])positions, 4 * SHEETS, (const uint32_t *)triangles, 2 * SHEETS);
+    mesh->ranges = test_ranges(&(struct material_range){0, 2 * SHEETS, 1}, 1);
+    mesh->range_count = 1;
+    test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static double light_of(uint32_t visibility)
+{
+    const double root = (double)(visibility & VISIBILITY_MAX) / VISIBILITY_MAX;
+    return root * root * root;
+}
+
 ALL_TESTS(open_device, close_device)
 
 TEST(options_out_of_range_are_refused_by_name)
@@ -317,4 +354,24 @@ TEST(a_thin_rod_does_not_darken_itself)
     }
     free(rays);
     free(visibilities);
+}
+
+/* One more than a search collects at once. */
+TEST(each_of_five_sheets_takes_its_share_of_light)
+{
+    const struct tracer_options coarse_voxels = {.abuffer = {.resolution = 512, .voxels = 16}};
+    struct fixture fixture;
+    struct ray rays[SHEET_RAYS];
+    uint32_t visibilities[SHEET_RAYS];
+    uint64_t seed = 5;
+    fixture_init(&fixture, scene_of_sheets(1.2 * 8 / (512 - MARGIN_CELLS)), &coarse_voxels);
+    for (uint32_t i = 0; i < SHEET_RAYS; i++) {
+        const float x = test_uniform(&seed, -3, 3), y = test_uniform(&seed, -3, 3);
+        rays[i] = (struct ray){{x, y, i & 1 ? -1 : 1, 1e-4f}, {0, 0, i & 1 ? 1 : -1, 2}};
+    }
+    trace_rays(trace_by_tracer, &fixture, WAVE_ANY, rays, SHEET_RAYS, NULL, visibilities);
+    for (uint32_t i = 0; i < SHEET_RAYS; i++)
+        if (!(fabs(light_of(visibilities[i]) - pow(0.9, SHEETS)) < 0.005))
+            fail_msg("ray %u: %.3f of the light, of %.3f", i, light_of(visibilities[i]), pow(0.9, SHEETS));
+    fixture_finish(&fixture);
 }
