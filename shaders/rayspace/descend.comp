@@ -29,6 +29,8 @@ uniform uint to, later; // the stacks that are written to
 // The node is divided while it is wider than a fraction of the element, by that factor: what is coarse on both sides
 // costs tests and culls little.
 uniform float split_factor;
+// 1: and whatever its width where its rays may go on alone (is_for_one_ray): each then has few pairs.
+uniform uint rays_go_alone;
 
 bundle bundle_at(uint node)
 {
@@ -38,21 +40,21 @@ bundle bundle_at(uint node)
 
 #ifndef RAYSPACE_FLAT
 
+// Whether a ray that meets the element goes on alone, as a pair of a ray and a leaf does (rayspace/subtree.glsl).
+bool is_for_one_ray(bool is_top, uint element, uint link)
+{
+    return is_leaf(link) ? !is_instance(link) : !is_top && link - element <= RAYSPACE_SUBTREE_MAX;
+}
+
 // Whether the node of a pair is to be divided, rather than the element.
-bool divides_node(uint level, bundle node, uint link, bounds b)
+bool divides_node(uint level, bundle node, bool for_one, uint link, bounds b)
 {
     if (level == 0u)
         return false;
     if (is_leaf(link))
         return !is_instance(link);
     float width = node.radius + distance(b.centre, node.centre) * node.tangent;
-    return node.secant == 0.0 || width * split_factor > b.radius;
-}
-
-// Whether a ray that meets the element goes on alone, as a pair of a ray and a leaf does (rayspace/subtree.glsl).
-bool is_for_one_ray(bool is_top, uint element, uint link)
-{
-    return is_leaf(link) ? !is_instance(link) : !is_top && link - element <= RAYSPACE_SUBTREE_MAX;
+    return (for_one && rays_go_alone != 0u) || node.secant == 0.0 || width * split_factor > b.radius;
 }
 
 uint after(uint element, uint link)
@@ -107,8 +109,9 @@ void take(uvec4 pair)
     tree_element element = element_at(tree, pair.y);
     bounds bounds_ = bounds_of(tree, element);
     uint link = element.link, next = pair.y + 1u, end = link;
-    bool itself = again || (level == 0u && is_for_one_ray(tree.is_top, pair.y, link));
-    bool by_node = itself || divides_node(level, b, link, bounds_);
+    bool for_one = is_for_one_ray(tree.is_top, pair.y, link);
+    bool itself = again || (level == 0u && for_one);
+    bool by_node = itself || divides_node(level, b, for_one, link, bounds_);
     if (!by_node && is_leaf(link)) { // the only instance of a scene: its tree's root is the one child
         made.z = link & BVH_LEAF_FIRST_MASK;
         tree = tree_of(made.z);

@@ -35,11 +35,8 @@
 #define PASSES_A_TEST 8u
 /* From all pairs of a stack to one it takes fewer halvings. */
 #define FAILED_IN_TURN_MAX 64u
-/* A node is divided while it is wider than a fraction of the element. The factor of the fewest tests; and where a
- * pass costs more than its tests, and rays that are alone sooner cost less: on software GL three scenes of the SPD
- * took 0.5 to 0.9 of the tracer's time. */
+/* A node is divided while it is wider than a fraction of the element. The factor of the fewest tests. */
 #define SPLIT_FACTOR 4.0f
-#define SPLIT_FACTOR_SOFTWARE 64.0f
 #define LEAVES_ALL 0u
 #define LEAVES_NONE UINT32_MAX
 
@@ -408,8 +405,9 @@ static bool dispatch_pass(struct rayspace *rayspace, struct gpu_scene *scene, st
     gpu_uniform_uint(program, "later", roles.later);
     set_tree(program, &rayspace->tree);
     set_levels(program, &state->levels);
-    gpu_uniform_float(program, "split_factor",
-                      scene->device->facts.software ? SPLIT_FACTOR_SOFTWARE : SPLIT_FACTOR);
+    gpu_uniform_float(program, "split_factor", SPLIT_FACTOR);
+    /* A pair of a pass takes software GL as long as a ray its whole way through a tree. */
+    gpu_uniform_uint(program, "rays_go_alone", scene->device->facts.software);
     gpu_dispatch_indirect(program, &state->control, offsetof(struct rayspace_control, pass_groups_x));
     if (!leaves_slots(state))
         return true;
