@@ -37,7 +37,7 @@ vec3 speck_of(vec3 left, vec3 mean, vec3 albedo, uint slot, float count)
     return second_count > 0.0 && all > 0.0 ? left * (1.0 - clamp(2.0 * shown / all, 0.0, 1.0)) : vec3(0.0);
 }
 
-// 1: no pixel beside it is about as bright.
+// 1: no pixel beside it is about as bright, by both halves, as one half may have a speck there.
 float is_alone(ivec2 pixel, vec3 filtered)
 {
     ivec2 lower, upper;
@@ -45,7 +45,8 @@ float is_alone(ivec2 pixel, vec3 filtered)
     float most = 0.0;
     for (int i = 0; i < 9; i++) {
         ivec2 next = clamp(pixel + ivec2(i % 3 - 1, i / 3 - 1), lower, upper - 1);
-        float shown = luminance(mean_of(halves_of_words(texelFetch(first_light, place_of(next)))));
+        halves h = halves_of_words(texelFetch(first_light, place_of(next)));
+        float shown = min(luminance(h.a), luminance(h.b));
         most = max(most, next == pixel ? 0.0 : shown);
     }
     float share = most / max(luminance(filtered), 1e-30);

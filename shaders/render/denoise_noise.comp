@@ -10,6 +10,7 @@
 
 uniform float white;     // 2^-exposure
 uniform uint one_sample; // there are no halves: the difference of neighbours stands for theirs
+uniform float doubt;     // so much of the noise of mirrors and glass is not believed
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
@@ -86,7 +87,7 @@ void main()
     vec3 noise = noise_of(h);
     if (one_sample != 0u && h.a == h.b)
         noise = apart;
-    float believed = 1.0 - (one_sample != 0u && h.a == h.b ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
+    float believed = 1.0 - (one_sample != 0u && h.a == h.b ? 1.0 : doubt) * own.share;
     noise *= believed;
     h = halves(mean + noise, mean - noise, min(abs(taken_of_words(words).y), cap) * believed);
     vec2 slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));

@@ -11,7 +11,7 @@
 
 #include "render/denoise.glsl"
 
-uniform float believed; // of the noise that halves show
+uniform float believed; // of the noise that halves show; above 1: the error may fall as much faster
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_RISK) uniform samplerBuffer risks;

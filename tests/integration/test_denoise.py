@@ -82,6 +82,13 @@ class Denoise(OneDaemon):
             ("--samples", "128", "--seed", "7"), ("--samples", "4"), ("--samples", "4", "--denoise")))
         self.assertLess(distance(denoised, truth), 0.65 * distance(noisy, truth))
 
+    def test_so_are_a_third_of_eight_samples_in_a_room_and_a_fifth_among_mirrors(self):
+        for scene, left in (("cornell.glb", 0.667), ("sphereflake-3.nff", 0.79)):
+            with self.subTest(scene=scene):
+                options = [scene, "--integrator", "distributed"]
+                truth = self.picture(*options, "--samples", "128", "--seed", "7")
+                self.assertLess(self.ratio(options, "8", truth, ("0",)), left)
+
     def test_the_option_says_whether_and_the_same_request_gives_the_same_bytes(self):
         options = ["cornell.glb", "--integrator", "path", "--samples", "2"]
         plain, denoised = self.digest(*options), self.digest(*options, "--denoise")

@@ -15,6 +15,8 @@
  */
 #define STEP_PIXELS_SOFTWARE (1u << 15)
 #define STEP_PIXELS (1u << 22)
+/* Up to so many samples, noise weighs more than the detail that looks like it. */
+#define FEW_SAMPLES 16u
 
 enum pass {
     PASS_TAKE,
@@ -142,6 +144,14 @@ static void bind_give(struct denoise_filter *filter, struct denoise_sums *sums, 
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_RESULT, band), BIND_DENOISE_OUT);
 }
 
+/* Of few samples of mirrors and glass, noise hides what is seen there; halves of many differ by that, and so do
+ * those that come from the picture before, as the eye moves. */
+static float mirror_doubt(const struct denoise_history *history, uint32_t samples)
+{
+    const float few = fmaxf(fminf(2.0f - (float)samples / (float)FEW_SAMPLES, 1.0f), 0.0f);
+    return history->is_written ? DENOISE_MIRROR_DOUBT : DENOISE_MIRROR_DOUBT * (1.0f - few);
+}
+
 static void bind_noise(struct denoise_filter *filter, const struct denoise_history *history,
                        struct render_context *context, const struct picture *picture,
                        const struct gpu_program *program)
@@ -152,13 +162,15 @@ static void bind_noise(struct denoise_filter *filter, const struct denoise_histo
     gpu_buffer_bind_storage(&filter->risks, BIND_DENOISE_OUT);
     gpu_buffer_bind_storage(&filter->wider, BIND_DENOISE_OUT_TOO);
     gpu_uniform_uint(program, "one_sample", picture->samples == 1);
+    gpu_uniform_float(program, "doubt", mirror_doubt(history, picture->samples));
     gpu_uniform_float(program, "white", exp2f(-context->request.exposure_stops));
 }
 
-/* The more samples, the less of what the halves of a picture differ by is noise: edges within pixels stay. */
+/* The more samples, the less of what the halves of a picture differ by is noise: edges within pixels stay. With
+ * few, how fast the error falls is guessed by quarters of two samples, so half of a fall is not believed. */
 static float believed(uint32_t samples)
 {
-    return fminf(5.0f / (1.0f + log2f((float)samples)), 1.0f);
+    return samples < FEW_SAMPLES ? 2.0f : 5.0f / (1.0f + log2f((float)samples));
 }
 
 static void bind_settle(struct denoise_filter *filter, struct render_context *context,
