@@ -24,12 +24,13 @@ CFLAGS_ALL := -std=c17 -fno-common -fvisibility=hidden -pthread -MMD -MP
 CXXFLAGS_ALL := -std=c++17 -fvisibility=hidden -pthread -MMD -MP
 LDFLAGS_ALL := -pthread
 
+# -g1 is what traces of calls and profiles need. -g adds variables, which config=debug has, for a fifth of the time to compile.
 ifeq ($(config),debug)
 OPT := -O0 -g3 -DFARLIGHT_DEBUG
 else ifeq ($(config),release)
-OPT := -O2 -g -fno-math-errno -fno-trapping-math
+OPT := -O2 -g1 -fno-math-errno -fno-trapping-math
 else ifeq ($(config),sanitize)
-OPT := -O1 -g -DFARLIGHT_DEBUG -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+OPT := -O1 -g1 -DFARLIGHT_DEBUG -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 LDFLAGS_ALL += -fsanitize=address,undefined
 else ifeq ($(config),coverage)
 OPT := -O0 -g --coverage -fprofile-update=atomic
@@ -37,7 +38,7 @@ LDFLAGS_ALL += --coverage
 else ifeq ($(config),fuzz)
 CC := clang
 CXX := clang++
-OPT := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+OPT := -O1 -g1 -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 LDFLAGS_ALL += -fsanitize=address,undefined
 else
 $(error config=$(config) is not one of debug, release, sanitize, coverage, fuzz)
