@@ -141,12 +141,13 @@ COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c edit_history.c i
 VIEWER_OBJ := $(call obj,$(VIEWER_C)) $(COMMAND_LINE_OBJ)
 WEB_OBJ := $(call obj,$(WEB_C) $(addprefix client/cli/,loading.c progress.c sharing.c wave_table.c)) $(COMMAND_LINE_OBJ)
 
-# The library for others' programs: position-independent, only what farlight.h declares is visible.
+# The library for others' programs: only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 # farlight.h is installed as <farlight/client.h>, the others below farlight/.
 PUBLIC_HEADERS := client/lib/farlight.h client/warp/warp.h $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def)
-LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(EDIT_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
+SHARED_OBJ := $(LIB_OBJ) $(PROTOCOL_OBJ)
 
+MODULES_OBJ := $(call obj,$(TEXTURE_CXX) $(ASSIMP_CXX) $(IMAGES_CXX) $(PALETTE_C))
 MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so $(B)/farlight-palette.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view $(B)/farlight-web
 
@@ -166,11 +167,11 @@ $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
 # Loops over lanes (client/warp/lanes.h) become vector instructions with -O3; with -O2 a view takes several times as long.
 # Without contraction all processors have the same results. clang says which loops it leaves as they are.
-$(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CPPFLAGS_ALL += -Ishaders
-$(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
-$(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
-$(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
-$(B)/client/video/%.o $(B)/pic/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
+$(B)/client/warp/%.o: CPPFLAGS_ALL += -Ishaders
+$(B)/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
+$(B)/client/import/%.opp $(B)/client/import/%.o: INCLUDES = -Iclient $(IMPORT_CFLAGS)
+$(B)/client/output/%.opp $(B)/client/output/%.o: INCLUDES = -Iclient $(EXPORT_CFLAGS)
+$(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
 SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVER_LOADED_PKGS)))$(SERVER_CFLAGS)
@@ -184,27 +185,23 @@ EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cfl
 
 $(B)/%.o: %.c
 	@mkdir -p $(@D)
-	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(POSITION) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 $(B)/%.opp: %.cpp
 	@mkdir -p $(@D)
-	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
+	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) $(POSITION) $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
 
-$(B)/pic/%.opp: %.cpp
-	@mkdir -p $(@D)
-	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) -fPIC $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
-# The library's map of symbols chooses among them.
-$(B)/pic/protocol/%.o $(B)/pic/client/warp/%.o: VISIBILITY = -fvisibility=default
-$(B)/pic/%.o: %.c
-	@mkdir -p $(@D)
-	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iclient $(CLIENT_CFLAGS) $(OPT) $(CFLAGS_ALL) -fPIC $(VISIBILITY) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
-$(B)/$(SONAME): $(LIB_PIC) client/lib/libfarlight.map
+# What libraries are linked of is compiled once, for them and for programs. No program replaces functions of the library, so that
+# its files call their own as those of a program do. Its map of symbols chooses among what is visible.
+$(SHARED_OBJ) $(MODULES_OBJ): POSITION := -fPIC -fno-semantic-interposition
+$(filter $(B)/protocol/% $(B)/client/warp/%,$(SHARED_OBJ)): POSITION += -fvisibility=default
+$(B)/$(SONAME): $(SHARED_OBJ) client/lib/libfarlight.map
 	$(call say,LINK)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
-	    $(LIB_PIC) $(CLIENT_LIBS) -o $@
+	    $(SHARED_OBJ) $(CLIENT_LIBS) -o $@
 # One object whose symbols are those of the shared library, so that no name of ours meets one of the program's.
-$(B)/libfarlight.a: $(LIB_PIC) client/lib/libfarlight.map
+$(B)/libfarlight.a: $(SHARED_OBJ) client/lib/libfarlight.map
 	@rm -f $@
 	$(call say,AR)sed -n '/^global:/,/^local:/s/^ *\(.*\);$$/\1/p' client/lib/libfarlight.map >$(B)/libfarlight.symbols && \
-	    ld -r $(LIB_PIC) -o $(B)/libfarlight.o && \
+	    ld -r $(SHARED_OBJ) -o $(B)/libfarlight.o && \
 	    objcopy --localize-hidden -w --keep-global-symbols=$(B)/libfarlight.symbols $(B)/libfarlight.o && \
 	    ar rcs $@ $(B)/libfarlight.o
 
@@ -241,15 +238,15 @@ $(B)/helper.a: $(HELPER_OBJ)
 	$(call say,AR)rm -f $@ && $(AR) rcs $@ $^
 $(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-textures.so $(B)/farlight-assimp.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
-$(B)/farlight-textures.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(TEXTURE_CXX))
+$(B)/farlight-textures.so: $(call obj,$(TEXTURE_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(TEXTURE_PKGS)) -o $@
-$(B)/farlight-assimp.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(ASSIMP_CXX))
+$(B)/farlight-assimp.so: $(call obj,$(ASSIMP_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(ASSIMP_PKGS)) -o $@
 $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-images.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
-$(B)/farlight-images.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(IMAGES_CXX))
+$(B)/farlight-images.so: $(call obj,$(IMAGES_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(IMAGES_PKGS)) -o $@
-$(B)/farlight-palette.so: $(patsubst %.c,$(B)/pic/%.o,$(PALETTE_C))
+$(B)/farlight-palette.so: $(call obj,$(PALETTE_C))
 	$(call say,LINK)$(CC) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(PALETTE_PKGS)) -o $@
 $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-palette.so
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
@@ -314,7 +311,7 @@ $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 	@mkdir -p $(@D)
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 # The importer without its main() and its sandbox, with its modules as they are compiled for themselves.
-READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(patsubst %.cpp,$(B)/pic/%.opp,$(TEXTURE_CXX) $(ASSIMP_CXX))
+READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(call obj,$(TEXTURE_CXX) $(ASSIMP_CXX))
 READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS) $(ASSIMP_PKGS))
 # What reads messages of the page of farlight-web.
 REQUEST_OBJ := $(call obj,client/web/address.c client/web/request.c)
