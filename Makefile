@@ -96,8 +96,9 @@ TEXTURE_CXX := client/import/texture.cpp
 ASSIMP_CXX := client/import/assimp_library.cpp
 IMPORT_CXX := $(filter-out $(TEXTURE_CXX) $(ASSIMP_CXX),$(call sources,client/import,cpp))
 EXPORT_C := $(call sources,client/output,c)
-IMAGES_CXX := $(call sources,client/output/library,cpp)
-EXPORT_CXX := $(filter-out $(IMAGES_CXX),$(call sources,client/output,cpp))
+# It includes the others of its folder.
+IMAGES_CXX := client/output/library/module.cpp
+EXPORT_CXX := $(filter-out client/output/library/%,$(call sources,client/output,cpp))
 PALETTE_C := client/video/palette_library.c
 VIDEO_C := $(filter-out $(PALETTE_C),$(call sources,client/video,c))
 VIEWER_C := $(call sources,client/viewer,c)
