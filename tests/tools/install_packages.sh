@@ -12,9 +12,15 @@ if ! command -v dpkg-query >/dev/null 2>&1; then
     echo "not a Debian system: going on with what is there; it should have what these packages have: $*" >&2
     exit 0
 fi
+# Asked once for all of them: each question takes 40 ms.
+installed=$(dpkg-query -W -f='${Package} ${db:Status-Status}\n' "$@" 2>/dev/null | sed -n 's/ installed$//p')
 missing=
 for package in "$@"; do
-    dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
+    case "
+$installed
+" in *"
+$package
+"*) ;; *) missing="$missing $package" ;; esac
 done
 [ -z "$missing" ] && exit 0
 how="apt-get install --no-install-recommends$missing"
