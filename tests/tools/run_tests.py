@@ -53,11 +53,12 @@ NOT_SANITIZED = re.compile(
     r"|unit/trace/(abuffer/traversal|ldc/traversal|quadtree/layers)"
     r"|test_(abuffer|animate|check_device|compare.*|denoise|guide|import_animation|layers|ldc|light|models|poses|quadtree|rayspace|shot|siege|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
-LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference", "accuracy/frame_ahead", "accuracy/emitters",
-                 "test_light", "test_models", "test_siege", "accuracy/distributed", "test_animate", "test_compare", "test_drill",
-                 "test_compare_tracers", "test_abuffer", "accuracy/path_light", "contract/quadtree", "unit/trace/ldc/traversal",
-                 "contract/rayspace, flat, by spheres, in batches of 256", "test_check_device", "test_poses", "test_quadtree",
-                 "test_staying_up", "test_sealed", "test_units")
+LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference", "accuracy/frame_ahead",
+                 "accuracy/emitters", "test_light", "test_models", "test_siege", "accuracy/distributed", "test_animate",
+                 "test_render", "test_denoise", "test_compare", "accuracy/energy", "test_drill", "test_compare_tracers",
+                 "test_abuffer", "accuracy/path_light", "contract/quadtree", "unit/trace/ldc/traversal",
+                 "contract/rayspace, flat, by spheres, in batches of 256", "test_check_device", "test_poses",
+                 "test_quadtree", "test_staying_up", "test_sealed", "test_units")
 
 # Left to FARLIGHT_TEST_LONG=1: forms of a tracer whose settings other rows have in other combinations, or whose answers
 # others hold against brute force: unit/trace/ldc/traversal (all levels, packets and layers one by one) and build (lists as
