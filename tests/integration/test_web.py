@@ -467,7 +467,8 @@ class Model(Case):
                     time.sleep(0.2)
             self.assertTrue(frame)
             self.assertNotIn(gateway.daemon, (None, first))
-            said = gateway.stop()[1]
+            # Pages may see the scene a moment before that is said.
+            said = gateway.said_until("the scene is shared again\n")
             self.assertIn("farlightd was ended by signal 9\n", said)
             self.assertIn("the scene is shared again\n", said)
 

@@ -43,6 +43,15 @@ class Gateway:
         status = self.process.wait(TIMEOUT_S)
         return status, self.process.stderr.read()
 
+    def said_until(self, words):
+        """What it says on standard error up to the line that has these words, or until it ends."""
+        lines = []
+        for line in self.process.stderr:
+            lines.append(line)
+            if words in line:
+                break
+        return "".join(lines)
+
     def __exit__(self, *_):
         self.stop(signal.SIGKILL)
         self.process.stdout.close()
