@@ -76,7 +76,7 @@ class Denoise(OneDaemon):
                     self.assertLessEqual(self.ratio(options, samples, truth, SEEDS), AS_GOOD)
 
     def test_more_than_a_third_of_the_noise_of_a_room_is_gone(self):
-        """Of four samples. Mirror and glass keep half of theirs, and the truth, a thirty-second of the noise, counts in both."""
+        """Of four samples. The truth's noise, a thirty-second of it, counts in both."""
         options = ["cornell.glb", "--integrator", "path"]
         truth, noisy, denoised = (self.picture(*options, *more) for more in (
             ("--samples", "128", "--seed", "7"), ("--samples", "4"), ("--samples", "4", "--denoise")))
