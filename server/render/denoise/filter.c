@@ -148,8 +148,8 @@ static void bind_give(struct denoise_filter *filter, struct denoise_sums *sums, 
  * those that come from the picture before, as the eye moves. */
 static float mirror_doubt(const struct denoise_history *history, uint32_t samples)
 {
-    const float few = fmaxf(fminf(2.0f - (float)samples / (float)FEW_SAMPLES, 1.0f), 0.0f);
-    return history->is_written ? DENOISE_MIRROR_DOUBT : DENOISE_MIRROR_DOUBT * (1.0f - few);
+    const float many = fminf(fmaxf((float)samples / (float)FEW_SAMPLES - 1.0f, 0.0f), 1.0f);
+    return history->is_written ? DENOISE_MIRROR_DOUBT : DENOISE_MIRROR_DOUBT * many;
 }
 
 static void bind_noise(struct denoise_filter *filter, const struct denoise_history *history,
