@@ -56,10 +56,10 @@ SERVER_PKGS += $(if $(filter sanitize fuzz,$(config)),,jemalloc)
 # The daemon loads this one when it needs it, so that only its headers are needed here.
 SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
-IMPORT_PKGS := tinygltf tinyobjloader draco jansson libsodium libseccomp libpng libturbojpeg
+IMPORT_PKGS := tinygltf tinyobjloader draco jansson libsodium libseccomp libpng libturbojpeg stb
 TEXTURE_PKGS := OpenImageIO
 ASSIMP_PKGS := assimp
-EXPORT_PKGS := libpng OpenEXR libseccomp
+EXPORT_PKGS := libpng libturbojpeg libexif OpenEXR libseccomp
 IMAGES_PKGS := OpenImageIO libtiff-4 libjxl
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
 PALETTE_PKGS := libavfilter libavutil
@@ -355,8 +355,8 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
-    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libexpat1-dev libminizip-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libexif-dev libopenexr-dev libjxl-dev libtinygltf-dev \
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libstb-dev libassimp-dev libexpat1-dev libminizip-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
@@ -703,8 +703,8 @@ $(B)/tests/fuzz/fuzz_request: $(REQUEST_OBJ) $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_request: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
 $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj threemf): $(READERS_OBJ)
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj threemf): FUZZ_LIBS = $(READERS_LIBS)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp environment gltf nff obj threemf): $(READERS_OBJ)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp environment gltf nff obj threemf): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
 run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))

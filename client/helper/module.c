@@ -5,6 +5,7 @@
 #include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -39,4 +40,13 @@ void *module_load(const char *file, const char *symbol, char *reason, size_t rea
     if (!found)
         snprintf(reason, reason_bytes, "%s", dlerror());
     return found;
+}
+
+char *module_folder(const char *file)
+{
+    char path[PATH_MAX], reason[1];
+    if (!find(file, path, reason, sizeof(reason)))
+        return NULL;
+    *strrchr(path, '/') = '\0';
+    return strdup(path);
 }

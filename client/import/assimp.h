@@ -21,15 +21,11 @@ struct assimp_format {
     bool z_up;             /* where files do not say it, or the library does not pass it on */
     double metres;         /* of a unit, likewise */
     bool has_facets;       /* every triangle has its own corners and normal, which say nothing more */
-    bool may_name_images;  /* or hold some */
     bool colours_are_srgb; /* of materials */
 };
 
 /* By the ending of a file's name; NULL: it is none of them. */
 const struct assimp_format *assimp_format_of(const char *name);
-/* By the letters behind its points alone; archives have the names that they hold unpacked at their end. `bytes`
- * has a NUL behind it. */
-bool assimp_may_name_images(const struct assimp_format *format, const unsigned char *bytes, size_t size_bytes);
 /* By number, NULL behind the last one. */
 const struct assimp_format *assimp_format_at(size_t number);
 
@@ -42,10 +38,8 @@ struct assimp_library {
 };
 extern const struct assimp_library assimp_library __attribute__((visibility("default")));
 
-/* Loads the module, before the sandbox is entered. */
-void assimp_load(void);
-/* NULL: it was not loaded, or could not be; `reason` says why. */
-const struct assimp_library *assimp_loaded(char reason[ASSIMP_REASON_BYTES]);
+/* Loads the module, once. NULL: it cannot be loaded; `reason` says why. */
+const struct assimp_library *assimp_load(char reason[ASSIMP_REASON_BYTES]);
 
 #ifdef __cplusplus
 }

@@ -75,7 +75,7 @@ struct library_scene {
 void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
     char reason[ASSIMP_REASON_BYTES] = "";
-    library_scene owner = {assimp_loaded(reason)};
+    library_scene owner = {assimp_load(reason)};
 
     if (!owner.library)
         fail(r, "", "%s", reason);

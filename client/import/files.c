@@ -337,52 +337,6 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
     return read_beneath(files, files->folder, name, size_bytes, reason);
 }
 
-/* -1: there is none that may be read. */
-static int open_to_look(const struct files *files, const char *name)
-{
-    char reason[FILES_REASON_BYTES];
-    const int descriptor = files->folder >= 0 ? open_beneath(files->folder, name, reason) : -1;
-
-    if (descriptor < 0)
-        return -1;
-    if (!may_be_key(descriptor) && is_regular(descriptor, reason))
-        return descriptor;
-    close(descriptor);
-    return -1;
-}
-
-size_t files_read_head(const struct files *files, const char *name, unsigned char head[FILES_HEAD_BYTES])
-{
-    const int descriptor = open_to_look(files, name);
-    ssize_t got;
-
-    if (descriptor < 0)
-        return 0;
-    got = pread(descriptor, head, FILES_HEAD_BYTES, 0);
-    close(descriptor);
-    return got > 0 ? (size_t)got : 0;
-}
-
-bool files_hold(const struct files *files, const char *name,
-                bool (*holds)(const unsigned char *bytes, size_t size_bytes))
-{
-    enum { PART_BYTES = 1 << 20 };
-    const int descriptor = open_to_look(files, name);
-    unsigned char *part = descriptor < 0 ? NULL : malloc(PART_BYTES);
-    bool found = false;
-
-    for (off_t at = 0; part && !found && at < (off_t)FILES_BYTES_MAX; at += PART_BYTES - FILES_HEAD_BYTES) {
-        const ssize_t got = pread(descriptor, part, PART_BYTES, at);
-        if (got <= 0)
-            break;
-        found = holds(part, (size_t)got);
-    }
-    free(part);
-    if (descriptor >= 0)
-        close(descriptor);
-    return found;
-}
-
 unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
                                 char reason[FILES_REASON_BYTES])
 {

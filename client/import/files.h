@@ -53,13 +53,6 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
                           char reason[FILES_REASON_BYTES]);
 
-#define FILES_HEAD_BYTES 16
-/* The first bytes of such a file; returns their number, 0: there is none that may be read. */
-size_t files_read_head(const struct files *files, const char *name, unsigned char head[FILES_HEAD_BYTES]);
-/* Whether `holds` says so of a part of such a file. Parts overlap by FILES_HEAD_BYTES. */
-bool files_hold(const struct files *files, const char *name,
-                bool (*holds)(const unsigned char *bytes, size_t size_bytes));
-
 /* As files_read(); what is not in the model's folder may be in that of further images. */
 unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
                                 char reason[FILES_REASON_BYTES]);

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "format.h"
 
-#include "gltf_image.h"
-
 #include <ctype.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -137,24 +135,6 @@ struct format format_of(const char *name, const unsigned char *bytes, size_t siz
         return format;
     snprintf(model, sizeof(model), "model%s", ending);
     return format_of_name(model);
-}
-
-bool format_may_need_images(const struct format *format, const struct files *files, const unsigned char *bytes,
-                            size_t size_bytes)
-{
-    switch (format->reader) {
-    case FORMAT_GLTF:
-        return gltf_may_have_other_images(files, bytes, size_bytes);
-    case FORMAT_AFF: /* what it includes may name some, too */
-        return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
-               contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
-    case FORMAT_ASSIMP:
-        return assimp_may_name_images(format->assimp, bytes, size_bytes);
-    case FORMAT_OBJ:
-        return contains(bytes, size_bytes, "mtllib");
-    default:
-        return false;
-    }
 }
 
 /* ---- what is not read ---- */

@@ -30,9 +30,6 @@ struct format {
 struct format format_of_name(const char *name);
 /* A GLB file is one under any name. */
 struct format format_of(const char *name, const unsigned char *bytes, size_t size_bytes);
-/* Whether images may be decoded that need the module (texture.h); nothing may be parsed yet. */
-bool format_may_need_images(const struct format *format, const struct files *files, const unsigned char *bytes,
-                            size_t size_bytes);
 /* Why a file of no known format is not read, and what to do about it. `format`: what the user takes it for, or
  * NULL. */
 void format_explain_unknown(const char *name, const char *format, const unsigned char *bytes, size_t size_bytes,

@@ -4,6 +4,7 @@
  * hostile files, and so that it can give up its rights before it does. */
 #include "formats.h"
 #include "import.h"
+#include "helper/module.h"
 #include "helper/sandbox.h"
 #include "model.h"
 #include "send.h"
@@ -197,12 +198,14 @@ static void leave_at_once(int status)
 #endif
 }
 
-/* Of all models, and of AFF the images beside it. */
+/* Of all models, of AFF the images beside it, and the one of the modules, which are loaded when they are needed.
+ */
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
-    char *folders[2 * SOURCES_MAX] = {NULL};
+    char *folders[2 * SOURCES_MAX + 1] = {NULL};
+    const size_t folder_count = 2 * options->source_count + 1;
     struct sandbox_options sandbox = {.read_folders = (const char *const *)folders,
-                                      .read_folder_count = 2 * options->source_count,
+                                      .read_folder_count = folder_count,
                                       .cpu_seconds = CPU_SECONDS_MAX};
     char reason[256];
     bool entered;
@@ -217,8 +220,9 @@ static bool enter_sandbox(struct import_scene *scene, const struct options *opti
             asprintf(&folders[2 * i + 1], "%s/" FILES_IMAGES_BESIDE, folders[2 * i]) < 0)
             folders[2 * i + 1] = NULL;
     }
+    folders[folder_count - 1] = module_folder(TEXTURE_MODULE);
     entered = sandbox_enter(&sandbox, reason, sizeof(reason));
-    for (size_t i = 0; i < 2 * options->source_count; i++)
+    for (size_t i = 0; i < folder_count; i++)
         free(folders[i]);
     if (!entered)
         return import_fail(scene, NULL, "the sandbox cannot be entered: %s", reason);
@@ -325,27 +329,6 @@ static bool import_all(struct import_scene *scene, struct files *surroundings, s
     return !scene->failed;
 }
 
-/* Models are read before the sandbox is entered and parsed within it: whether the module of images is needed
- * shows in the bytes, and loading it opens more files than the sandbox allows. */
-static bool read_and_import(struct import_scene *scene, struct files *surroundings, struct sender *sender,
-                            const struct options *options)
-{
-    bool needs_images = options->environment != NULL, needs_assimp = false;
-
-    for (size_t i = 0; i < options->source_count; i++) {
-        const struct source *source = &options->sources[i];
-
-        needs_images =
-            needs_images || format_may_need_images(&source->of, &source->files, source->bytes, source->size_bytes);
-        needs_assimp = needs_assimp || source->of.reader == FORMAT_ASSIMP;
-    }
-    if (needs_images)
-        texture_load();
-    if (needs_assimp)
-        assimp_load();
-    return enter_sandbox(scene, options) && import_all(scene, surroundings, sender, options);
-}
-
 static bool read_files(struct import_scene *scene, struct files *surroundings, const struct options *options)
 {
     char reason[FILES_REASON_BYTES];
@@ -386,7 +369,8 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
     pthread_t marker;
 
     silence_libraries();
-    imported = read_files(scene, &surroundings, options) && read_and_import(scene, &surroundings, sender, options);
+    imported = read_files(scene, &surroundings, options) && enter_sandbox(scene, options) &&
+               import_all(scene, &surroundings, sender, options);
     parsed_ns = monotonic_now_ns();
     done.read_bytes = surroundings.read_bytes;
     done.read_ns = surroundings.read_ns;

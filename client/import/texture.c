@@ -10,37 +10,39 @@
 #pragma weak texture_reader
 /* NULL, unless the module is linked to the program itself. */
 static const struct texture_reader *reader = &texture_reader;
-static char why_none[200] =
-    "is neither PNG nor JPEG, and nothing in the model says so, by an ending, a MIME type or its first bytes";
 
-void texture_load(void)
+/* False: the job says why. */
+static bool load_for(struct texture_job *job)
 {
     char reason[160];
 
-    if (reader)
-        return;
-    reader = module_load("farlight-textures.so", "texture_reader", reason, sizeof(reason));
     if (!reader)
-        snprintf(why_none, sizeof(why_none), "cannot be decoded: %s", reason);
+        reader = module_load(TEXTURE_MODULE, "texture_reader", reason, sizeof(reason));
+    if (!reader)
+        snprintf(job->reason, sizeof(job->reason), "cannot be decoded: %s", reason);
+    return reader;
+}
+
+static bool is_left(const struct texture_job *job)
+{
+    return job->bytes && !job->texels && job->reason[0] == '\0';
 }
 
 void texture_decode(struct texture_job *jobs, size_t count)
 {
+    size_t left = 0;
+
     texture_plain_decode(jobs, count);
-    if (reader)
+    for (size_t i = 0; i < count; i++)
+        left += is_left(&jobs[i]) && load_for(&jobs[i]);
+    if (left > 0)
         reader->decode(jobs, count);
-    else
-        for (size_t i = 0; i < count; i++)
-            if (jobs[i].bytes && !texture_is_plain(&jobs[i]))
-                snprintf(jobs[i].reason, sizeof(jobs[i].reason), "%s", why_none);
 }
 
 void texture_decode_environment(struct texture_job *job)
 {
-    if (reader)
+    if (!texture_plain_decode_environment(job) && load_for(job))
         reader->decode_environment(job);
-    else
-        snprintf(job->reason, sizeof(job->reason), "%s", why_none);
 }
 
 unsigned char *texture_marker(void)

@@ -3,6 +3,7 @@
 // memory, and what the header claims is checked before a pixel is asked for. A module of its own, for OpenImageIO
 // takes longer to load than most models to import.
 #include "texture.h"
+#include "half.h"
 #include "protocol/common/srgb.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -26,7 +27,6 @@ constexpr size_t texel_bytes = 4;
 // Of all images of a model: many small files can hold large images.
 constexpr uint64_t all_images_bytes_max = 4ull << 30;
 std::atomic<uint64_t> all_images_bytes{0};
-constexpr float half_max = 65504.0f;
 
 struct signature {
     const char *reader;
@@ -243,20 +243,6 @@ void decode_next(texture_job *jobs, size_t count, std::atomic<size_t> &next) noe
             run(jobs[i], decode);
 }
 
-// IEEE 754 binary16, rounded to nearest even; finite, non-negative, at most half_max.
-uint16_t half_of(float value)
-{
-    if (!(value > 0))
-        return 0; // NaN, too
-    value = std::min(value, half_max);
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof(bits));
-    if (bits < 0x38800000u) // below 2^-14: a denormal half, a multiple of 2^-24
-        return uint16_t(std::nearbyint(value * 16777216.0f));
-    bits += 0xfffu + ((bits >> 13) & 1u);
-    return uint16_t(std::min((bits - 0x38000000u) >> 13, 0x7bffu));
-}
-
 bool decode_halves(texture_job &job, std::string &reason)
 {
     const char *reader = reader_of(job.bytes, job.size_bytes);
@@ -282,7 +268,7 @@ bool decode_halves(texture_job &job, std::string &reason)
     }
     for (size_t i = 0; i < texels; i++)
         for (size_t c = 0; c < 3; c++)
-            halves[i * 4 + c] = half_of(pixels[i * size_t(channels) + (channels == 3 ? c : 0)]);
+            halves[i * 4 + c] = half_of_radiance(pixels[i * size_t(channels) + (channels == 3 ? c : 0)]);
     job.texels = reinterpret_cast<unsigned char *>(halves);
     job.width = uint32_t(image.spec.width);
     job.height = uint32_t(image.spec.height);

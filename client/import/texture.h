@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Images to texels. PNG and JPEG are decoded by texture_plain.h; the rest by a module (texture.cpp), because
- * loading OpenImageIO with its libraries takes longer than importing most models; it is loaded before the sandbox
- * is entered, by the imports that may need it. */
+ * loading OpenImageIO with its libraries takes longer than importing most models. */
 #ifndef FARLIGHT_IMPORT_TEXTURE_H
 #define FARLIGHT_IMPORT_TEXTURE_H
 
@@ -35,10 +34,10 @@ struct texture_reader {
 };
 extern const struct texture_reader texture_reader __attribute__((visibility("default")));
 
-/* Loads the module. If it was not loaded, or could not be, that is the reason of every image. */
-void texture_load(void);
+/* The module, which is in this file, is loaded by the first image that needs it. */
+#define TEXTURE_MODULE "farlight-textures.so"
 
-/* As the module's. */
+/* As the module's. If it cannot be loaded, that is the reason of every image that needs it. */
 void texture_decode(struct texture_job *jobs, size_t count);
 void texture_decode_environment(struct texture_job *job);
 /* The replacement of a missing image: 2x2 texels, magenta and black. NULL: out of memory. */

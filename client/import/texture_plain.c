@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 #include "texture_plain.h"
 
+#include "half.h"
+
 #include <png.h>
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stb_image.h>
 #include <stdlib.h>
 #include <string.h>
 #include <turbojpeg.h>
@@ -179,6 +182,86 @@ static bool decode_jpeg(struct texture_job *job)
     if (handle)
         tjDestroy(handle);
     return decoded;
+}
+
+/* ---- HDR ---- */
+
+static bool is_hdr(const struct texture_job *job)
+{
+    return (job->size_bytes >= 10 && memcmp(job->bytes, "#?RADIANCE", 10) == 0) ||
+           (job->size_bytes >= 6 && memcmp(job->bytes, "#?RGBE", 6) == 0);
+}
+
+struct hdr_bytes {
+    const unsigned char *at;
+    size_t left_bytes;
+    bool exhausted; /* more were read than there are */
+};
+
+/* Behind the end stb 2.27 reads zeros and takes them for runs of no texel, without end. Ends of lines end its
+ * header, and are runs of ten. */
+static int read_hdr(void *context, char *to, int count)
+{
+    struct hdr_bytes *bytes = context;
+    const size_t wanted = (size_t)count, given = wanted < bytes->left_bytes ? wanted : bytes->left_bytes;
+    if (given == 0) {
+        bytes->exhausted = true;
+        memset(to, '\n', wanted);
+        return count;
+    }
+    memcpy(to, bytes->at, given);
+    bytes->at += given;
+    bytes->left_bytes -= given;
+    return (int)given;
+}
+
+static void skip_hdr(void *context, int count)
+{
+    struct hdr_bytes *bytes = context;
+    const size_t wanted = count > 0 ? (size_t)count : 0,
+                 skipped = wanted < bytes->left_bytes ? wanted : bytes->left_bytes;
+    bytes->at += skipped;
+    bytes->left_bytes -= skipped;
+}
+
+static int is_at_end_of_hdr(void *context)
+{
+    const struct hdr_bytes *bytes = context;
+    return bytes->left_bytes == 0;
+}
+
+static float *decode_hdr(const struct texture_job *job, int *width, int *height)
+{
+    static const stbi_io_callbacks calls = {.read = read_hdr, .skip = skip_hdr, .eof = is_at_end_of_hdr};
+    struct hdr_bytes bytes = {job->bytes, job->size_bytes, false};
+    int channels = 0;
+    if (!stbi_info_from_callbacks(&calls, &bytes, width, height, &channels) || *width < 1 || *height < 1 ||
+        *width > EDGE_MAX || *height > EDGE_MAX || (uint64_t)*width * (uint64_t)*height > IMAGE_TEXELS_MAX)
+        return NULL;
+    bytes = (struct hdr_bytes){job->bytes, job->size_bytes, false};
+    float *pixels = stbi_loadf_from_callbacks(&calls, &bytes, width, height, &channels, 3);
+    if (!bytes.exhausted)
+        return pixels;
+    stbi_image_free(pixels);
+    return NULL;
+}
+
+bool texture_plain_decode_environment(struct texture_job *job)
+{
+    int width = 0, height = 0;
+    float *pixels = is_hdr(job) ? decode_hdr(job, &width, &height) : NULL;
+    const size_t texels = (size_t)width * (size_t)height;
+    uint16_t *halves = pixels ? calloc(texels, 4 * sizeof(*halves)) : NULL;
+    for (size_t i = 0; halves && i < texels; i++)
+        for (size_t c = 0; c < 3; c++)
+            halves[i * 4 + c] = half_of_radiance(pixels[i * 3 + c]);
+    stbi_image_free(pixels);
+    if (!halves)
+        return false;
+    job->texels = (unsigned char *)halves;
+    job->width = (uint32_t)width;
+    job->height = (uint32_t)height;
+    return true;
 }
 
 /* ---- all ---- */

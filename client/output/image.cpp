@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "image.h"
 #include "exr_encode.hpp"
+#include "jpeg_encode.h"
 #include "layers.hpp"
 #include "library.h"
 #include "metadata.hpp"
@@ -87,6 +88,20 @@ bool write_png(const struct raster &raster, const std::vector<std::pair<std::str
     return png_encode(&png, file, file_bytes, reason, reason_bytes);
 }
 
+// A JPEG file's pixels become bytes where they are not.
+bool write_jpeg(const struct raster &raster, unsigned quality, const char *description, const char *date,
+                uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
+{
+    std::vector<uint8_t> bytes;
+    struct jpeg jpeg = {raster, quality, description, date};
+    if (raster.component_bytes != 1) {
+        bytes = bytes_of(raster);
+        jpeg.raster.component_bytes = 1;
+        jpeg.raster.pixels = bytes.data();
+    }
+    return jpeg_encode(&jpeg, file, file_bytes, reason, reason_bytes);
+}
+
 bool copy_out(const std::vector<uint8_t> &made, uint8_t **file, size_t *file_bytes, char *reason,
               size_t reason_bytes)
 {
@@ -132,6 +147,9 @@ bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, 
         return fail(reason, reason_bytes, "only an EXR file of 32-bit floats can store layers");
     if (image.format == IMAGE_EXR)
         return copy_out(exr_encode(image, date_words), file, file_bytes, reason, reason_bytes);
+    if (image.format == IMAGE_JPEG)
+        return write_jpeg(raster, image.quality, metadata_lines(image).c_str(), date_words.c_str(), file,
+                          file_bytes, reason, reason_bytes);
     if (image.format == IMAGE_TIFF && raster.component_bytes != 1) {
         bytes = bytes_of(raster);
         raster = {raster.width, raster.height, raster.channels, 1, bytes.data()};
@@ -171,7 +189,7 @@ enum image_format image_format_of(const char *path, const char *fallback)
 
 bool image_needs_library(enum image_format format)
 {
-    return format != IMAGE_PNG && format != IMAGE_EXR;
+    return format != IMAGE_PNG && format != IMAGE_JPEG && format != IMAGE_EXR;
 }
 
 bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
@@ -183,12 +201,12 @@ bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes,
 bool image_encode_plain(enum image_format format, const struct raster *raster, const char *description,
                         uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
-    if (format == IMAGE_JPEG)
-        return write_with_library({format, *raster, 95, description, ""}, file, file_bytes, reason, reason_bytes);
-    if (format != IMAGE_PNG)
+    if (format != IMAGE_PNG && format != IMAGE_JPEG)
         return fail(reason, reason_bytes, "a picture of errors must be PNG or JPEG");
     return guard(
         [=] {
+            if (format == IMAGE_JPEG)
+                return write_jpeg(*raster, 95, description, "", file, file_bytes, reason, reason_bytes);
             return write_png(*raster, {{"Description", description}}, nullptr, file, file_bytes, reason,
                              reason_bytes);
         },

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The module that does what needs OpenImageIO, libtiff and libjxl: it writes JPEG, HDR, WebP, TIFF and GIF, and
+/* The module that does what needs OpenImageIO, libtiff and libjxl: it writes HDR, WebP, TIFF and GIF, and
  * compares images. Their libraries take a third of a second to load, so that only the runs that need it load it.
  */
 #ifndef FARLIGHT_CLIENT_OUTPUT_LIBRARY_H
@@ -14,9 +14,9 @@ extern "C" {
 #endif
 
 struct library_image {
-    enum image_format format; /* JPEG, HDR, WEBP, TIFF or GIF */
+    enum image_format format; /* HDR, WEBP, TIFF or GIF */
     struct raster raster;
-    unsigned quality;        /* JPEG, WebP */
+    unsigned quality;        /* WebP */
     const char *description; /* lines of text */
     const char *date;        /* "YYYY:MM:DD hh:mm:ss"; may be empty */
 };

@@ -587,9 +587,32 @@ class Written(importer.Written):
             texel, = set(result.data(result.of(SET_TEXTURE)[0]["arrays"][0])[:3])
             self.assertAlmostEqual(texel, 188, delta=1, msg="sRGB of 0.5")
 
+    def import_environment(self, data, status=0):
+        result = Peer().run(["--environment", self.write("sky.hdr", data), "--no-model"])
+        self.assertEqual(result.status, status, result.text() + result.stderr)
+        return result
+
+    def halves_of(self, result):
+        environment, = result.of(SET_ENVIRONMENT)
+        return environment["size"], list(memoryview(result.data(environment["arrays"][0])).cast("H"))
+
+    def test_environments_are_read_whole_or_not_at_all(self):
+        """With runs, and without, as narrow ones are. The second row is 16 times as bright."""
+        dim, bright = b"\x80\x40\x20\x80", b"\x80\x40\x20\x84"
+        dim_halves, bright_halves = [0x3800, 0x3400, 0x3000, 0], [0x4800, 0x4400, 0x4000, 0]
+        head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n"
+        runs = b"".join(b"\x02\x02\x00\x08" + bytes(b for value in row for b in (0x88, value)) for row in (dim, bright))
+        for width, data in ((8, head + b"-Y 2 +X 8\n" + runs), (1, head + b"-Y 2 +X 1\n" + dim + bright)):
+            size, texels = self.halves_of(self.import_environment(data))
+            self.assertEqual((size, texels), ((width, 2), dim_halves * width + bright_halves * width))
+            for cut in (11, len(head) - 2, len(head) + 4, len(head + b"-Y 2 +X "), len(data) - 1):
+                with self.subTest(width=width, cut=cut):
+                    self.assertIn("cannot be read", self.import_environment(data[:cut], status=1).text())
+
     def test_without_its_module_the_importer_reads_models_but_no_images(self):
         alone = shutil.copy(importer.IMPORTER, self.folder)
         with unittest.mock.patch.object(importer, "IMPORTER", alone):
+            self.assertEqual(self.halves_of(self.import_environment(HDR)), ((1, 1), [0x3800, 0x3800, 0x3800, 0]))
             plain = self.import_text("model.nff", "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 1\nresolution 8 8\ns 0 0 0 1\n")
             self.assertNotIn("farlight-textures", plain.text())
             result = self.import_text("model.gltf", self.textured())

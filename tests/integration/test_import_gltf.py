@@ -625,22 +625,16 @@ class Materials(Gltf):
                 self.assertEqual((texels[:4], text), (bytes([255, 0, 0, 255]), ""))
 
     def test_an_image_in_a_buffer_of_another_file_is_what_its_first_bytes_say(self):
-        """In base64, and in a file where its signature lies across two of the parts that are looked through."""
-        part_bytes = 1 << 20
-        for uri in ("data:application/octet-stream;base64,", "my%20buffer.bin"):
+        """In base64, and in a file beside the model."""
+        for uri in (None, "my%20buffer.bin"):
             with self.subTest(uri):
                 model = Model().cube()
                 model.primitive["material"] = 0
-                if not uri.startswith("data:"):
-                    model.view(bytes(part_bytes - WEBP.index(b"WEBPVP8") - 4 - len(model.data)))
                 model.json.update(materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
                                   textures=[{"source": 0}], images=[{"bufferView": model.view(WEBP), "mimeType": "image/png"}])
-                if not uri.startswith("data:"):
-                    self.assertLess(model.data.index(b"WEBPVP8"), part_bytes)
-                    self.assertGreater(model.data.index(b"WEBPVP8") + 7, part_bytes)
                 self.write("my buffer.bin", model.data)
                 text = model.text()
-                if not uri.startswith("data:"):
+                if uri:
                     text = json.dumps({**json.loads(text), "buffers": [{"uri": uri, "byteLength": len(model.data)}]})
                 result = self.import_text("model.gltf", text)
                 texture, = result.of(SET_TEXTURE)
@@ -649,7 +643,7 @@ class Materials(Gltf):
     def test_an_image_of_no_known_format_is_named(self):
         texels, text = self.texels("image/png", data=b"no image at all")
         self.assertEqual(texels[:4], bytes([255, 0, 255, 255]), "magenta stands in")
-        self.assertIn("is neither PNG nor JPEG", text)
+        self.assertIn("is not an image of a known format", text)
 
     def test_a_specular_texture_makes_metal_of_what_shines(self):
         """Black below it: the coloured texels reflect as metals of their colours."""

@@ -237,6 +237,25 @@ class Outputs(OneDaemon):
         data = picture("webp").read_bytes()
         self.assertEqual((data[8:16], data[20] >> 4 & 1), (b"WEBPVP8X", 1))
 
+    def test_jpeg_tells_in_a_comment_and_in_exif_what_it_shows(self):
+        path = self.folder / "picture.jpg"
+        for metadata, tags_wanted in (("stable", {270, 305}), ("full", {270, 305, 306})):
+            self.expect(render_picture("cornell", path, "--metadata", metadata), 0)
+            data, at, segments = path.read_bytes(), 2, {}
+            while data[at + 1] != 0xda:
+                count, = struct.unpack_from(">H", data, at + 2)
+                segments[data[at + 1]] = data[at + 4:at + 2 + count]
+                at += 2 + count
+            exif = segments[0xe1][6:]
+            self.assertEqual((segments[0xe1][:6], exif[:4]), (b"Exif\0\0", b"II*\0"))
+            first, = struct.unpack_from("<I", exif, 4)
+            entries = (struct.unpack_from("<HHII", exif, first + 2 + 12 * i) for i in range(*struct.unpack_from("<H", exif, first)))
+            texts = {tag: exif[offset:offset + count] for tag, kind, count, offset in entries if kind == 2}
+            self.assertEqual(set(texts), tags_wanted, "description, software and, in full, date")
+            self.assertEqual(texts[270], segments[0xfe] + b"\0")
+            self.assertIn(b"farlight/tracer=bvh\n", segments[0xfe])
+            self.assertEqual(texts[305][:9], b"farlight ")
+
     def test_exr_metadata_holds_camera_and_tracer_and_in_full_revision_times_and_path(self):
         path = self.folder / "picture.exr"
         always = {"worldToCamera", "farlight/tracer", "farlight/digest", "farlight/model"}

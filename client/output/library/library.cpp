@@ -33,10 +33,8 @@ const char *plugin_of(enum image_format format)
         return "hdr";
     case IMAGE_WEBP:
         return "webp";
-    case IMAGE_GIF:
-        return "gif";
     default:
-        return "jpeg";
+        return "gif";
     }
 }
 
@@ -47,7 +45,7 @@ OIIO::TypeDesc type_of(const struct raster &raster)
                                          : OIIO::TypeDesc::FLOAT;
 }
 
-// What the file's pixels are. JPEG and HDR have no alpha, and the library writes GIF without.
+// What the file's pixels are. HDR has no alpha, and the library writes GIF without.
 OIIO::ImageSpec make_spec(const struct library_image &image)
 {
     const bool is_linear = image.format == IMAGE_HDR;
@@ -131,7 +129,7 @@ bool prepare(bool draws, char *reason, size_t reason_bytes)
     // One thread: the renderer has use for the others, and the sandbox need not allow more.
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
-    for (const enum image_format format : {IMAGE_JPEG, IMAGE_HDR, IMAGE_WEBP, IMAGE_GIF}) {
+    for (const enum image_format format : {IMAGE_HDR, IMAGE_WEBP, IMAGE_GIF}) {
         const struct library_image image = {format, {4, 4, 4, 1, pixels.data()}, 90, "", "2026:01:01 00:00:00"};
         uint8_t *file = nullptr;
         size_t file_bytes = 0;
