@@ -198,8 +198,7 @@ static void leave_at_once(int status)
 #endif
 }
 
-/* Of all models, of AFF the images beside it, and the one of the modules, which are loaded when they are needed.
- */
+/* Of all models, of AFF the images beside it, and that of the modules, which are loaded when they are needed. */
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
     char *folders[2 * SOURCES_MAX + 1] = {NULL};
