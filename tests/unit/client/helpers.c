@@ -223,7 +223,7 @@ TEST(an_exporter_for_one_format_refuses_those_that_it_did_not_load)
     struct fl_exporter *exporter =
         fl_exporter_start(&(struct fl_exporter_options){.folder = folder, .format = "png"}, &error);
     assert_non_null(exporter);
-    snprintf(path, sizeof(path), "%s/a.jpg", folder);
+    snprintf(path, sizeof(path), "%s/a.webp", folder);
     assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
     assert_false(fl_exporter_wait(exporter, &error));
     check_error(FL_ERROR_FILE, "started for other formats");
