@@ -2,7 +2,6 @@
 #include "assimp.h"
 #include "helper/module.h"
 
-#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 

@@ -4,7 +4,6 @@
 #define FARLIGHT_IMPORT_FORMAT_H
 
 #include "assimp.h"
-#include "files.h"
 
 #include <stdbool.h>
 #include <stddef.h>

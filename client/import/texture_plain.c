@@ -31,7 +31,7 @@ static bool is_jpeg(const struct texture_job *job)
     return job->size_bytes >= 3 && memcmp(job->bytes, "\xff\xd8\xff", 3) == 0;
 }
 
-bool texture_is_plain(const struct texture_job *job)
+static bool is_plain(const struct texture_job *job)
 {
     return job->bytes && (is_png(job) || is_jpeg(job));
 }
@@ -299,9 +299,9 @@ void texture_plain_decode(struct texture_job *jobs, size_t count)
     struct work work = {.jobs = malloc((count + 1) * sizeof(struct texture_job *))};
     pthread_t helper;
     for (size_t i = 0; i < count; i++) {
-        if (texture_is_plain(&jobs[i]) && work.jobs)
+        if (is_plain(&jobs[i]) && work.jobs)
             work.jobs[work.count++] = &jobs[i];
-        else if (texture_is_plain(&jobs[i]))
+        else if (is_plain(&jobs[i]))
             snprintf(jobs[i].reason, sizeof(jobs[i].reason), "out of memory");
     }
     if (work.jobs)

@@ -7,9 +7,8 @@
 
 #include "texture.h"
 
-/* By the image's first bytes. */
-bool texture_is_plain(const struct texture_job *job);
-/* Decodes all that are, with two threads if there are several; leaves the others as they are. */
+/* Decodes all that are, by their first bytes, with two threads if there are several; leaves the others as they
+ * are. */
 void texture_plain_decode(struct texture_job *jobs, size_t count);
 /* Of an HDR image, texels as texture_reader.decode_environment has them. False: it is none, or stb cannot read it.
  */
