@@ -186,12 +186,6 @@ static bool decode_jpeg(struct texture_job *job)
 
 /* ---- HDR ---- */
 
-static bool is_hdr(const struct texture_job *job)
-{
-    return (job->size_bytes >= 10 && memcmp(job->bytes, "#?RADIANCE", 10) == 0) ||
-           (job->size_bytes >= 6 && memcmp(job->bytes, "#?RGBE", 6) == 0);
-}
-
 struct hdr_bytes {
     const unsigned char *at;
     size_t left_bytes;
@@ -233,12 +227,16 @@ static int is_at_end_of_hdr(void *context)
 static float *decode_hdr(const struct texture_job *job, int *width, int *height)
 {
     static const stbi_io_callbacks calls = {.read = read_hdr, .skip = skip_hdr, .eof = is_at_end_of_hdr};
-    struct hdr_bytes bytes = {job->bytes, job->size_bytes, false};
+    const struct hdr_bytes whole = {job->bytes, job->size_bytes, false};
+    struct hdr_bytes bytes = whole;
     int channels = 0;
+    if (!stbi_is_hdr_from_callbacks(&calls, &bytes)) /* other formats have better readers */
+        return NULL;
+    bytes = whole;
     if (!stbi_info_from_callbacks(&calls, &bytes, width, height, &channels) || *width < 1 || *height < 1 ||
         *width > EDGE_MAX || *height > EDGE_MAX || (uint64_t)*width * (uint64_t)*height > IMAGE_TEXELS_MAX)
         return NULL;
-    bytes = (struct hdr_bytes){job->bytes, job->size_bytes, false};
+    bytes = whole;
     float *pixels = stbi_loadf_from_callbacks(&calls, &bytes, width, height, &channels, 3);
     if (!bytes.exhausted)
         return pixels;
@@ -249,7 +247,7 @@ static float *decode_hdr(const struct texture_job *job, int *width, int *height)
 bool texture_plain_decode_environment(struct texture_job *job)
 {
     int width = 0, height = 0;
-    float *pixels = is_hdr(job) ? decode_hdr(job, &width, &height) : NULL;
+    float *pixels = decode_hdr(job, &width, &height);
     const size_t texels = (size_t)width * (size_t)height;
     uint16_t *halves = pixels ? calloc(texels, 4 * sizeof(*halves)) : NULL;
     for (size_t i = 0; halves && i < texels; i++)

@@ -67,38 +67,38 @@ std::vector<uint8_t> bytes_of(const struct raster &raster)
     return bytes;
 }
 
+// With bytes for components, which `bytes` keeps where they have to be made.
+struct raster as_bytes(const struct raster &raster, std::vector<uint8_t> &bytes)
+{
+    if (raster.component_bytes == 1)
+        return raster;
+    bytes = bytes_of(raster);
+    return {raster.width, raster.height, raster.channels, 1, bytes.data()};
+}
+
 // What every PNG file of ours says, then `texts`.
 bool write_png(const struct raster &raster, const std::vector<std::pair<std::string, std::string>> &texts,
                const std::tm *date, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
     std::vector<png_text> all = {{"oiio:ColorSpace", "sRGB"}, {"Software", "farlight " FARLIGHT_VERSION}};
     std::vector<uint8_t> bytes;
-    if (raster.component_bytes != 1)
-        bytes = bytes_of(raster);
     for (const auto &each : texts)
         all.push_back({each.first.c_str(), each.second.c_str()});
     const struct png png = {raster.width,
                             raster.height,
                             raster.channels,
-                            raster.component_bytes == 1 ? static_cast<const uint8_t *>(raster.pixels)
-                                                        : bytes.data(),
+                            static_cast<const uint8_t *>(as_bytes(raster, bytes).pixels),
                             all.data(),
                             all.size(),
                             date};
     return png_encode(&png, file, file_bytes, reason, reason_bytes);
 }
 
-// A JPEG file's pixels become bytes where they are not.
 bool write_jpeg(const struct raster &raster, unsigned quality, const char *description, const char *date,
                 uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
     std::vector<uint8_t> bytes;
-    struct jpeg jpeg = {raster, quality, description, date};
-    if (raster.component_bytes != 1) {
-        bytes = bytes_of(raster);
-        jpeg.raster.component_bytes = 1;
-        jpeg.raster.pixels = bytes.data();
-    }
+    const struct jpeg jpeg = {as_bytes(raster, bytes), quality, description, date};
     return jpeg_encode(&jpeg, file, file_bytes, reason, reason_bytes);
 }
 
@@ -150,10 +150,8 @@ bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, 
     if (image.format == IMAGE_JPEG)
         return write_jpeg(raster, image.quality, metadata_lines(image).c_str(), date_words.c_str(), file,
                           file_bytes, reason, reason_bytes);
-    if (image.format == IMAGE_TIFF && raster.component_bytes != 1) {
-        bytes = bytes_of(raster);
-        raster = {raster.width, raster.height, raster.channels, 1, bytes.data()};
-    }
+    if (image.format == IMAGE_TIFF)
+        raster = as_bytes(raster, bytes);
     if (image.format != IMAGE_PNG)
         return write_with_library(
             {image.format, raster, image.quality, metadata_lines(image).c_str(), date_words.c_str()}, file,
