@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Runs the tests that registered themselves. Usage: PROGRAM [--list] [FILE[:TEST] ..]
- * FILE and TEST are parts of names; without any, all tests run. --list prints 'FILE TEST' for each. More than one
- * file: each in a child process, so that one that crashes takes no other along. */
+ * FILE and TEST are parts of names; without any, all tests run. --list prints 'FILE TEST' for each, with ' long'
+ * behind those that are skipped unless FARLIGHT_TEST_LONG is set. More than one file: each in a child process, so
+ * that one that crashes takes no other along. */
 #include "tests/harness/test.h"
 
 #include <stdio.h>
@@ -13,7 +14,7 @@
 struct test_file {
     char name[96]; /* its path below tests/, without the ending */
     struct CMUnitTest *tests;
-    bool *own_fixtures;
+    unsigned *kinds; /* of enum test_kind, for each test */
     size_t count;
     CMFixtureFunction set_up, tear_down;           /* once */
     CMFixtureFunction each_set_up, each_tear_down; /* of tests without fixtures of their own */
@@ -47,13 +48,13 @@ static struct test_file *file_named(const char *path)
     return file;
 }
 
-void test_register(const char *path, const struct CMUnitTest *test, bool has_own_fixture)
+void test_register(const char *path, const struct CMUnitTest *test, unsigned kind)
 {
     struct test_file *file = file_named(path);
     file->tests = grown(file->tests, (file->count + 1) * sizeof(*file->tests));
-    file->own_fixtures = grown(file->own_fixtures, (file->count + 1) * sizeof(*file->own_fixtures));
+    file->kinds = grown(file->kinds, (file->count + 1) * sizeof(*file->kinds));
     file->tests[file->count] = *test;
-    file->own_fixtures[file->count++] = has_own_fixture;
+    file->kinds[file->count++] = kind;
 }
 
 void test_register_each(const char *path, CMFixtureFunction set_up, CMFixtureFunction tear_down)
@@ -84,6 +85,12 @@ static void skipped(void **state)
     skip();
 }
 
+static void left_out(void **state)
+{
+    printf("skipped: left to make test-all\n");
+    skipped(state);
+}
+
 /* cmocka cannot skip a group, but asks for each test's functions only when its turn comes. */
 static int begin_file(void **state)
 {
@@ -111,7 +118,7 @@ static void keep_named(struct test_file *file, const char *part)
     for (size_t i = 0; i < file->count; i++) {
         if (is_whole ? strcmp(file->tests[i].name, part) != 0 : !strstr(file->tests[i].name, part))
             continue;
-        file->own_fixtures[kept] = file->own_fixtures[i];
+        file->kinds[kept] = file->kinds[i];
         file->tests[kept++] = file->tests[i];
     }
     file->count = kept;
@@ -120,11 +127,16 @@ static void keep_named(struct test_file *file, const char *part)
 /* The number of tests that failed. */
 static int run_file(struct test_file *file)
 {
-    for (size_t i = 0; i < file->count; i++)
-        if (!file->own_fixtures[i]) {
-            file->tests[i].setup_func = file->each_set_up;
-            file->tests[i].teardown_func = file->each_tear_down;
+    const bool leaves_out = !getenv("FARLIGHT_TEST_LONG");
+    for (size_t i = 0; i < file->count; i++) {
+        struct CMUnitTest *test = &file->tests[i];
+        if (leaves_out && (file->kinds[i] & TEST_IS_LONG)) {
+            *test = (struct CMUnitTest){.name = test->name, .test_func = left_out};
+        } else if (!(file->kinds[i] & TEST_HAS_OWN_FIXTURE)) {
+            test->setup_func = file->each_set_up;
+            test->teardown_func = file->each_tear_down;
         }
+    }
     running = file;
     return _cmocka_run_group_tests(file->name, file->tests, file->count, begin_file, end_file);
 }
@@ -185,7 +197,8 @@ int main(int argc, char **argv)
     if (lists) {
         for (size_t i = 0; i < asked; i++)
             for (size_t t = 0; t < files[i].count; t++)
-                printf("%s %s\n", files[i].name, files[i].tests[t].name);
+                printf("%s %s%s\n", files[i].name, files[i].tests[t].name,
+                       files[i].kinds[t] & TEST_IS_LONG ? " long" : "");
         return 0;
     }
     if (asked == 0)

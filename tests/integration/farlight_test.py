@@ -18,9 +18,9 @@ BIN = pathlib.Path(os.environ.get("FARLIGHT_BIN", ROOT / "build" / "release"))
 SHARED_SCENES = pathlib.Path(os.environ.get("FARLIGHT_SCENES", ROOT.parent / "shared" / "scenes"))
 TIMEOUT_S = 900  # on a busy machine; sanitizers and software GL together are slow
 
-# `make test-long` runs what takes minutes and adds breadth, not another kind of check.
+# `make test-all` runs what takes minutes and adds breadth, not another kind of check.
 LONG = bool(os.environ.get("FARLIGHT_TEST_LONG"))
-long_test = unittest.skipUnless(LONG, "left to make test-long")
+long_test = unittest.skipUnless(LONG, "left to make test-all")
 
 # A picture has one sample where a test says nothing, in place of 16 and more of what is noisy (Case.default_samples).
 os.environ.setdefault("FARLIGHT_SAMPLES", "1")
