@@ -25,7 +25,7 @@ static void report_facts(struct check_report *report, const struct gpu_device *d
     tell(report, "device", "renderer", device->info.name);
     tell(report, "device", "vendor", device->info.vendor);
     tell(report, "device", "version", device->info.version);
-    tell(report, "device", "kind", facts->software ? "software: measures say nothing of a GPU" : "hardware");
+    tell(report, "device", "kind", device->info.software ? "software: measures say nothing of a GPU" : "hardware");
     tell(report, "extension", "loss of the context",
          facts->robust ? "is told" : "is not told: a reset ends the daemon or hangs it");
     tell(report, "extension", "binaries of programs",

@@ -25,7 +25,7 @@
 /* Nothing but first hits, and their depth. */
 static struct frame_request request_of(const struct gpu_device *device, bool several, enum first_hits_way way)
 {
-    const uint32_t side = device->facts.software ? SIDE_SOFTWARE : SIDE_HARDWARE;
+    const uint32_t side = device->info.software ? SIDE_SOFTWARE : SIDE_HARDWARE;
     struct frame_request request = check_request(TRACER_BVH, side, side);
     request.samples = several ? SAMPLES_SEVERAL : 1;
     request.primary = way == FIRST_HITS_TRACED ? PRIMARY_TRACE : PRIMARY_RASTER;
@@ -128,7 +128,7 @@ struct gpu_measured first_hits_limits(const struct first_hits *measured)
 
 bool first_hits_keep(struct gpu_device *device, const struct first_hits *measured)
 {
-    if (device->facts.software || device->measured.known)
+    if (device->info.software || device->measured.known)
         return true;
     device->measured = first_hits_limits(measured);
     return !device->measured.known || gpu_measured_store(&device->info, &device->measured);
@@ -138,7 +138,7 @@ void first_hits_decide(struct gpu_device *device)
 {
     struct first_hits measured;
     struct error error = {0};
-    if (device->measured.known || device->facts.software)
+    if (device->measured.known || device->info.software)
         return;
     if (!first_hits_measure(device, &measured, &error)) {
         log_write(LOG_WARNING, "check", "first hits were not measured, and are rasterised: %s", error.text);

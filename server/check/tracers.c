@@ -180,7 +180,7 @@ static bool watched_frame(struct checking *checking, const struct frame_request 
 
 static struct frame_request timed_request(const struct checking *checking, unsigned tracer)
 {
-    const bool software = checking->frames.device->facts.software;
+    const bool software = checking->frames.device->info.software;
     return check_request(tracer, software ? TIMED_WIDTH_SOFTWARE : TIMED_WIDTH_HARDWARE,
                          software ? TIMED_HEIGHT_SOFTWARE : TIMED_HEIGHT_HARDWARE);
 }
@@ -310,7 +310,7 @@ static const char *program_key(const struct gpu_device *device, unsigned name)
 static void report_dispatch(const struct checking *checking, const char *name, const struct longest *longest)
 {
     const struct gpu_device *device = checking->frames.device;
-    const bool asked = !device->facts.software && device->facts.time_stamp_bits > 0;
+    const bool asked = !device->info.software && device->facts.time_stamp_bits > 0;
     const bool good = longest->ns <= DISPATCH_NS_MAX;
     check_report_row(checking->report,
                      &(struct check_row){.verdict = !asked ? CHECK_NOTE

@@ -72,6 +72,13 @@ static void ask_info(struct gpu_device_info *info, const struct gpu_egl_place *p
     info->software = place->software || sounds_like_software(info->name);
 }
 
+/* Zink queues its work as GPUs do, on lavapipe too. FARLIGHT_LIKE_GPU=1 is for tests on machines without a GPU. */
+static bool chooses_as_software(const struct gpu_device_info *info)
+{
+    const char *like_gpu = getenv("FARLIGHT_LIKE_GPU");
+    return info->software && strncmp(info->name, "zink", 4) != 0 && !(like_gpu && strcmp(like_gpu, "1") == 0);
+}
+
 static uint64_t get_integer(GLenum name)
 {
     GLint64 value = 0;
@@ -79,7 +86,7 @@ static uint64_t get_integer(GLenum name)
     return value < 0 ? 0 : (uint64_t)value;
 }
 
-static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool debug)
+static void ask_facts(struct gpu_facts *facts, const struct gpu_device_info *info, bool robust, bool debug)
 {
     GLint groups = 0, time_stamp_bits = 0;
     glGetQueryiv(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &time_stamp_bits);
@@ -87,7 +94,7 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
     const char *renderer = (const char *)glGetString(GL_RENDERER);
     const bool compiles_at_dispatch = renderer && strncmp(renderer, "llvmpipe", 8) == 0;
     *facts = (struct gpu_facts){
-        .software = software,
+        .software = chooses_as_software(info),
         .robust = robust,
         .debug_output = debug,
         .has_program_binary = get_integer(GL_NUM_PROGRAM_BINARY_FORMATS) > 0,
@@ -102,7 +109,7 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
     facts->texture_buffer_texels_max = facts->limits[GPU_MAX_TEXTURE_BUFFER_SIZE];
     facts->texture_size_max = (uint32_t)facts->limits[GPU_MAX_TEXTURE_SIZE];
     facts->texture_layers_max = (uint32_t)facts->limits[GPU_MAX_ARRAY_TEXTURE_LAYERS];
-    const struct gpu_memory_answers answers = gpu_memory_ask(software);
+    const struct gpu_memory_answers answers = gpu_memory_ask(info->software);
     facts->memory = gpu_memory_from(&answers);
 }
 
@@ -208,7 +215,7 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
         error_set(error, ERROR_UNSUPPORTED, "device", "no software device was found, only %s", device->info.name);
         goto fail;
     }
-    ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
+    ask_facts(&device->facts, &device->info, device->egl->robust, debug);
     if (device->facts.has_program_binary)
         device->binaries = gpu_binary_cache_open(options->binaries_bytes);
     device->ahead = gpu_ahead_create(device);

@@ -14,8 +14,8 @@
 #include <stdint.h>
 
 struct gpu_device_info {
-    int index; /* what --device takes */
-    bool software;
+    int index;      /* what --device takes */
+    bool software;  /* no GPU renders, whatever facts.software lets passes choose */
     char name[128]; /* GL_RENDERER */
     char vendor[64];
     char version[128]; /* GL_VERSION */
@@ -32,8 +32,11 @@ struct gpu_texel_formats {
 
 /* Facts asked once. */
 struct gpu_facts {
-    bool software; /* llvmpipe and the like: SSBO loads are gathers, dispatches are synchronous */
-    bool robust;   /* context tells of its loss */
+    /* Passes choose what suits llvmpipe: SSBO loads are gathers, dispatches are synchronous. False for software GL
+     * as well where the environment has FARLIGHT_LIKE_GPU=1, so that tests try what GPUs do on any machine, and
+     * for zink. */
+    bool software;
+    bool robust; /* context tells of its loss */
     bool debug_output;
     bool has_program_binary;
     bool compiles_together;    /* the driver compiles several programs at a time, in threads of its own */

@@ -62,7 +62,7 @@ static bool traces_first_hits(const struct render_context *context)
     const struct gpu_device *device = context->device;
     const uint64_t primitives = primitives_shown(context->scene);
     const bool by_rule =
-        device->facts.software && !device->measured.known && primitives >= SOFTWARE_TRACED_PRIMITIVES;
+        device->info.software && !device->measured.known && primitives >= SOFTWARE_TRACED_PRIMITIVES;
     const uint64_t pixels = (uint64_t)context->request.width * context->request.height;
     return impl->traces_on_host ||
            (impl->finds_first_hits &&
