@@ -63,7 +63,7 @@ TEST(what_is_decided_for_a_gpu_holds_at_its_next_start)
     const struct first_hits first = made(5000), second = made(500);
     assert_non_null(mkdtemp(folder));
     assert_int_equal(setenv("XDG_CACHE_HOME", folder, 1), 0);
-    device->facts.software = device->info.software = false;
+    device->info.software = false;
     device->measured = (struct gpu_measured){0};
     assert_true(first_hits_keep(device, &first));
     assert_true(device->measured.known);
@@ -71,7 +71,6 @@ TEST(what_is_decided_for_a_gpu_holds_at_its_next_start)
     assert_true(back.traced_from[1] == device->measured.traced_from[1]);
     assert_true(first_hits_keep(device, &second)); /* it is decided already */
     assert_true(back.traced_from[1] == device->measured.traced_from[1]);
-    device->facts.software = before.facts.software;
     device->info.software = before.info.software;
     device->measured = before.measured;
     snprintf(command, sizeof(command), "rm -r %s", folder);
@@ -80,7 +79,7 @@ TEST(what_is_decided_for_a_gpu_holds_at_its_next_start)
 
 TEST(software_gl_is_not_measured_for_it)
 {
-    if (!device->facts.software)
+    if (!device->info.software)
         skip();
     first_hits_decide(device);
     assert_false(device->measured.known);
