@@ -373,7 +373,7 @@ WEB_PACKAGES := chromium python3-websocket
 FARM_PACKAGES := slurm-wlm slurmdbd mariadb-server-core mariadb-client-core nodejs python3-yaml
 BLENDER_PACKAGES := blender python3-numpy xvfb xauth
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test container-test clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-part test-all test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test container-test clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -410,14 +410,17 @@ JOBS ?= $(shell nproc)
 test: test-packages
 	$(MAKE) -j$(JOBS) all tests
 	python3 tests/tools/run_tests.py $(B) $(TESTS)
-# With what takes minutes: all forms of the tracers, the benchmark itself, tiny, and every hostile file the whole way.
-test-long: test-packages
-	$(MAKE) -j$(JOBS) all tests
-	FARLIGHT_TEST_LONG=1 python3 tests/tools/run_tests.py $(B) $(TESTS)
-# What depends on the driver, on Mesa's zink over lavapipe; FARLIGHT_TEST_LONG=1: all of it (run_tests.py, STACKS).
+# What `make test` leaves out, in seven parts (tests/tools/suite.py): one of them, or all.
+PART ?= $(shell date -u +%u)
+test-part: test-packages stack-packages
+	$(MAKE) -j$(JOBS) all tests-all
+	python3 tests/tools/rest.py $(B) $(PART)
+test-all:
+	$(MAKE) test-part PART=all
+# What depends on the driver, on Mesa's zink over lavapipe.
 test-zink: stack-packages
 	$(MAKE) -j$(JOBS) all tests
-	FARLIGHT_TEST_STACK=zink python3 tests/tools/run_tests.py $(B) $(TESTS)
+	python3 tests/tools/run_tests.py $(B) $(or $(TESTS:%=zink/%),zink/)
 # Frames under Vulkan's synchronisation validation: where a glMemoryBarrier() is missing.
 check-sync: sync-packages
 	$(MAKE) -j$(JOBS) $(B)/tests/unit/unit_tests $(B)/tests/tools/sync_layer.so
@@ -437,7 +440,7 @@ bench: test-packages
 SAMPLES ?= 256
 fidelity: fidelity-packages
 	$(MAKE) -j$(JOBS) all
-	/usr/bin/python3 tests/fidelity/fidelity.py $(B) --samples $(SAMPLES) --only "$(ONLY)"
+	/usr/bin/python3 tests/fidelity/fidelity.py $(B) --samples $(SAMPLES) $(if $(SMALL),--small) --only "$(ONLY)"
 equal-time: equal-time-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	/usr/bin/python3 tests/fidelity/equal_time.py $(B) --only "$(ONLY)" $(OPTIONS)
@@ -639,12 +642,12 @@ distclean: clean
 
 help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/   [FAST=1: one picture]'
-	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
-	@echo 'make test-long  all tests and what takes minutes: all forms of the tracers, the benchmark itself, every hostile file the whole way'
-	@echo "make test-zink  tracers, frames and layers on another OpenGL stack, and its pictures beside llvmpipe's   [TESTS=part-of-a-name]"
+	@echo 'make test       install what tests need, build, run what a commit has to pass   [TESTS=part-of-a-name]'
+	@echo 'make test-all   the rest of the tests and checks, which takes hours; make test-part: one part in seven   [PART=3]'
+	@echo 'make test-zink  what depends on the driver, on another OpenGL stack   [TESTS=part-of-a-name]'
 	@echo 'make check-sync frames under Vulkan synchronisation validation, to find missing memory barriers'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
-	@echo 'make fidelity   compare pictures with those of known renderers, into out/fidelity   [SAMPLES=256 ONLY=scene,scene]'
+	@echo 'make fidelity   compare pictures with those of known renderers, into out/fidelity   [SAMPLES=256 SMALL=1 ONLY=scene,scene]'
 	@echo 'make equal-time measure noise over time beside Cycles, into out/equal-time   [ONLY=scene,scene OPTIONS="--denoise"]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'

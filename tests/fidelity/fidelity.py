@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Renders scenes whose pictures by other renderers are known, and says how far ours are from theirs.
 
-fidelity.py BUILD [--samples N] [--only A,B] [--jobs N] [--out FOLDER]
+fidelity.py BUILD [--samples N] [--small] [--only A,B] [--jobs N] [--out FOLDER]
 
 Models, cameras, environments and the others' pictures are in the folder fidelity of FARLIGHT_SCENES (default:
 ../shared/scenes beside the checkout). Of each scene the mean absolute difference to each path tracer is measured, in
@@ -41,6 +41,9 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--samples", type=int, default=256, help="per pixel (default 256)")
+    parser.add_argument("--small", action="store_true",
+                        help=f"pictures a {BLOCK}th as wide and high, whose pixels are what the means are compared with: "
+                             "hours become minutes, and noise and edges count more")
     parser.add_argument("--only", default="", help="scenes, separated by commas")
     parser.add_argument("--jobs", type=int, default=1, help="clients at once (default 1)")
     parser.add_argument("--out", type=pathlib.Path, default=HERE.parents[1] / "out" / "fidelity")
@@ -55,6 +58,7 @@ import pictures  # pylint: disable=wrong-import-position
 import sheet  # pylint: disable=wrong-import-position
 
 FOLDER = farlight_test.SHARED_SCENES / "fidelity"
+SCALE = BLOCK if OPTIONS.small else 1
 KNOWN = json.loads((HERE / "known.json").read_text())
 
 
@@ -70,7 +74,7 @@ def render(scene, digest):
     """The picture's path, and what went wrong or None."""
     picture = OPTIONS.out / "pictures" / f"{scene['name']}.exr"
     command = ["render", FOLDER / scene["model"], "-o", picture, "--float", "--integrator", "path", "--quiet",
-               "--size", f"{scene['golden_width']}x{scene['golden_height']}", "--samples", OPTIONS.samples,
+               "--size", f"{scene['golden_width'] // SCALE}x{scene['golden_height'] // SCALE}", "--samples", OPTIONS.samples,
                "--fov", scene["verticalFoV"], "--environment", FOLDER / scene["lighting"]]
     command += [f"--{option}=" + ",".join(map(str, scene[key]))
                 for option, key in (("eye", "eye"), ("look-at", "lookat"), ("up", "up"))]
@@ -102,7 +106,7 @@ def known_pictures(scene, names):
 
 def judge(scene, picture):
     """What is said of a scene, and its pictures are laid beside each other."""
-    ours = pictures.displayed(numpy.maximum(pictures.read(picture)[..., :3], 0))
+    ours = pictures.displayed(numpy.maximum(pictures.read(picture)[..., :3], 0)).repeat(SCALE, 0).repeat(SCALE, 1)
     means = pictures.block_means(ours, BLOCK)  # of what is displayed, as the others' are
     tracers, rasterisers = known_pictures(scene, PATH_TRACERS), known_pictures(scene, RASTERISERS)
     shown = sheet.lay_out(OPTIONS.out / "pictures", scene["name"], ours, {**tracers, **rasterisers}, tracers, MAGNIFIED)

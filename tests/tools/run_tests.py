@@ -1,20 +1,23 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Runs every test and prints one closing line: N passed, N failed, N skipped.
+"""Runs tests and prints one closing line: N passed, N failed, N skipped.
 
-Usage: run_tests.py BUILD_FOLDER [PART_OF_A_NAME ..]      /scene/ is the folder of that name alone
+Usage: run_tests.py BUILD_FOLDER                        those of `make test` (suite.py says which)
+       run_tests.py BUILD_FOLDER --rest                 all that `make test` leaves out
+       run_tests.py BUILD_FOLDER --part 3               one of the parts that the rest is cut into
+       run_tests.py BUILD_FOLDER PART_OF_A_NAME ..      tests with such a word in their name: /scene/ is that folder alone,
+                                                        like-gpu/ or zink/ before the word runs them in that way
+
 C tests are cmocka programs below BUILD_FOLDER/tests that hold many files of tests; each file runs in a process of its
-own. Integration tests are unittest modules in tests/integration, which find the programs through FARLIGHT_BIN. The
-rules of the sources are checked first. Files and modules run side by side, as most of them leave processors idle:
-FARLIGHT_TEST_JOBS at a time (default: two more than there are processors, at most 4), those first that took longest
-the last time. With CI=true in the environment, a skipped test fails unless EXPECTED_SKIPS names its reason.
-FARLIGHT_TEST_SANITIZED=1 leaves out where the sanitizers see little for their time (NOT_SANITIZED).
-FARLIGHT_TEST_STACK=zink runs what depends on the driver on another driver stack than Mesa's default (STACKS): without a
-part of a name what is worth most for its time, with FARLIGHT_TEST_LONG=1 all of it.
-FARLIGHT_TEST_LONG=1 also runs what adds breadth, not another kind of check: LONG, which a part of a name chooses too.
+own. Integration tests are unittest modules in tests/integration, which find the programs through FARLIGHT_BIN. Files and
+modules run side by side, as most of them leave processors idle: FARLIGHT_TEST_JOBS at a time (default: two more than
+there are processors, at most 4), those first that took longest the last time.
+With CI=true in the environment, a skipped test fails unless EXPECTED_SKIPS names its reason. FARLIGHT_TEST_LONG=1, which
+--rest and --part set, runs the tests as well that are declared as long.
 """
 import collections
 import concurrent.futures
+import functools
 import io
 import json
 import os
@@ -27,66 +30,26 @@ import threading
 import time
 import unittest
 
+import suite
+
 FILE_TIMEOUT_S = 900  # of one file of C tests, beside others
 JOBS_MAX = 4  # each holds pictures, structures and daemons
 SLOWEST = 10  # so many are named at the end
 MODULE = "--module"  # run_tests.py --module NAME: one module of integration tests, for run_module()
 
+LEFT = "left to make test-all"
+NO_MODELS = "no folder of models at FARLIGHT_SCENES"
 # Reasons for which a test may be skipped in CI.
 EXPECTED_SKIPS = (
+    NO_MODELS,  # they lie beside a checkout that has them
     r"no systemd can be started here",  # most containers start none
     r"sanitizers (do not run within|have an allocator)",
     r"ptrace: ",  # forbidden in many containers
     r"this kernel does not name children",
     r"a GPU refits nothing in order",
     r"no promtool",  # its package starts a server
-    r"left to make test-all",
     r"programs on such a library need its compiler flags",  # of the sanitizers and of coverage
 )
-# Under the sanitizers each large allocation of Mesa's is mapped and cleared anew, so that what rasterises large
-# structures takes ten times as long, and they see nothing of shaders, which Mesa compiles at run time. Left out are
-# pictures and samples against closed forms, forms of a tracer that differ in shaders, rows of the tracers that rasterise
-# (their rooms' unit tests stay, but for those of answers), and programs from end to end where pictures are compared.
-NOT_SANITIZED = re.compile(
-    r"accuracy/(?!render_frame|tracer_owners|wave_comparison)"
-    r"|contract/(.*(ray alone|packets of|rays? a call)|bvh in the plain|ldc|abuffer|rayspace, |quadtree)"
-    r"|unit/trace/(abuffer/traversal|ldc/traversal|quadtree/layers)"
-    r"|test_(abuffer|animate|check_device|compare.*|denoise|guide|import_animation|layers|ldc|light|models|poses|quadtree|rayspace|shot|siege|view)$")
-# Where no times of an earlier run are known: what takes longest begins first.
-LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference", "accuracy/frame_ahead",
-                 "accuracy/emitters", "test_light", "test_models", "test_siege", "accuracy/distributed", "test_animate",
-                 "test_render", "test_denoise", "test_compare", "accuracy/energy", "test_drill", "test_compare_tracers",
-                 "test_abuffer", "accuracy/path_light", "contract/quadtree", "unit/trace/ldc/traversal",
-                 "contract/rayspace, flat, by spheres, in batches of 256", "test_check_device", "test_poses",
-                 "test_quadtree", "test_staying_up", "test_sealed", "test_units")
-
-# Left to FARLIGHT_TEST_LONG=1: forms of a tracer whose settings other rows have in other combinations, or whose answers
-# others hold against brute force: unit/trace/ldc/traversal (all levels, packets and layers one by one) and build (lists as
-# peeled), unit/trace/bvh/tracer (one ray alone, packets, spheres, the plain form), accuracy/sampled_against_reference (searches),
-# unit/trace/rayspace/reduce and tracer (ways to reduce, too little room) and nodes (sorted, turned round),
-# accuracy/quadtree_against_reference (numbers of layers, the view, planes).
-LONG = re.compile(r"contract/(bvh, one|bvh, packets|bvh in the plain|bvh with|ldc, |ldc by|abuffer, |rayspace, flat$|rayspace, sorted"
-                  r"|rayspace with|quadtree, of one layer|quadtree, of the view|quadtree, planes)")
-
-# Driver stacks beside the default one: what chooses it, and what the daemon must then say that it renders with.
-# zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers).
-Stack = collections.namedtuple("Stack", "environment renderer")
-STACKS = {"zink": Stack({"LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink"}, "zink")}
-# What depends on the driver: tracers, frames, layers, and commands from end to end.
-ON_A_STACK = re.compile(r"accuracy/|contract/|unit/(gpu|gpu_scene|render|trace)/|test_stacks$"
-                        r"|test_(render|layers|ldc|abuffer|compare_tracers|animate|carousel|light|poses)$")
-# Left to FARLIGHT_TEST_LONG=1, as others see the same of a driver in less time: scattering and light against closed forms,
-# which is GLSL's arithmetic again; the lengths of steps; forms of a tracer that differ in constants of a shader, or in
-# what the host does; what fills memory up to limits; commands that differ from those of test_stacks in files and options.
-LONG_ON_A_STACK = re.compile(
-    r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|distributed_light|emitters|energy.*|fireflies|sheen|film"
-    r"|depth_of_field|frame_steps)"
-    r"|contract/(bvh, one ray alone|reference, |ldc by|rayspace, flat, by|quadtree, of boxes)"
-    r"|unit/trace/(abuffer|ldc)/(limits|traversal)|unit/trace/bvh/history"
-    r"|test_(render|ldc|abuffer|animate|carousel|light|poses)$")
-# Compares two stacks.
-ONLY_ON_A_STACK = re.compile(r"test_stacks$")
-
 # skips: (test, reason); used: processor time of it and of the programs that it has waited for, in seconds
 Result = collections.namedtuple("Result", "text passed failed skips used")
 
@@ -95,9 +58,9 @@ def processor_time(usage):
     return usage.ru_utime + usage.ru_stime
 
 
-def run_command(command, timeout=None):
-    """(output, exit status, processor time)"""
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace") as program:
+def run_command(command, environment=None, timeout=None):
+    """(output, exit status, processor time); `environment` is added to that of this process."""
+    with subprocess.Popen(command, env={**os.environ, **(environment or {})}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace") as program:
         timer = threading.Timer(timeout or threading.TIMEOUT_MAX, program.kill)
         timer.start()
         output = program.stdout.read()
@@ -113,9 +76,9 @@ def run_check(name, command):
     return Result(f"== {name}\n{output}", int(status == 0), int(status != 0), [], used)
 
 
-def run_program(command):
+def run_program(command, environment):
     """(output, exit status, test -> verdict, (test, reason) of those that were skipped, processor time)"""
-    output, status, used = run_command(command, FILE_TIMEOUT_S)
+    output, status, used = run_command(command, environment, FILE_TIMEOUT_S)
     verdicts, reason, skips = {}, "", []  # by name: cmocka lists those that failed once more at the end
     for line in output.splitlines():
         if line.startswith(("skipped: ", "SKIP: ")):
@@ -130,16 +93,16 @@ def run_program(command):
     return output, status, verdicts, skips, used
 
 
-def run_cmocka(name, command, tests):
+def run_cmocka(name, environment, command, tests):
     """`tests`: their names in order, where they are known. What follows a test that failed, or after which the program
     died, may have failed because of it, and is run again alone."""
-    output, status, verdicts, skips, used = run_program(command)
+    output, status, verdicts, skips, used = run_program(command, environment)
     first = next((i for i, test in enumerate(tests) if verdicts.get(test) in (None, "FAILED")), len(tests))
     if first < len(tests):
         verdicts[tests[first]] = "FAILED"
     for test in tests[first + 1:]:
         if verdicts.get(test) in (None, "FAILED"):
-            again, _, alone, _, more = run_program([command[0], f"{command[1]}:{test}"])
+            again, _, alone, _, more = run_program([command[0], f"{command[1]}:{test}"], environment)
             verdicts[test], used = alone.get(test, "FAILED"), used + more
             output += f"\nalone:\n{again}"
     passed, failed = (sum(verdict == word for verdict in verdicts.values()) for word in ("OK", "FAILED"))
@@ -182,8 +145,8 @@ def module_main(name):
                       "skips": [(test.id(), reason) for test, reason in result.skipped]}))
 
 
-def run_module(name):
-    output, status, used = run_command([sys.executable, __file__, MODULE, name])
+def run_module(name, environment, module):
+    output, status, used = run_command([sys.executable, __file__, MODULE, module], environment)
     text, _, last = output.rstrip("\n").rpartition("\n")
     if status != 0 or not last.startswith('{"failed"'):  # it died
         return Result(f"== {name}\n{output}", 0, 1, [], used)
@@ -191,9 +154,9 @@ def run_module(name):
     return Result(f"== {name}\n{text}", counts["passed"], counts["failed"], counts["skips"], used)
 
 
-def tasks(build, names):
-    """What there is to run: name -> function."""
-    found = {path.stem: lambda name=path.stem: run_module(name)
+def tests_of(build):
+    """What there is to run: name -> function of the name that it goes by and of its environment."""
+    found = {path.stem: functools.partial(run_module, module=path.stem)
              for path in sorted(pathlib.Path("tests/integration").glob("test_*.py"))}
     for program in sorted(build.glob("tests/*/*_tests")):
         listing = subprocess.run([program, "--list"], stdout=subprocess.PIPE, text=True, check=True).stdout
@@ -201,31 +164,30 @@ def tasks(build, names):
         for line in listing.splitlines():
             file, test, *_ = line.split(" ")
             files[file].append(test)
-        for file, tests in files.items():
-            found[file] = lambda file=file, program=program, tests=tests: run_cmocka(file, [program, file], tests)
+        found.update({file: functools.partial(run_cmocka, command=[program, file], tests=tests) for file, tests in files.items()})
     contract = build / "tests/tracers/test_contract"
     if contract.is_file():
         rows = subprocess.run([contract, "--list"], stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
-        found.update({f"contract/{row}": lambda row=row: run_cmocka(f"contract/{row}", [contract, f"{row}: "], ())
+        found.update({f"contract/{row}": functools.partial(run_cmocka, command=[contract, f"{row}: "], tests=())
                       for row in rows})
-    if os.environ.get("FARLIGHT_TEST_SANITIZED"):
-        found = {name: task for name, task in found.items() if not NOT_SANITIZED.match(name)}
-    if not names and not os.environ.get("FARLIGHT_TEST_LONG"):
-        found = {name: task for name, task in found.items() if not LONG.match(name)}
-    stack = STACKS.get(os.environ.get("FARLIGHT_TEST_STACK"))
-    found = {name: task for name, task in found.items()
-             if (ON_A_STACK.match(name) if stack else not ONLY_ON_A_STACK.match(name))}
-    if stack and not names and not os.environ.get("FARLIGHT_TEST_LONG"):
-        found = {name: task for name, task in found.items() if not LONG_ON_A_STACK.match(name)}
-    return {name: task for name, task in found.items() if not names or any(part in f"/{name}" for part in names)}
+    return found
+
+
+def named(core, rest, words):
+    """In the way that a word begins with, as a part of `make test` if it is one."""
+    chosen = {}
+    for run in core + rest:
+        way = run.name.removesuffix(run.test)
+        if any(word.startswith(way) and word.removeprefix(way) in f"/{run.test}" for word in words):
+            chosen.setdefault(run.name, run._replace(environment=suite.WAYS[way].environment))
+    return list(chosen.values())
 
 
 def known_times(path):
     try:
-        times = json.loads(path.read_text())
+        return json.loads(path.read_text())
     except (OSError, ValueError):
-        times = {}
-    return {**{name: 1000 - place for place, name in enumerate(LONGEST_FIRST)}, **times}
+        return {}
 
 
 def timed(task):
@@ -237,59 +199,81 @@ class Sums:
     """What has been run so far; prints what each has to say."""
 
     def __init__(self):
-        self.passed = self.failed = self.skipped = 0
+        self.passed = self.failed = self.skipped = self.left = self.without_models = 0
         self.skips_are_failures = os.environ.get("CI") == "true"
 
-    def add(self, result, seconds=None):
+    def add(self, result, seconds=None, leaves=False):
+        """`leaves`: tests may be left to another run."""
         print(result.text + ("" if seconds is None else f" in {seconds:.1f} s, of processors {result.used:.1f} s"), flush=True)
         self.passed += result.passed
         self.failed += result.failed
         for test, reason in result.skips:
+            if leaves and reason == LEFT:
+                self.left += 1
+                continue
             expected = any(re.search(pattern, reason) for pattern in EXPECTED_SKIPS)
-            fails = self.skips_are_failures and not expected
+            fails = reason == LEFT or (self.skips_are_failures and not expected)
             self.failed += fails
             self.skipped += not fails
+            self.without_models += NO_MODELS in reason
             print(f"   {'FAILED, as it was skipped' if fails else 'skipped'}: {test}: {reason}", flush=True)
 
+    def show(self):
+        if self.left:
+            print(f"{self.left} tests are {LEFT}")
+        if self.without_models:
+            print(f"{self.without_models} of the skipped tests need models: FARLIGHT_SCENES=FOLDER says where they are")
+        print(f"\n{self.passed} passed, {self.failed} failed, {self.skipped} skipped")
 
-def choose_stack(build):
-    """True when the programs render with the driver stack that FARLIGHT_TEST_STACK names; unset: Mesa's default."""
-    name = os.environ.get("FARLIGHT_TEST_STACK")
-    if not name:
-        return True
-    if name not in STACKS:
-        print(f"FARLIGHT_TEST_STACK={name} is not one of: {', '.join(STACKS)}")
-        return False
-    os.environ.update(STACKS[name].environment)
-    listing = subprocess.run([build / "farlightd", "--list-devices"], stdout=subprocess.PIPE, text=True, check=False).stdout
-    if STACKS[name].renderer not in listing:
-        print(f"no driver stack {name}: farlightd --list-devices says {listing.strip() or 'nothing'}")
-        return False
-    print(f"on {listing.strip()}")
+
+def device_of(build, way):
+    """The device that programs render with in a way, where a way asks for one. None: it is not there."""
+    if not way.renderer:
+        return ""
+    listing = subprocess.run([build / "farlightd", "--list-devices"], env={**os.environ, **way.environment},
+                             stdout=subprocess.PIPE, text=True, check=False).stdout.strip()
+    return listing if way.renderer in listing else None
+
+
+def begin_ways(build, runs):
+    """Whether every way of the runs can be had; says which devices they are."""
+    for prefix in sorted({run.name.removesuffix(run.test) for run in runs}):
+        device = device_of(build, suite.WAYS[prefix])
+        if device is None:
+            print(f"{prefix}: no device of that kind is here; its driver is in the packages of `make stack-packages`")
+            return False
+        if device:
+            print(f"{prefix} is on {device}")
     return True
 
 
-def run_all(build, names):
-    sums = Sums()
-    if not names and not os.environ.get("FARLIGHT_TEST_STACK"):
-        sums.add(run_check("include rules", [sys.executable, "tests/tools/check_includes.py"]))
-        sums.add(run_check("headers alone", ["make", "-s", "check-headers"]))
+def choose(found, sanitized, arguments):
+    """The runs that are asked for, and whether tests may be left to others."""
+    core, rest = suite.runs(found, sanitized)
+    if arguments[:1] == ["--rest"]:
+        return rest, False
+    if arguments[:1] == ["--part"]:
+        return suite.part(rest, int(arguments[1])), False
+    long = bool(os.environ.get("FARLIGHT_TEST_LONG"))
+    return (named(core, rest, arguments) if arguments else core), not long
+
+
+def run_all(build, runs, tests, leaves, sums):
     jobs = int(os.environ.get("FARLIGHT_TEST_JOBS") or min(JOBS_MAX, len(os.sched_getaffinity(0)) + 2))
-    times_path = build / f"test_times{os.environ.get('FARLIGHT_TEST_STACK', '')}.json"
-    times, todo, took, used = known_times(times_path), tasks(build, names), {}, {}
+    times_path = build / "test_times.json"
+    times, took, used = {**dict.fromkeys(suite.LONGEST, 1000), **known_times(times_path)}, {}, {}
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        running = {pool.submit(timed, todo[name]): name
-                   for name in sorted(todo, key=lambda name: -times.get(name, 0))}
+        running = {pool.submit(timed, functools.partial(tests[run.test], run.name, run.environment)): run.name
+                   for run in sorted(runs, key=lambda run: -times.get(run.name, 0))}
         for done in concurrent.futures.as_completed(running):
             result, took[running[done]] = done.result()
             used[running[done]] = result.used
-            sums.add(result, took[running[done]])
+            sums.add(result, took[running[done]], leaves)
     times_path.write_text(json.dumps({**times, **took}, indent=1))
     for title, seconds in (("slowest", took), ("most processor time", used)):
         longest = sorted(seconds.items(), key=lambda item: -item[1])[:SLOWEST]
         print(f"\n{title}: " + ", ".join(f"{name} {value:.0f} s" for name, value in longest), end="")
     print(f"\nprocessor time: {processor_time(resource.getrusage(resource.RUSAGE_CHILDREN)):.0f} s")
-    return sums
 
 
 def main():
@@ -314,10 +298,18 @@ def main():
     cache = build.parent / "cache"
     cache.mkdir(exist_ok=True)
     os.environ.setdefault("XDG_CACHE_HOME", str(cache))
-    if not choose_stack(build):
+    tests = tests_of(build)
+    sums = Sums()
+    for fault in suite.faults(tests):
+        sums.add(Result(fault, 0, 1, [], 0))
+    runs, leaves = choose(tests, build.name == "sanitize", sys.argv[2:])
+    if not begin_ways(build, runs):
         return 1
-    sums = run_all(build, sys.argv[2:])
-    print(f"\n{sums.passed} passed, {sums.failed} failed, {sums.skipped} skipped")
+    if len(sys.argv) == 2:
+        sums.add(run_check("include rules", [sys.executable, "tests/tools/check_includes.py"]))
+        sums.add(run_check("headers alone", ["make", "-s", "check-headers"]))
+    run_all(build, runs, tests, leaves, sums)
+    sums.show()
     return 1 if sums.failed or not sums.passed else 0
 
 
