@@ -74,7 +74,7 @@ def render(scene, digest):
     """The picture's path, and what went wrong or None."""
     picture = OPTIONS.out / "pictures" / f"{scene['name']}.exr"
     command = ["render", FOLDER / scene["model"], "-o", picture, "--float", "--integrator", "path", "--quiet",
-               "--size", f"{scene['golden_width'] // SCALE}x{scene['golden_height'] // SCALE}", "--samples", OPTIONS.samples,
+               "--size", f"{-(-scene['golden_width'] // SCALE)}x{-(-scene['golden_height'] // SCALE)}", "--samples", OPTIONS.samples,
                "--fov", scene["verticalFoV"], "--environment", FOLDER / scene["lighting"]]
     command += [f"--{option}=" + ",".join(map(str, scene[key]))
                 for option, key in (("eye", "eye"), ("look-at", "lookat"), ("up", "up"))]
@@ -106,7 +106,8 @@ def known_pictures(scene, names):
 
 def judge(scene, picture):
     """What is said of a scene, and its pictures are laid beside each other."""
-    ours = pictures.displayed(numpy.maximum(pictures.read(picture)[..., :3], 0)).repeat(SCALE, 0).repeat(SCALE, 1)
+    ours = pictures.displayed(numpy.maximum(pictures.read(picture)[..., :3], 0))
+    ours = ours.repeat(SCALE, 0).repeat(SCALE, 1)[:scene["golden_height"], :scene["golden_width"]]
     means = pictures.block_means(ours, BLOCK)  # of what is displayed, as the others' are
     tracers, rasterisers = known_pictures(scene, PATH_TRACERS), known_pictures(scene, RASTERISERS)
     shown = sheet.lay_out(OPTIONS.out / "pictures", scene["name"], ours, {**tracers, **rasterisers}, tracers, MAGNIFIED)
