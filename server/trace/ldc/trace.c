@@ -73,7 +73,7 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
         if (store->cubes[i].resolution)
             cubes[cube_count++] = &store->cubes[i];
     cube_count = cube_count ? cube_count : 1;
-    char number_of_cubes[4], bits[4];
+    char number_of_cubes[12], bits[4];
     snprintf(number_of_cubes, sizeof(number_of_cubes), "%u", cube_count);
     const struct ldc_level_layout layout = ldc_level_layout_of(store, cubes[0]->resolution, options);
     snprintf(bits, sizeof(bits), "%u", layout.bits);
