@@ -299,7 +299,7 @@ CONTRACT := $(B)/tests/tracers/test_contract
 CONTRACT_OBJ := $(call obj,$(filter-out tests/tracers/test_%,$(wildcard tests/tracers/*.c $(EXTRA_TRACER:%=%/row.c))))
 $(CONTRACT): %: %.o $(CONTRACT_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-MODEL_OBJ := $(B)/tests/bench/load_model.o
+MODEL_OBJ := $(B)/tests/fixtures/load_model.o
 RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c) tests/bench/bench_warps.c) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 # Sessions live in a time of their own.
@@ -332,7 +332,7 @@ $(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client
 EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c rayspace.c tracers.c))
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
-$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c plan.c)) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c plan.c)) $(MODEL_OBJ) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) $(VIEWER_LIBS) -o $@
 # A link to look over.
 SHAPED_LINK := $(B)/tests/bench/shaped_link

@@ -4,7 +4,7 @@
 #define FARLIGHT_TESTS_BENCH_SCENE_H
 
 #include "render/frame.h"
-#include "tests/bench/load_model.h"
+#include "tests/fixtures/load_model.h"
 #include "gpu_scene/scene.h"
 
 #include <jansson.h>
