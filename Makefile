@@ -212,14 +212,6 @@ $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefil
 $(B)/shader_sources.o: $(B)/shader_sources.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
-# Programs that measure or test rivals have their shaders too.
-RIVAL_SHADERS := $(patsubst tests/bench/%,%,$(call sources,tests/bench/svo tests/bench/reduce,h glsl comp frag))
-$(B)/tests/bench/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) $(addprefix tests/bench/,$(RIVAL_SHADERS)) Makefile
-	@mkdir -p $(@D)
-	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) -- $(CURDIR)/tests/bench $(RIVAL_SHADERS) >$@.new && mv $@.new $@
-$(B)/tests/bench/shader_sources.o: $(B)/tests/bench/shader_sources.c
-	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iserver $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
-
 # ---- programs --------------------------------------------------------------------------------------
 EMBREE_LIBS := $(if $(filter 1,$(EMBREE)),-lembree3)
 SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) $(EMBREE_LIBS) -lm
@@ -270,18 +262,12 @@ $(B)/man/farlight.1: conf/man/farlight.1 $(B)/farlight
 	$(B)/farlight tracers --manual >$@.part && sed -e '/@TRACERS@/{r $@.part' -e 'd;}' $< >$@.new && mv $@.new $@
 
 # ---- tests -----------------------------------------------------------------------------------------
-# What has shaders of its own has them in place of the daemon's alone.
-RIVAL_SOURCES := $(B)/tests/bench/shader_sources.o
-LINKED = $(if $(filter $(RIVAL_SOURCES),$^),$(filter-out $(B)/shader_sources.o,$^),$^)
 # Tests register themselves (tests/harness/test.h). Those that need neither libraries nor functions replaced for them alone are
 # one program; run_tests.py runs each of its files in a process of its own.
 MEDIA_TEST_SRC := $(call sources,tests/unit/encode tests/unit/viewer,c)
 FAULT_TEST_SRC := tests/unit/session/faults.c
 CORPUS_TEST_SRC := $(call sources,tests/unit/fuzz,c)
 UNIT_TEST_SRC := $(filter-out $(MEDIA_TEST_SRC) $(FAULT_TEST_SRC) $(CORPUS_TEST_SRC),$(call sources,tests/unit tests/accuracy,c))
-ifneq ($(EMBREE),1)
-UNIT_TEST_SRC := $(filter-out tests/unit/bench/contest.c,$(UNIT_TEST_SRC))
-endif
 TEST_PROGRAMS := $(addprefix $(B)/tests/unit/,unit_tests media_tests fault_tests corpus_tests)
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE_LIBS) -lm
 # With the optimiser they take longer to compile than it saves when they run, but for brute force over triangles.
@@ -289,7 +275,7 @@ ifneq ($(filter release sanitize,$(config)),)
 $(call obj,$(filter-out tests/unit/trace/%,$(call sources,tests/unit tests/accuracy tests/harness tests/tracers,c))): OPT += -O0
 endif
 $(TEST_PROGRAMS): $(B)/tests/harness/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 $(B)/tests/unit/unit_tests: $(call obj,$(UNIT_TEST_SRC))
 $(B)/tests/unit/media_tests: $(call obj,$(MEDIA_TEST_SRC))
 $(B)/tests/unit/fault_tests: $(call obj,$(FAULT_TEST_SRC))
@@ -299,9 +285,7 @@ CONTRACT := $(B)/tests/tracers/test_contract
 CONTRACT_OBJ := $(call obj,$(filter-out tests/tracers/test_%,$(wildcard tests/tracers/*.c $(EXTRA_TRACER:%=%/row.c))))
 $(CONTRACT): %: %.o $(CONTRACT_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-MODEL_OBJ := $(B)/tests/bench/load_model.o
-RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c) tests/bench/bench_warps.c) $(RIVAL_SOURCES)
-CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
+MODEL_OBJ := $(B)/tests/fixtures/load_model.o
 # Sessions live in a time of their own.
 SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))
 SERVING_WRAP := -Wl,--wrap=clock_now_ns
@@ -327,13 +311,12 @@ $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode e
   warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp) $(SERVING_WRAP)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(addprefix $(B)/client/web/,address.o callers.o links.o outage.o queue.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
-# Measurements of the benchmark register themselves (tests/bench/bench.h). Those that hold us against Embree need it.
-EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c rayspace.c tracers.c))
-BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(addprefix $(B)/client/web/,address.o callers.o links.o outage.o queue.o) $(MODEL_OBJ)
+# Measurements of the benchmark register themselves (tests/bench/bench.h).
+BENCH_SRC := $(filter-out tests/bench/shaped_link.c,$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
-$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c plan.c)) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) $(VIEWER_LIBS) -o $@
+$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c plan.c)) $(MODEL_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) $(VIEWER_LIBS) -o $@
 # A link to look over.
 SHAPED_LINK := $(B)/tests/bench/shaped_link
 $(SHAPED_LINK): %: %.o
@@ -373,8 +356,10 @@ WEB_PACKAGES := chromium python3-websocket
 FARM_PACKAGES := slurm-wlm slurmdbd mariadb-server-core mariadb-client-core nodejs python3-yaml
 BLENDER_PACKAGES := blender python3-numpy xvfb xauth
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-part test-all test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test container-test clean distclean help
-tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
+.PHONY: tests tests-all build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-part test-all test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test container-test clean distclean help
+tests: $(TEST_PROGRAMS) $(CONTRACT) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
+# With the benchmark, whose own tests need it.
+tests-all: tests $(BENCH_PROGRAM) $(SHAPED_LINK)
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -522,7 +507,7 @@ PURE_TESTS := /base/ /net/ /protocol/ /scene/ /client/catalogue /client/frames /
 # How each source is compiled, for editors and clang's tools; from our own rules.
 .PHONY: compile_commands.json
 compile_commands.json:
-	@$(MAKE) -nB V=1 --no-print-directory all tests | python3 tests/tools/compile_commands.py >$@.new && mv $@.new $@
+	@$(MAKE) -nB V=1 --no-print-directory all tests-all | python3 tests/tools/compile_commands.py >$@.new && mv $@.new $@
 # gcc's analyzer knows C only. What it finds is an error of the build, whose objects stay: a second run costs what changed.
 analyze: analyze-packages
 	@$(MAKE) -s compile_commands.json

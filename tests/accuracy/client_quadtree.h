@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_CLIENT_QUADTREE_H
 #define FARLIGHT_TESTS_CLIENT_QUADTREE_H
 
-#include "tests/bench/load_model.h"
+#include "tests/fixtures/load_model.h"
 #include "tests/unit/trace/quadtree/layers.h"
 
 #include "render/frame.h"

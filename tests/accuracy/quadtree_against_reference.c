@@ -3,7 +3,7 @@
  * its structure belongs to, and all pixels that each of them sees. Models are those of the folder FARLIGHT_SCENES.
  * Each test prints what share of the pixels is known, by layers. */
 #include "tests/accuracy/test_scenes.h"
-#include "tests/bench/load_model.h"
+#include "tests/fixtures/load_model.h"
 #include "tests/fixtures/device.h"
 
 #include "gpu_scene/scene.h"

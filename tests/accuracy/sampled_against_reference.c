@@ -6,7 +6,7 @@
  * keeps the pictures. */
 #include "tests/accuracy/against_reference.h"
 
-#include "tests/bench/load_model.h"
+#include "tests/fixtures/load_model.h"
 #include "render/frame_state.h"
 #include "tests/harness/test.h"
 

@@ -2,21 +2,20 @@
 # SPDX-License-Identifier: MIT
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
-Parts: start, first_picture, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
-steps, link, view, deadline, walk, warp, ldc, abuffer, sampled, rayspace, quadtree, reduce, reach; all of them where none is named. Each figure is the median of several runs after a
-warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES
-(default: ../shared/scenes beside the checkout) are left out, and named, where missing.
+Parts: start, first_picture, oneshot, frames, animation, tracers, family, pixels, rays, link, view; and of the tracers' papers
+parallel, flake, distributed, ldc, abuffer, rayspace, quadtree; all of them where none is named. Each figure is the median of
+several runs after a warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of
+FARLIGHT_SCENES (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
 
 Writes FOLDER/bench.txt and FOLDER/bench.json (FOLDER: out); a run that writes into out, other than with --tiny, also brings
 the sections of its parts in tests/bench/README.md up to date. Parts that an earlier run on the same device and commit left
-there stay. The JSON: {"format": 1, "environment": {date, commit, processor, processors, device, vendor, version, software,
-embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are objects of median, deviation, min, max
-and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
-bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
-memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).
-`first_picture` is described in bench_first_picture.py, `distributed` in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `view` in bench_view.py, `deadline` in bench_deadline.py, `walk` in bench_walk.py, `warp` in bench_warp.py, `ldc` in bench_ldc.py,
-`abuffer` in bench_abuffer.py, `rayspace` in bench_rayspace.py, `quadtree` in bench_quadtree.py, `reduce` in bench_reduce.py, `sampled` in bench_sampled.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread
-(missed by no more than twice its deviation), where.
+there stay. The JSON: {"format": 1, "environment": {date, commit, processor, processors, device, vendor, version, software},
+"parts": {NAME: {..}}}. Figures are objects of median, deviation, min, max and runs; keys end with their unit. tracers, family,
+pixels and rays have `results`, one for each call of bench_tracers: title, triangles, spheres, instances, width, height,
+rays_per_pixel, `structures` (tracer, build, memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, way, time,
+rays_per_s, agreement). The others are described in the heads of bench_first_picture.py, bench_link.py, bench_view.py,
+bench_bvh.py, bench_sampled.py, bench_rayspace.py and bench_quadtree.py. `wanted` has the lines that are to be reached: line,
+wanted, measured, met, within_spread (missed by no more than twice its deviation), where.
 
 Exit status 1 if something failed, or a tracer gave wrong answers; a line that was missed is no failure.
 """
@@ -29,28 +28,17 @@ import sys
 import tempfile
 import time
 
-import bench_abuffer
-import bench_abuffer_show
-import bench_animated
+import bench_bvh
 import bench_client
-import bench_deadline
 import bench_first_picture
-import bench_frames
-import bench_ldc
-import bench_ldc_show
 import bench_link
 import bench_quadtree
-import bench_quadtree_show
 import bench_rays
 import bench_rayspace
-import bench_reach
 import bench_readme
-import bench_reduce
 import bench_sampled
-import bench_steps
 import bench_view
-import bench_walk
-import bench_warp
+import bench_wanted
 from bench_common import Bench, Failure, command, environment, say
 
 # name: (title, measure, show)
@@ -61,29 +49,18 @@ PARTS = {
     "frames": ("Frames", bench_client.measure_frames, bench_client.show_frames),
     "animation": ("An animation", bench_client.measure_animation, bench_client.show_animation),
     "tracers": ("Tracers, scene by scene", bench_rays.measure_tracers, bench_rays.show_tracers),
-    "forms": ("The forms of bvh", bench_rays.measure_forms, lambda data: data["text"].rstrip()),
     "family": ("Time against triangles", bench_rays.measure_family, bench_rays.show_family),
     "pixels": ("Time against pixels", bench_rays.measure_pixels, bench_rays.show_pixels),
     "rays": ("Time against rays per pixel", bench_rays.measure_rays, bench_rays.show_rays),
-    "parallel": ("Packets of rays", bench_animated.measure_parallel, bench_animated.show_parallel),
-    "instances": ("Instances that move", bench_animated.measure_instances, bench_animated.show_instances),
-    "refit": ("A mesh that deforms", bench_animated.measure_refit, bench_animated.show_refit),
-    "flake": ("Time against spheres", bench_animated.measure_flake, bench_animated.show_flake),
-    "distributed": ("Distributed ray tracing, whole frames", bench_frames.measure_distributed,
-                    bench_frames.show_distributed),
-    "steps": ("Steps of a frame", bench_steps.measure, bench_steps.show),
     "link": ("A sealed connection beside an open one", bench_link.measure, bench_link.show),
     "view": ("Views whose camera moves", bench_view.measure, bench_view.show),
-    "deadline": ("Heavy views with a rate to keep", bench_deadline.measure, bench_deadline.show),
-    "walk": ("A walk whose pictures come late", bench_walk.measure, bench_walk.show),
-    "warp": ("A walk over slow links", bench_warp.measure, bench_warp.show),
-    "ldc": ("Layered depth cubes", bench_ldc.measure, bench_ldc_show.show),
-    "abuffer": ("Voxels and A-buffers", bench_abuffer.measure, bench_abuffer_show.show),
-    "sampled": ("Layered depth cubes and A-buffers beside bvh", bench_sampled.measure, bench_sampled.show),
+    "parallel": ("Packets of rays", bench_bvh.measure_parallel, bench_bvh.show_parallel),
+    "flake": ("Time against spheres", bench_bvh.measure_flake, bench_bvh.show_flake),
+    "distributed": ("Distributed ray tracing, whole frames", bench_bvh.measure_distributed, bench_bvh.show_distributed),
+    "ldc": ("Layered depth cubes", bench_sampled.measure_ldc, bench_sampled.show_ldc),
+    "abuffer": ("Voxels and A-buffers", bench_sampled.measure_abuffer, bench_sampled.show_abuffer),
     "rayspace": ("A hierarchy over the rays", bench_rayspace.measure, bench_rayspace.show),
-    "quadtree": ("Quadtrees over what a view sees", bench_quadtree.measure, bench_quadtree_show.show),
-    "reduce": ("Stream reduction", bench_reduce.measure, bench_reduce.show),
-    "reach": ("bvh beside Embree", bench_rays.measure_reach, bench_rays.show_reach),
+    "quadtree": ("Quadtrees over what a view sees", bench_quadtree.measure, bench_quadtree.show),
 }
 WANTED_TITLE = "What is wanted"
 OUT = pathlib.Path("out")
@@ -116,19 +93,19 @@ def part_section(name, data):
 def show_environment(facts):
     where = "software GL" if facts["software"] else "GPU"
     return (f"farlight {facts['commit']}, {facts['date']}\n{facts['device']} ({where}), {facts['version']}\n"
-            f"{facts['processor']}, {facts['processors']} processors; Embree {facts['embree']}\n")
+            f"{facts['processor']}, {facts['processors']} processors\n")
 
 
 def render(document):
     sections = [show_environment(document["environment"])]
     sections += [part_section(name, document["parts"][name]) for name in PARTS if name in document["parts"]]
     if "wanted" in document["parts"]:
-        sections.append(section(WANTED_TITLE, bench_reach.show(document["parts"]["wanted"])))
+        sections.append(section(WANTED_TITLE, bench_wanted.show(document["parts"]["wanted"]["rows"])))
     return "\n".join(sections)
 
 
 def write(document, out):
-    wanted = bench_reach.derive(document["parts"])
+    wanted = bench_wanted.derive(document["parts"])
     if wanted:
         document["parts"]["wanted"] = wanted
     out.mkdir(parents=True, exist_ok=True)
@@ -140,7 +117,7 @@ def write_readme(document):
     """What bench.json has, in the README beside this file."""
     parts = [(name, PARTS[name][0], part_text(name, document["parts"][name])) for name in PARTS if name in document["parts"]]
     if "wanted" in document["parts"]:
-        parts.append(("wanted", WANTED_TITLE, bench_reach.show(document["parts"]["wanted"])))
+        parts.append(("wanted", WANTED_TITLE, bench_wanted.show(document["parts"]["wanted"]["rows"])))
     bench_readme.write(document["environment"], parts)
 
 
@@ -174,7 +151,7 @@ def run(bench, names, out):
         print(show_environment(facts), flush=True)
         measure(bench, names, document, out)
         if "wanted" in document["parts"]:
-            print(section(WANTED_TITLE, bench_reach.show(document["parts"]["wanted"])))
+            print(section(WANTED_TITLE, bench_wanted.show(document["parts"]["wanted"]["rows"])))
     except Failure as failure:
         bench.faults.append(str(failure))
     finally:
@@ -189,7 +166,6 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=OUT, help="where the tables go (out)")
     parser.add_argument("--runs", type=int, help="how many runs a figure has (3 to 9)")
     parser.add_argument("--link-seconds", type=int, default=60, help="how long the part view looks over a slow link (60)")
-    parser.add_argument("--goals", action="store_true", help="of the part warp only the links that goals are set for: a minute")
     parser.add_argument("--tiny", action="store_true", help="the smallest scenes only: shows that it works, measures nothing")
     arguments = parser.parse_args()
     unknown = [name for name in arguments.parts if name not in PARTS]
@@ -200,7 +176,7 @@ def main():
     if not 2 <= arguments.link_seconds <= 3600:
         parser.error("between 2 and 3600 seconds")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # what was started is ended on the way out
-    bench = Bench(arguments.build, arguments.runs, arguments.tiny, arguments.link_seconds, arguments.goals)
+    bench = Bench(arguments.build, arguments.runs, arguments.tiny, arguments.link_seconds)
     faults = run(bench, arguments.parts or list(PARTS), arguments.out)
     document = load(arguments.out / "bench.json")
     if document and not arguments.tiny and arguments.out == OUT:

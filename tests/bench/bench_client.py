@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import struct
 import subprocess
 import tempfile
 import time
@@ -103,29 +102,12 @@ def show_start(data):
 # ---- one command ------------------------------------------------------------------------------------
 
 
-def glb_triangles(path):
-    """Offsets of positions and indices in a GLB of one float mesh: what the yardstick reads."""
-    data = path.read_bytes()
-    json_bytes = struct.unpack_from("<I", data, 12)[0]
-    gltf = json.loads(data[20:20 + json_bytes])
-    base = 20 + json_bytes + 8
-    primitive = gltf["meshes"][0]["primitives"][0]
-
-    def place(accessor):
-        view = gltf["bufferViews"][accessor["bufferView"]]
-        return base + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    positions = gltf["accessors"][primitive["attributes"]["POSITION"]]
-    indices = gltf["accessors"][primitive["indices"]]
-    return place(positions), positions["count"], place(indices), indices["count"] // 3
-
-
 def measure_oneshot(bench):
     left_out = []
     models = list(shared(bench, [("dragon 871K", "common/dragon-871k.glb", [])], left_out))
     if not models:
         return {"left_out": left_out}
     model = models[0][1]
-    yardstick = json.loads(command(*bench.form("embree_build"), model, *glb_triangles(model)))
     runs = []
     with tempfile.TemporaryDirectory(prefix="farlight-bench-") as folder:
         for _ in range(1 + bench.times(3)):
@@ -141,21 +123,15 @@ def measure_oneshot(bench):
         rows[name] = client[key] / 1e6
     rows.update({f"frame: {stage}": stage_ms(frame, stage) for stage in STAGES})
     rows["export"] = client["export_ns"] / 1e6
-    ours_ms = client["load_ns"] / 1e6 + stage_ms(frame, "upload") + stage_ms(frame, "build")
-    return {"left_out": left_out, "wall_ms": figure([run[0] for run in runs]), "rows_ms": rows, "yardstick_ns": yardstick,
-            "import_upload_build_ms": ours_ms, "of_yardstick": ours_ms / (sum(yardstick.values()) / 1e6)}
+    return {"left_out": left_out, "wall_ms": figure([run[0] for run in runs]), "rows_ms": rows}
 
 
 def show_oneshot(data):
     if "rows_ms" not in data:
         return "nothing to measure it with"
-    yardstick = data["yardstick_ns"]
     rows = [(name, f"{value:.1f}") for name, value in data["rows_ms"].items()]
-    rows.append(("read + hash + Embree build", f"{sum(yardstick.values()) / 1e6:.1f}"))
-    rows.append(("import + upload + build", f"{data['import_upload_build_ms']:.1f}"))
     return (table([("dragon-871k.glb to a 1280x720 PNG, the median run", "ms")], rows) +
-            f"\n\nimport + upload + build takes {data['of_yardstick']:.2f} of read + hash + Embree build (wanted: under 5); "
-            f"the whole command {with_spread(data['wall_ms'])} ms")
+            f"\n\nthe whole command {with_spread(data['wall_ms'])} ms")
 
 
 # ---- frames -----------------------------------------------------------------------------------------

@@ -19,13 +19,12 @@ class Failure(Exception):
 class Bench:
     """One run of the benchmark: where the programs lie, how often, and what went wrong on the way."""
 
-    def __init__(self, build, runs=None, tiny=False, link_seconds=60, goals=False):
+    def __init__(self, build, runs=None, tiny=False, link_seconds=60):
         self.build = pathlib.Path(build).resolve()
         self.shared = pathlib.Path(os.environ.get("FARLIGHT_SCENES", ROOT.parent / "shared" / "scenes"))
         self.runs = runs
         self.tiny = tiny  # the smallest scene and one run: for the test of the benchmark itself
         self.link_seconds = link_seconds  # of a view over a slow link
-        self.goals = goals  # of the part `warp` those links alone that goals are set for
         self.scenes = None  # folder of the bundled scenes
         self.faults = []
         os.environ.setdefault("FARLIGHT_LIBEXEC", str(self.build))  # for clients among the programs below it
@@ -154,6 +153,6 @@ def commit_name():
 def environment(bench):
     """Where it was measured; the device as `bench tracers` opens it."""
     probe = json.loads(command(*bench.form("tracers"), "--family", "100", "--size", "8x8", "--waves",
-                               "primary", "--runs", "1", "--quick"))["environment"]
+                               "primary", "--runs", "1", "--tracers", "bvh"))["environment"]
     return {"date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"), "commit": commit_name(),
             "processor": processor_name(), "processors": len(os.sched_getaffinity(0)), **probe}

@@ -21,24 +21,17 @@
 #define EXAMINED_MAX                                                                                              \
     20000u /* disagreeing rays that are looked at for edges; beyond it the run has failed anyway */
 
-struct bench_contender *bench_contest_add(struct bench_contest *contest, const char *tracer, const char *form,
-                                          enum bench_way way)
+struct bench_contender *bench_contest_add(struct bench_contest *contest, struct tracer *tracer, enum bench_way way)
 {
     struct bench_contender *added = &contest->contenders[contest->contender_count++];
-    *added = (struct bench_contender){.tracer = tracer, .form = form, .way = way};
+    *added = (struct bench_contender){.tracer = tracer, .way = way};
     return added;
 }
 
-bool bench_contest_fits(const struct bench_contest *contest, const struct bench_contender *contender,
-                        enum bench_wave_kind kind)
+/* Any-hit waves have a visibility and nothing else. */
+static bool fits(const struct bench_contender *contender, enum bench_wave_kind kind)
 {
-    const struct gpu_scene *scene = &contest->scene->gpu;
-    const bool is_any = bench_wave_facts[kind].is_any;
-    if (contender->way == BENCH_TRAVERSAL)
-        return !is_any; /* a visibility is all that there is */
-    if (contender->way == BENCH_RAW)
-        return !scene->has_cutout && !(is_any && scene->has_translucent); /* what it knows nothing of */
-    return true;
+    return contender->way == BENCH_INTERFACE || !bench_wave_facts[kind].is_any;
 }
 
 /* ---- one run ---- */
@@ -69,23 +62,11 @@ static bool run_tracer(struct bench_contest *contest, struct tracer *tracer, boo
     return ok;
 }
 
-/* `raw`: an intersection or a visibility for each ray. */
 static bool run_once(struct bench_contest *contest, const struct bench_contender *contender,
-                     const struct bench_wave *wave, void *raw, uint64_t *time_ns, struct error *error)
+                     const struct bench_wave *wave, uint64_t *time_ns, struct error *error)
 {
-    const struct bench_wave_fact *fact = &bench_wave_facts[wave->kind];
     const uint64_t start_ns = clock_now_ns();
-    bool ok = true;
-    if (contender->way == BENCH_RAW)
-        bench_embree_trace(contender->embree,
-                           &(struct bench_embree_wave){.rays = wave->rays,
-                                                       .ray_count = wave->ray_count,
-                                                       .packet = contender->packet,
-                                                       .coherent = fact->coherent,
-                                                       .intersections = fact->is_any ? NULL : raw,
-                                                       .visibilities = raw});
-    else
-        ok = run_tracer(contest, contender->tracer_used, contender->way == BENCH_TRAVERSAL, wave, error);
+    const bool ok = run_tracer(contest, contender->tracer, contender->way == BENCH_TRAVERSAL, wave, error);
     *time_ns = clock_now_ns() - start_ns;
     return ok;
 }
@@ -97,23 +78,14 @@ static float let_through(uint32_t visibility)
     return (float)((visibility & 255) + (visibility >> 8 & 255) + (visibility >> 16 & 255)) / 765;
 }
 
-/* One number a ray: the distance (< 0: nothing), or the share of light that is let through. `raw` holds what
- * Embree wrote; a tracer's answers are fetched into it. */
-static void read_answers(struct bench_contest *contest, const struct bench_contender *contender,
-                         const struct bench_wave *wave, void *raw, float *answers)
+/* One number a ray: the distance (< 0: nothing), or the share of light that is let through; by way of `raw`. */
+static void read_answers(struct bench_contest *contest, const struct bench_wave *wave, void *raw, float *answers)
 {
     const bool is_any = bench_wave_facts[wave->kind].is_any;
     const size_t item_bytes = is_any ? sizeof(uint32_t) : sizeof(struct hit);
-    if (contender->way != BENCH_RAW)
-        gpu_buffer_read(contest->device, &contest->answer_buffer, 0, raw, wave->ray_count * item_bytes);
-    for (uint32_t i = 0; i < wave->ray_count; i++) {
-        if (is_any)
-            answers[i] = let_through(((const uint32_t *)raw)[i]);
-        else if (contender->way == BENCH_RAW)
-            answers[i] = ((const struct bench_intersection *)raw)[i].distance;
-        else
-            answers[i] = ((const struct hit *)raw)[i].distance;
-    }
+    gpu_buffer_read(contest->device, &contest->answer_buffer, 0, raw, wave->ray_count * item_bytes);
+    for (uint32_t i = 0; i < wave->ray_count; i++)
+        answers[i] = is_any ? let_through(((const uint32_t *)raw)[i]) : ((const struct hit *)raw)[i].distance;
 }
 
 static bool is_same(const struct bench_contest *contest, bool is_any, float truth, float answer)
@@ -165,9 +137,9 @@ static bool count_edges(struct bench_contest *contest, const struct bench_conten
     *edges = 0;
     for (uint32_t i = 0; ok && i < count * NUDGES; i++)
         nudge(&rays[i], &wave->rays[places[i / NUDGES]], i % NUDGES, contest->scene->gpu.diagonal);
-    ok = ok && upload(contest, &nudged, error) && run_once(contest, truth, &nudged, raw, &time_ns, error);
+    ok = ok && upload(contest, &nudged, error) && run_once(contest, truth, &nudged, &time_ns, error);
     if (ok)
-        read_answers(contest, truth, &nudged, raw, near);
+        read_answers(contest, &nudged, raw, near);
     for (uint32_t i = 0; ok && i < count; i++) {
         bool is_edge = false;
         for (uint32_t k = 0; k < NUDGES; k++)
@@ -216,20 +188,15 @@ bool bench_contender_failed(const struct bench_contender *contender, uint32_t ra
 
 /* ---- a wave ---- */
 
-/* The reference behind the interface knows all that the others know; else Embree itself. NULL: nobody can tell. */
-static const struct bench_contender *find_truth(const struct bench_contest *contest, enum bench_wave_kind kind)
+/* The contender whose answers count as right: the reference. NULL: there is none. */
+static const struct bench_contender *find_truth(const struct bench_contest *contest)
 {
-    const struct bench_contender *found = NULL;
     for (unsigned i = 0; i < contest->contender_count; i++) {
         const struct bench_contender *contender = &contest->contenders[i];
-        if (!bench_contest_fits(contest, contender, kind))
-            continue;
-        if (contender->way == BENCH_INTERFACE && strcmp(contender->tracer, "reference") == 0)
+        if (contender->way == BENCH_INTERFACE && strcmp(contender->tracer->impl->name, "reference") == 0)
             return contender;
-        if (contender->way == BENCH_RAW && contender->packet == 1 && (!found || strstr(contender->form, "robust")))
-            found = contender;
     }
-    return found;
+    return NULL;
 }
 
 /* All contenders once; the round's number turns their order. The last round's answers are compared. */
@@ -240,17 +207,17 @@ static bool run_round(struct bench_contest *contest, unsigned round, const struc
     for (unsigned k = 0; k < contest->contender_count; k++) {
         struct bench_contender *contender = &contest->contenders[(k + round) % contest->contender_count];
         uint64_t time_ns;
-        if (!bench_contest_fits(contest, contender, wave->kind))
+        if (!fits(contender, wave->kind))
             continue;
-        if (!run_once(contest, contender, wave, raw, &time_ns, error))
+        if (!run_once(contest, contender, wave, &time_ns, error))
             return false;
         if (round > 0)
             bench_add(&contender->runs, time_ns);
         if (round == 0 && contender == truth)
-            read_answers(contest, contender, wave, raw, truths);
+            read_answers(contest, wave, raw, truths);
         if (round < contest->runs || !truth || contender == truth)
             continue;
-        read_answers(contest, contender, wave, raw, answers);
+        read_answers(contest, wave, raw, answers);
         if (!compare(contest, contender, truth, wave, truths, answers, error))
             return false;
     }
@@ -259,7 +226,7 @@ static bool run_round(struct bench_contest *contest, unsigned round, const struc
 
 bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *wave, struct error *error)
 {
-    const struct bench_contender *truth = find_truth(contest, wave->kind);
+    const struct bench_contender *truth = find_truth(contest);
     void *raw = malloc(wave->ray_count * sizeof(struct hit));
     float *truths = malloc(wave->ray_count * sizeof(*truths)),
           *answers = malloc(wave->ray_count * sizeof(*answers));
@@ -281,26 +248,14 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
     return ok;
 }
 
-static bool trace_once(struct bench_contest *contest, struct tracer *tracer, bool intersections_only,
-                       const struct bench_wave *wave, struct hit *hits, struct error *error)
-{
-    gpu_scene_bind(&contest->scene->gpu);
-    if (!upload(contest, wave, error) || !run_tracer(contest, tracer, intersections_only, wave, error))
-        return false;
-    gpu_buffer_read(contest->device, &contest->answer_buffer, 0, hits, wave->ray_count * sizeof(*hits));
-    return true;
-}
-
 bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
                         struct hit *hits, struct error *error)
 {
-    return trace_once(contest, tracer, false, wave, hits, error);
-}
-
-bool bench_contest_intersections(struct bench_contest *contest, struct tracer *tracer,
-                                 const struct bench_wave *wave, struct hit *hits, struct error *error)
-{
-    return trace_once(contest, tracer, true, wave, hits, error);
+    gpu_scene_bind(&contest->scene->gpu);
+    if (!upload(contest, wave, error) || !run_tracer(contest, tracer, false, wave, error))
+        return false;
+    gpu_buffer_read(contest->device, &contest->answer_buffer, 0, hits, wave->ray_count * sizeof(*hits));
+    return true;
 }
 
 void bench_contest_finish(struct bench_contest *contest)

@@ -4,7 +4,6 @@
 #ifndef FARLIGHT_TESTS_BENCH_CONTEST_H
 #define FARLIGHT_TESTS_BENCH_CONTEST_H
 
-#include "tests/bench/bench_embree.h"
 #include "tests/bench/bench_stats.h"
 #include "tests/bench/bench_waves.h"
 #include "trace/tracer.h"
@@ -17,15 +16,11 @@
 enum bench_way {
     BENCH_INTERFACE, /* rays on the device to hits there, or to visibilities */
     BENCH_TRAVERSAL, /* closest hits only: distance, primitive, instance, barycentrics */
-    BENCH_RAW,       /* the same from Embree itself */
 };
 
 struct bench_contender {
-    const char *tracer, *form; /* "bvh", "1 ray" */
+    struct tracer *tracer;
     enum bench_way way;
-    struct tracer *tracer_used;        /* interface and traversal */
-    const struct bench_embree *embree; /* raw */
-    unsigned packet;
     bool is_exact; /* its disagreement is a fault, not a property */
     /* of the last wave */
     struct bench_runs runs;
@@ -50,19 +45,13 @@ struct bench_wave {
 };
 
 /* The one that is added, zeroed but for the arguments; the array has room for BENCH_CONTENDERS_MAX. */
-struct bench_contender *bench_contest_add(struct bench_contest *contest, const char *tracer, const char *form,
+struct bench_contender *bench_contest_add(struct bench_contest *contest, struct tracer *tracer,
                                           enum bench_way way);
-/* Whether a contender can be asked about such a wave and means the same by it. */
-bool bench_contest_fits(const struct bench_contest *contest, const struct bench_contender *contender,
-                        enum bench_wave_kind kind);
 /* A warm-up, then the runs; fills what the contenders know of the last wave. */
 bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *wave, struct error *error);
 /* One untimed run through the interface: the hits, for what is made of them. */
 bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
                         struct hit *hits, struct error *error);
-/* Likewise of the traversal alone: distance, primitive and instance of the hits. */
-bool bench_contest_intersections(struct bench_contest *contest, struct tracer *tracer,
-                                 const struct bench_wave *wave, struct hit *hits, struct error *error);
 /* More than 0.01 % of the rays wrong, edges aside. */
 bool bench_contender_failed(const struct bench_contender *contender, uint32_t ray_count);
 void bench_contest_finish(struct bench_contest *contest); /* the buffers */

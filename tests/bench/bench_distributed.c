@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* What a sample of distributed ray tracing costs beside a plain one, whole frames on the paper's kind of scene.
- * Usage: bench distributed [--size WxH] [--runs N] [--picture FILE.ppm]
+ * Usage: bench distributed [--size WxH] [--runs N]
  *
  * The contenders take turns, run by run, after a warm-up. Prints JSON: {"scene": {primitives, width, height},
  * "forms": [{name, samples, primary_rays, shadow_rays, secondary_rays, "frame_ns": [..], "stages_ns": {stage:
- * [..]}}]}; times of the frame from begin to the pixels on the host, one a run. --picture also writes what the
- * last form shows. */
+ * [..]}}]}; times of the frame from begin to the pixels on the host, one a run. */
 #include "tests/bench/bench.h"
 #include "tests/bench/paper_scene.h"
 
@@ -25,17 +24,14 @@ static const struct form {
     uint32_t samples;
     float aperture;
     bool moves;
-    uint32_t packet_rays; /* of the bvh, 0: chosen */
-    uint32_t slice_rays;  /* 0: chosen */
 } forms[] = {
-    {"whitted, 1 sample", INTEGRATOR_WHITTED, 1, 0.0f, false, 0, 0},
-    {"distributed, 1 sample", INTEGRATOR_DISTRIBUTED, 1, 0.0f, false, 0, 0},
-    {"distributed, 16 samples", INTEGRATOR_DISTRIBUTED, 16, 0.0f, false, 0, 0},
-    {"and a lens", INTEGRATOR_DISTRIBUTED, 16, 0.12f, false, 0, 0},
-    {"and motion", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true, 0, 0},
-    {"rays traverse alone", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true, 1, 0},
+    {"whitted, 1 sample", INTEGRATOR_WHITTED, 1, 0.0f, false},
+    {"distributed, 1 sample", INTEGRATOR_DISTRIBUTED, 1, 0.0f, false},
+    {"distributed, 16 samples", INTEGRATOR_DISTRIBUTED, 16, 0.0f, false},
+    {"and a lens", INTEGRATOR_DISTRIBUTED, 16, 0.12f, false},
+    {"and motion", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true},
 };
-enum { FORM_COUNT = sizeof(forms) / sizeof(forms[0]), FORM_WHOLE = 4 };
+enum { FORM_COUNT = sizeof(forms) / sizeof(forms[0]) };
 
 struct bench {
     struct gpu_device *device;
@@ -45,7 +41,6 @@ struct bench {
     struct scene_motion motion;
     uint32_t width, height;
     unsigned runs;
-    const char *picture;
     json_t *results[FORM_COUNT];
 };
 
@@ -58,8 +53,6 @@ static bool render(struct bench *bench, const struct form *form, struct frame_re
     request.integrator = form->integrator;
     request.samples = form->samples;
     request.aperture = form->aperture;
-    request.tracer_options.bvh.rays = form->packet_rays;
-    frame_renderer_set_capacity(bench->renderer, form->slice_rays, 0);
     if (!frame_begin(bench->renderer, bench->scene, form->moves ? &bench->motion : NULL, &request, error))
         return false;
     enum frame_progress progress;
@@ -94,23 +87,6 @@ static void note(json_t *form, const struct frame_result *result, uint64_t frame
     }
 }
 
-static void write_picture(struct bench *bench)
-{
-    struct frame_result result = {0};
-    struct error error = {0};
-    FILE *file = fopen(bench->picture, "wb");
-    if (!file || !render(bench, &forms[FORM_WHOLE], &result, &error)) {
-        fprintf(stderr, "bench distributed: %s cannot be written\n", bench->picture);
-    } else {
-        fprintf(file, "P6\n%u %u\n255\n", result.width, result.height);
-        for (size_t i = 0; i < result.size_bytes; i += 4)
-            fwrite(result.pixels + i, 1, 3, file);
-    }
-    frame_result_finish(&result);
-    if (file)
-        fclose(file);
-}
-
 static bool measure(struct bench *bench, struct error *error)
 {
     for (unsigned run = 0; run <= bench->runs; run++)
@@ -126,8 +102,6 @@ static bool measure(struct bench *bench, struct error *error)
                 note(bench->results[i], &result, frame_ns);
             frame_result_finish(&result);
         }
-    if (bench->picture)
-        write_picture(bench);
     return true;
 }
 
@@ -159,8 +133,6 @@ static bool parse(struct bench *bench, int argc, char **argv)
         } else if (strcmp(argv[i], "--runs") == 0) {
             if (sscanf(value, "%u%c", &bench->runs, &rest) != 1)
                 return false;
-        } else if (strcmp(argv[i], "--picture") == 0) {
-            bench->picture = value;
         } else {
             return false;
         }
@@ -173,7 +145,7 @@ BENCH(distributed)
     struct bench bench = {0};
     struct error error = {0};
     if (!parse(&bench, argc, argv)) {
-        fputs("usage: bench distributed [--size WxH] [--runs N] [--picture FILE.ppm]\n", stderr);
+        fputs("usage: bench distributed [--size WxH] [--runs N]\n", stderr);
         return 2;
     }
     bench.device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);

@@ -6,7 +6,9 @@
  * time. */
 #include "tests/accuracy/test_scenes.h"
 #include "tests/bench/bench.h"
-#include "tests/bench/bench_contest.h"
+#include "tests/bench/bench_stats.h"
+#include "tests/bench/bench_waves.h"
+#include "trace/tracer.h"
 
 #include "base/clock.h"
 

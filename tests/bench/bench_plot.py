@@ -16,7 +16,7 @@ from bench_common import Bench, Failure, figure, fit_exponent
 from bench_rays import CURVES, curve
 
 # One colour a contender, told apart without colour vision too (Okabe and Ito 2008); one dash and mark a kind of ray.
-COLOURS = {"bvh, traversal": "#0072b2", "bvh, hits": "#56b4e9", "reference, hits": "#009e73", "Embree, 1 ray a call": "#d55e00"}
+COLOURS = {"bvh, traversal": "#0072b2", "bvh, hits": "#56b4e9", "reference, hits": "#009e73"}
 KINDS = {"primary": (1, 7), "occlusion": (1, 7), "bounce": (2, 9)}  # gnuplot's dash and point types
 SIZES = {"svg": "svg size 1100,560 dynamic enhanced font 'DejaVu Sans,14' background '#ffffff'",
          "png": "pngcairo size 1650,840 enhanced font 'DejaVu Sans,18' background '#ffffff'"}
@@ -43,12 +43,12 @@ def time_lines(results, kinds, x, letter, per_ray):
 
 
 def build_lines(results):
-    names = {"bvh": ("bvh", "#0072b2"), "reference": ("reference", "#009e73"), "embree": ("Embree itself", "#d55e00")}
+    names = {"bvh": ("bvh", "#0072b2"), "reference": ("reference", "#009e73")}
     for tracer, (name, colour) in names.items():
         values = []
         for result in results:
             for structure in result["structures"]:
-                if structure["tracer"] == tracer and structure["form"] in ("auto", "default"):
+                if structure["tracer"] == tracer:
                     build = figure([ns / 1e6 for ns in structure["build"]["runs_ns"]])
                     values.append((result["triangles"], build["median"], build["deviation"]))
         if values:

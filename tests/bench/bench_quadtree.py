@@ -1,180 +1,115 @@
 # SPDX-License-Identifier: MIT
-"""The part `quadtree` of the benchmark: quadtrees over what a view sees ('An Adaptive Acceleration Structure for Screen-space Ray
-Tracing'), the paper's tables beside ours, and other ways to make the same pictures. Its JSON:
+"""The part `quadtree`: quadtrees over what a view sees ('An Adaptive Acceleration Structure for Screen-space Ray Tracing'), the
+paper's tables 1 to 5 beside ours, as whole pictures that a user asks for. Its JSON has results of bench_pictures.py: `builds`,
+`stereo`, `upsampling`, `lens` and `reflections`. The paper's baseline of a warped mesh is left out.
+"""
+import json
+import pathlib
 
-  builds       results of `bench quadtree`: building over a family of scenes, 5K to 1.3 M triangles
-  stereo       likewise, rays of an eye 6.5 cm aside in the classroom: quadtree, dda, minmax, bvh and reference with 1 layer,
-               and with 2
-  layers       likewise, with 1, 2 and 3 layers, and with adaptive thresholds
-  reflections  likewise, faces of a cube: first and third mirror reflection, with 1 and 2 layers, beside bvh and reference
-  warps        result of `bench views`: pictures of moved eyes by mesh, splats and iteration
-  mesh         likewise, at the size of `stereo`
-  eyes         result of `bench eyes`: the same moves by layers of the tracer
-  upsampling   likewise, the three frames between two of a walk
-  lens         for each of SAMPLES likewise, a lens
-  wanted       rows as in bench_reach.py
+from bench_common import command, significant, table
+from bench_pictures import MIRRORS, form_of, median_ratio, models, ms, pictures, size
 
-Counts and PSNR are exact; times are of the processor, all threads of the process."""
-from bench_animated import run_json
-from bench_common import figure, paired_ratio, shared
-from bench_forms import once
-from bench_reach import row
-
-CLASSROOM = "screenspace/classroom.obj"
 VIEW = ["--eye=-6.079,0.764,-0.244", "--look-at=3.862,-0.288,-0.498", "--up=0,0,1", "--fov", "50"]
-FAMILY = (5000, 20000, 80000, 325000, 1300000)
-# The paper has 900 rows; rays go in tiles of 8x8.
-STEREO_SIZE, SIZE = (1600, 896), (1280, 720)
-LENS_SIZE = (640, 360)  # its true pictures have many samples
-ASIDE = "0.065,0,0"
-STEREO = "quadtree,dda,minmax"
-# A walk at 1.4 m/s, shown at 60 frames a second of which 15 are rendered.
-WALK = [f"0,0,{1.4 * k / 60:.4f}" for k in (1, 2, 3)]
-# Of the true pictures, whose noise is measured and taken off: with 16 to 128 of them all PSNR agree within 0.5 dB.
-SAMPLES, TRUE_SAMPLES = (4, 8, 16), 64
-LENS = ["--move", "0,0,0", "--aperture", "0.1", "--focus", "4"]
-SPREAD_MAX, BUILD_MAX, STEPS_MAX, LAYER_MAX, ADAPTIVE_MAX = 3, 1 / 3, 0.6, 1.25, 0.9
-OVER = {"reference": 1.8, "dda": 3, "minmax": 1.4}
-PSNR_MIN, OVER_SPLAT, OVER_MESH = (35, 32), (0.9, 4), 1.4
-UNSEEN_MAX = {"two": 0.7, "three": 0.5}
-LENS_MIN, LENS_PSNR, UPSAMPLING_MIN, UPSAMPLING_PSNR = 5, 35, 3, 33
+ROOM = [("classroom", "screenspace/classroom.obj", VIEW)]
+FAMILY = (5, 20, 80, 325, 1300)  # thousands of triangles
+ONE, TWO = ["--quadtree-layers", 1], ["--quadtree-layers", 2]
+WAYS = {"quadtree": [], "minmax": ["--quadtree-nodes", "minmax"], "dda": ["--quadtree-walk", "dda"]}
+SAMPLES = (4, 8, 16)
+# The paper's figures, on a GeForce GTX 980 at 1600x900. Table 1: scene, ms.
+PAPER_BUILDS = (("Sponza, 227K", 0.646), ("living room, 456K", 0.636), ("San Miguel, 6550K", 0.657))
+# Table 2, living room: ms of building and both eyes.
+PAPER_STEREO = {"quadtree, 1 layer": 4.35, "quadtree, 2 layers": 5.45, "minmax, 1 layer": 8.5, "dda, 1 layer": 12.33,
+                "dda, 2 layers": 17.01}
+# Table 3: ms of a frame in the mean, one of four rendered. Table 4, Sponza: ms by rays a pixel.
+PAPER_UPSAMPLING = {"1 layer": 0.86, "2 layers": 1.13}
+PAPER_LENS = {"1 layer": {4: 2.8, 8: 5.32}, "2 layers": {4: 3.21, 8: 5.85}}
+# Table 5: ms of the cube map and of one glossy bounce of 8 samples.
+PAPER_REFLECTIONS = {"1 layer": (2.38, 1.974), "2 layers": (5.15, 4.91)}
+LAYERS = {"1 layer": ONE, "2 layers": TWO}
 
 
-# ---- measuring --------------------------------------------------------------------------------------
-
-
-def call(bench, name, title, usual_runs, *arguments):
-    return {"title": title, **run_json(bench, name, *arguments, "--runs", bench.times(usual_runs))}
-
-
-def size(bench, pixels):
-    return ["--size", "64x48"] if bench.tiny else ["--size", "{}x{}".format(*pixels)]
-
-
-def classroom(bench, left_out):
-    """Arguments of the model and its view; of something bundled where it is not there."""
-    found = [] if bench.tiny else list(shared(bench, [("classroom", CLASSROOM, [])], left_out))
-    return ["--model", found[0][1], *VIEW] if found else ["--model", bench.scenes / "teapot.glb"]
+def walk(bench):
+    """Writes camera keys: a second ahead at 1.4 m/s."""
+    eye, look_at = ([float(number) for number in VIEW[k].partition("=")[2].split(",")] for k in (0, 1))
+    way = [b - a for a, b in zip(eye, look_at)]
+    step = [1.4 * part / sum(p * p for p in way) ** 0.5 for part in way]
+    path = pathlib.Path(bench.scenes) / "walk.json"
+    keys = [{"time": t, "eye": [a + t * s for a, s in zip(eye, step)], "look_at": [a + t * s for a, s in zip(look_at, step)],
+             "up": [0, 0, 1], "fov": 50} for t in (0, 1)]
+    path.write_text(json.dumps(keys))
+    return path
 
 
 def measure_builds(bench):
-    sizes = (500, 1000) if bench.tiny else FAMILY
-    return [call(bench, "quadtree", f"family {n}", 9, "--family", n, *size(bench, STEREO_SIZE), "--layers", 1, "--forms",
-                 "quadtree") for n in sizes]
-
-
-def measure_rays(bench, room):
-    stereo = ["--move", ASIDE, *size(bench, STEREO_SIZE)]
-    return {"stereo": [call(bench, "quadtree", f"{n} layer{'s' * (n > 1)}", 5, *room, *stereo, "--layers", n, "--forms",
-                            STEREO + ",reference") for n in (1, 2)],
-            "layers": call(bench, "quadtree", "layers", 5, *room, *stereo, "--forms", "one,two,three,adaptive,stack,primitives"),
-            "reflections": [call(bench, "quadtree", title, 3, *room, *size(bench, SIZE), "--wave", "reflection", "--after", after,
-                                 "--faces", "cube", "--forms", "one,two,reference")
-                            for title, after in (("first reflection", 0), ("third", 2))]}
-
-
-def measure_pictures(bench, room):
-    moves = [argument for way in WALK for argument in ("--move", way)]
-    return {"warps": call(bench, "views", "moved", 3, *room, *size(bench, SIZE)),
-            "mesh": call(bench, "views", "stereo", 3, *room, *size(bench, STEREO_SIZE), "--move", ASIDE),
-            "eyes": call(bench, "eyes", "moved", 3, *room, *size(bench, SIZE), "--forms", "one,two,three,adaptive"),
-            "upsampling": call(bench, "eyes", "walk", 3, *room, *size(bench, SIZE), *moves, "--forms", "one,two,minmax,dda"),
-            "lens": [call(bench, "eyes", f"{n} samples", 3, *room, *size(bench, LENS_SIZE), *LENS, "--samples", n, "--true-samples",
-                          4 if bench.tiny else TRUE_SAMPLES, "--forms", "one,two,dda") for n in SAMPLES]}
+    sizes = (1, 2) if bench.tiny else FAMILY
+    command(bench.program("tests/tools/make_scenes"), bench.scenes, *sizes)
+    options = [*size(bench, "1600x896"), "--samples", 1, "--depth", 1, "--tracer", "quadtree", "--quadtree-faces", "view"]
+    return [pictures(bench, f"{n}K", pathlib.Path(bench.scenes) / f"bumpy-{n}.glb", {"quadtree": ONE}, options, 5)
+            for n in sizes]
 
 
 def measure(bench):
     left_out = []
-    room = classroom(bench, left_out)
-    data = {"builds": measure_builds(bench), **measure_rays(bench, room), **measure_pictures(bench, room)}
-    data["left_out"] = sorted(set(left_out))
-    data["wanted"] = wanted(data)
-    return data
+    title, model, view = models(bench, ROOM, left_out)[0]
+    still = [*view, "--samples", 1, "--integrator", "whitted"]
+    stereo = {"rendered": ["--views", "rays"],
+              **{f"{way}, {n}": [*how, *layers] for n, layers in LAYERS.items() for way, how in WAYS.items()}}
+    upsampling = {"rendered": [], **{n: [*layers, "--upsample", 4] for n, layers in LAYERS.items()}}
+    lens = {f"{n}, {samples} samples": [*layers, "--lens", way, "--samples", samples] for samples in SAMPLES
+            for n, layers, way in (("rendered", [], "rays"), *((n, layers, "quadtree") for n, layers in LAYERS.items()))}
+    mirrors = {"bvh": ["--tracer", "bvh"], **{n: ["--tracer", "quadtree", *layers] for n, layers in LAYERS.items()}}
+    moving = ("animate", "--keys", walk(bench), "--fps", 60, "--frames", "1-9")
+    return {"builds": measure_builds(bench), "left_out": left_out,
+            "stereo": pictures(bench, title, model, stereo, [*still, *size(bench, "1600x896"), "--stereo", "0.065"]),
+            "upsampling": pictures(bench, title, model, upsampling,
+                                   ["--samples", 1, "--integrator", "whitted", *size(bench, "1280x720")], 3, moving),
+            "lens": pictures(bench, title, model, lens, [*view, *size(bench, "640x360"), "--aperture", "0.1", "--focus", 4]),
+            "reflections": [pictures(bench, f"{depth} bounce{'s' * (depth > 1)}", model, mirrors,
+                                     [*still, *size(bench, "640x360"), *MIRRORS, "--depth", depth]) for depth in (1, 3)]}
 
 
-# ---- reading ----------------------------------------------------------------------------------------
+def unknown(form):
+    """Unknown share of the rays of views or of bounces, in per cent."""
+    found = [value for name, value in form["structure"].items()
+             if "unknown" in name and name.startswith(("views/", "secondary/"))]
+    return f"{100 * sum(found):.2f}" if found else "-"
 
 
-def form_of(result, name):
-    key = "contenders" if "contenders" in result else "forms" if "forms" in result else "methods"
-    return next(form for form in result[key] if form["name"] == name)
+def lines_of(result, paper):
+    """One row for each form: the paper's time, ours, the speed-up over the first form, and the unknown share."""
+    first = result["forms"][0]
+    return [(form["name"], significant(paper.get(form["name"])), *ms(form, "build", "frame"),
+             significant(median_ratio(first, form, "frame")), unknown(form)) for form in result["forms"]]
 
 
-def build_ns(contender):
-    """What comes before the rays: a walk from texel to texel needs the layers, but no tree."""
-    builds = contender["draw_ns" if contender["name"] == "dda" else "update_ns"]
-    return builds or [0] * len(contender["trace_ns"])
+def show_lens(result):
+    lines = []
+    for samples in SAMPLES:
+        rendered = form_of(result, f"rendered, {samples} samples")
+        for n in ("rendered", *LAYERS):
+            form = form_of(result, f"{n}, {samples} samples")
+            lines.append((form["name"], significant(PAPER_LENS.get(n, {}).get(samples)), *ms(form, "build", "frame"),
+                          significant(median_ratio(rendered, form, "frame")), unknown(form)))
+    return lines
 
 
-def stereo_ns(contender):
-    """Of a pair of pictures: building, and two eyes, each from the camera to its hits."""
-    builds = build_ns(contender)
-    return [build + 2 * eye for build, eye in zip(builds, contender["eye_ns"])]
-
-
-def percent_spread(results):
-    """Of the builds' medians, about their mean."""
-    each = [figure(form_of(r, "quadtree")["nodes_ns"]) for r in results]
-    middles = [f["median"] for f in each]
-    mean = sum(middles) / len(middles)
-    return {**once(100 * (max(middles) - min(middles)) / mean),
-            "deviation": 100 * sum(f["deviation"] for f in each) / len(each) / mean}
-
-
-def upsampled(move, name):
-    """Frames a second over rendered ones, where one of four is rendered."""
-    form = form_of(move, name)
-    return [4 * whole / (cold + 3 * warm) for whole, cold, warm in zip(move["rendered_ns"], form["cold_ns"], form["warm_ns"])]
-
-
-# ---- what is wanted ---------------------------------------------------------------------------------
-
-
-def wanted_of_rays(data):
-    one, layers = data["stereo"][0], data["layers"]
-    ours = form_of(one, "quadtree")
-    where = f"{one['triangles']} triangles, {one['width']}x{one['height']}, one layer"
-    builds = data["builds"]
-    yield row("quadtree, building: spread, %", SPREAD_MAX, percent_spread(builds),
-              f"nodes, {builds[0]['triangles']} to {builds[-1]['triangles']} triangles; the paper 3", at_most=True)
-    drawn = figure([b / t for b, t in zip(ours["update_ns"], ours["trace_ns"])])["median"]
-    yield row("quadtree, building the nodes / one traced view", round(BUILD_MAX, 3),
-              paired_ratio(ours["nodes_ns"], ours["trace_ns"]), f"{where}; with drawing the layers {drawn:.2f}", at_most=True)
-    for name, least in OVER.items():
-        yield row(f"quadtree, stereo with building: rate / {name}", least,
-                  paired_ratio(stereo_ns(form_of(one, name)), stereo_ns(ours)), where)
-    yield row("quadtree, steps a ray / minmax", STEPS_MAX, once(ours["steps"] / form_of(one, "minmax")["steps"]),
-              f"{where}; the prototype 0.53", at_most=True)
-    yield row("quadtree, time with a second layer / one", LAYER_MAX,
-              paired_ratio(form_of(layers, "two")["trace_ns"], form_of(layers, "one")["trace_ns"]), "rays; the paper 1.1 to 1.2",
-              at_most=True)
-
-
-def wanted_of_pictures(data):
-    for k, (warps, eyes) in enumerate(zip(data["warps"]["moves"], data["eyes"]["moves"])):
-        one, ours = form_of(eyes, "one"), form_of(eyes, "three")  # the latter are what a picture has by itself
-        where = f"eye moved by {eyes['name']} m, three layers; one {one['psnr_db']:.1f} dB"
-        yield row("quadtree, PSNR, dB", PSNR_MIN[k], once(ours["psnr_db"]), where)
-        for name, least in (("splat", OVER_SPLAT[k]), ("mesh", OVER_MESH)):
-            yield row(f"quadtree, PSNR over {name}, dB", least, once(ours["psnr_db"] - form_of(warps, name)["psnr_db"]), where)
-        for name, most in UNSEEN_MAX.items():
-            yield row(f"quadtree, share unseen with {name} layers / one", most,
-                      once(form_of(eyes, name)["unseen"] / max(one["unseen"], 1e-9)), f"eye moved by {eyes['name']} m", at_most=True)
-    eyes, layers = data["eyes"]["moves"][0], data["layers"]
-    yield row("quadtree, time with adaptive thresholds / without", ADAPTIVE_MAX,
-              paired_ratio(form_of(layers, "adaptive")["trace_ns"], form_of(layers, "two")["trace_ns"]),
-              f"{form_of(eyes, 'adaptive')['psnr_db']:.2f} and {form_of(eyes, 'two')['psnr_db']:.2f} dB", at_most=True)
-    lens = data["lens"][-1]["moves"][0]
-    ours = form_of(lens, "one")  # as lenses and frames between others have it by themselves
-    where = f"{data['lens'][-1]['title']}, one layer; rendered ones {lens['psnr_db']:.1f} dB"
-    yield row("quadtree, lens: frames a second / bvh", LENS_MIN, paired_ratio(lens["rendered_ns"], ours["cold_ns"]), where)
-    yield row("quadtree, lens: PSNR, dB", LENS_PSNR, once(ours["psnr_db"]), where)
-    walk = data["upsampling"]["moves"]
-    yield row("quadtree, 15 to 60 frames a second: frames a second / rendered", UPSAMPLING_MIN,
-              figure([ratio for move in walk for ratio in upsampled(move, "one")]), "one layer")
-    yield row("quadtree, 15 to 60 frames a second: PSNR, dB", UPSAMPLING_PSNR,
-              once(min(form_of(move, "one")["psnr_db"] for move in walk)), f"the worst of {len(walk)}, one layer")
-
-
-def wanted(data):
-    return [*wanted_of_rays(data), *wanted_of_pictures(data)]
+def show(data):
+    nodes = [r["forms"][0]["ms"]["nodes"] for r in data["builds"]]
+    middles = [value["median"] for value in nodes]
+    spread = 100 * (max(middles) - min(middles)) / (sum(middles) / len(middles))
+    head = [("", "paper", "build", "a frame", "rendered", "unknown"), ("", "ms", "ms", "ms", "/ it", "%")]
+    reflections = [(result["title"], *line) for result in data["reflections"] for line in lines_of(result, {})]
+    return "\n\n".join((
+        "Table 1, building, one layer, 1600x896. The paper, ms of the nodes: " +
+        "; ".join(f"{name}: {time}" for name, time in PAPER_BUILDS) + "\n\n" +
+        table([("bumpy sphere", "nodes", "with the layers"), ("triangles", "ms", "ms")],
+              [(r["title"], *ms(r["forms"][0], "nodes", "build")) for r in data["builds"]]) +
+        f"\n\nspread of the nodes over their mean: {spread:.0f} % (the paper: 3)",
+        "Table 2, stereo, 1600x896, eyes 6.5 cm apart, both pictures with shading; the paper's without: its living room\n\n" +
+        table(head, lines_of(data["stereo"], PAPER_STEREO)),
+        "Table 3, 15 to 60 frames a second, 1280x720, the mean of a walk's frames\n\n" +
+        table(head, lines_of(data["upsampling"], PAPER_UPSAMPLING)),
+        "Table 4, depth of field, 640x360; the paper: Sponza\n\n" + table(head, show_lens(data["lens"])),
+        "Table 5, reflections in a cube round the eye, 640x360, everything a mirror.\nThe paper, ms of the cube and glossy rays: " +
+        "; ".join(f"{n} {a} and {b}" for n, (a, b) in PAPER_REFLECTIONS.items()) + "\n\n" +
+        table([("", *head[0]), ("", *head[1])], reflections)))

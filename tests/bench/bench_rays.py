@@ -2,18 +2,16 @@
 """The parts of the benchmark that measure rays: `bench tracers` over scenes, triangles, pixels and rays per pixel.
 
 A result is what `bench tracers` prints, with "title" added. Two measures: through the interface (rays to hits on the device,
-surface included), and the traversal alone (distance, primitive, instance, barycentrics), which is held against Embree itself. A
-visibility is all that an any-hit wave asks for, so there the two are the same.
+surface included), and the traversal alone (distance, primitive, instance, barycentrics). A visibility is all that an any-hit
+wave asks for, so there the two are the same.
 """
 import json
 import subprocess
 
-from bench_common import (KITCHEN_VIEW, Failure, bundled, command, figure, fit_exponent, paired_ratio, say, shared,
-                          significant, table, with_spread)
+from bench_common import KITCHEN_VIEW, Failure, bundled, figure, fit_exponent, paired_ratio, shared, significant, table, with_spread
 
 WAVES = ("primary", "reflection", "shadow", "occlusion", "bounce")
 FAMILY = [1000 * 2 ** k for k in range(11)]
-REACH = (5000, 37000, 147000)
 EXACT = ("--tracers", "bvh,reference")
 MEBI = 1 << 20
 
@@ -53,12 +51,6 @@ def measure_tracers(bench):
     return {"results": results, "left_out": left_out}
 
 
-def measure_reach(bench):
-    sizes = (1000,) if bench.tiny else REACH
-    size = "64x64" if bench.tiny else "512x512"
-    return {"results": [trace(bench, f"family {n}", bench.times(5), "--family", n, "--size", size, *EXACT) for n in sizes]}
-
-
 def join_times(into, more):
     """Adds the runs of a figure of `bench tracers` to those of another."""
     into["runs_ns"] += more["runs_ns"]
@@ -80,10 +72,10 @@ def sweep(bench, calls):
     """Results of calls (title, arguments) that make a curve. There and back, so that a machine that grows slower or faster
     meanwhile bends the curve less; the runs are put together."""
     runs = max(1, bench.times(6) // 2)
-    results = [trace(bench, title, runs, *arguments, *EXACT, "--quick") for title, arguments in calls]
+    results = [trace(bench, title, runs, *arguments, *EXACT) for title, arguments in calls]
     if bench.times(6) > 1:
         for result, (title, arguments) in reversed(list(zip(results, calls))):
-            join(result, trace(bench, title, runs, *arguments, *EXACT, "--quick"))
+            join(result, trace(bench, title, runs, *arguments, *EXACT))
     return {"results": results}
 
 
@@ -116,12 +108,6 @@ def measure_rays(bench):
                                                          "--rays-per-pixel", n]) for n in counts])
 
 
-def measure_forms(bench):
-    """The table of the forms of `bvh` that `bench bvh` prints, with a warm-up and medians of its own; two of its sizes."""
-    say("  bench bvh")
-    return {"text": command(*bench.form("bvh"), *(["1000"] if bench.tiny else ["37000", "146000"]))}
-
-
 # ---- reading results --------------------------------------------------------------------------------
 
 
@@ -129,11 +115,11 @@ def find_wave(result, kind):
     return next((wave for wave in result["waves"] if wave["kind"] == kind), None)
 
 
-def find_measure(wave, tracer, form, way):
+def find_measure(wave, tracer, way):
     """None: was not measured. The traversal of an any-hit wave is what the interface does."""
     if wave and wave["any"] and way == "traversal":
         way = "interface"
-    return next((m for m in wave["measures"] if (m["tracer"], m["form"], m["way"]) == (tracer, form, way)), None) if wave else None
+    return next((m for m in wave["measures"] if (m["tracer"], m["way"]) == (tracer, way)), None) if wave else None
 
 
 def rate(measure):
@@ -144,32 +130,20 @@ def rate(measure):
     return figure([rays / ns / 1e6 for ns in measure["time"]["runs_ns"]])
 
 
-def times_as_fast(measure, other):
-    """How many times as fast as the other, a figure over the rounds."""
-    if measure is None or other is None:
-        return None
-    return paired_ratio(other["time"]["runs_ns"], measure["time"]["runs_ns"])
-
-
-def tracers_of(result):
-    """Their names, in the protocol's order, bar Embree itself."""
-    return list(dict.fromkeys(s["tracer"] for s in result["structures"] if s["tracer"] != "embree"))
-
-
-def disagreement(result, tracer, form):
-    """(rays that differ, of them edges, rays) of all waves; None: nobody could tell."""
-    told = [(m["agreement"], wave["rays"]) for wave in result["waves"] for m in wave["measures"]
-            if m["tracer"] == tracer and m["form"] == form and "agreement" in m]
-    if not told:
-        return None
-    return sum(a["differing"] for a, _ in told), sum(a["edges"] for a, _ in told), sum(rays for _, rays in told)
-
-
-def agreed_text(result, tracer, form):
-    told = disagreement(result, tracer, form)
-    if told is None:
+def beside_reference(wave, measure):
+    """How many times as fast, as a cell."""
+    reference = find_measure(wave, "reference", "interface")
+    if measure is None or reference is None:
         return "-"
-    differing, edges, rays = told
+    return significant(paired_ratio(reference["time"]["runs_ns"], measure["time"]["runs_ns"])["median"])
+
+
+def agreed_text(result, tracer):
+    told = [(m["agreement"], wave["rays"]) for wave in result["waves"] for m in wave["measures"]
+            if m["tracer"] == tracer and "agreement" in m]
+    if not told:
+        return "-"
+    differing, edges, rays = sum(a["differing"] for a, _ in told), sum(a["edges"] for a, _ in told), sum(n for _, n in told)
     return f"{100 * (1 - differing / rays):.4f}" + (f" ({edges} of {differing} edges)" if differing else "")
 
 
@@ -177,63 +151,29 @@ def agreed_text(result, tracer, form):
 
 
 def tracer_rows(result):
-    """One row a tracer, through the interface, and one for Embree itself, 1 ray a call."""
-    for tracer, form, built, way in [(t, "auto", "auto", "interface") for t in tracers_of(result)] + [
-            ("embree", "1 a call", "default", "raw")]:
-        structure = next(s for s in result["structures"] if (s["tracer"], s["form"]) == (tracer, built))
-        primary = find_measure(find_wave(result, "primary"), tracer, form, way)
-        reference = [times_as_fast(find_measure(find_wave(result, kind), tracer, form, way),
-                                   find_measure(find_wave(result, kind), "reference", "auto", "interface"))
-                     for kind in ("primary", "bounce")]
-        build_ms = structure["build"]["median_ns"] / 1e6
-        trace_ms = primary["time"]["median_ns"] / 1e6 if primary else None
-        yield (result["title"], f"{result['width']}x{result['height']}",
-               tracer if way == "interface" else "(embree itself)", significant(build_ms), significant(trace_ms),
-               significant(build_ms + trace_ms) if primary else "-", f"{structure['memory_bytes'] / MEBI:.1f}",
-               *(with_spread(rate(find_measure(find_wave(result, kind), tracer, form, way))) for kind in WAVES),
-               *(significant(r["median"]) if r else "-" for r in reference), agreed_text(result, tracer, form))
-
-
-def interface_table(results):
-    header = [("scene", "pixels", "tracer", "build", "trace", "total", "memory", *WAVES, "x reference", "x reference",
-               "agreed"),
-              ("", "", "", "ms", "ms", "ms", "MiB", *(["Mray/s"] * len(WAVES)), "primary", "bounce", "% of rays")]
-    return table(header, [row for result in results for row in tracer_rows(result)])
-
-
-TRAVERSERS = [("bvh", "bvh", "auto", "traversal"), ("bvh 1 ray", "bvh", "1 ray", "traversal"), ("reference", "reference", "auto", "traversal"),
-              ("Embree 1", "embree", "1 a call", "raw"), ("Embree 8", "embree", "8 a call", "raw"),
-              ("Embree 16", "embree", "16 a call", "raw"), ("robust 1", "embree", "1 a call, robust", "raw"),
-              ("robust 8", "embree", "8 a call, robust", "raw"), ("robust 16", "embree", "16 a call, robust", "raw")]
-
-
-def traversal_table(results):
-    rows = []
-    for result in results:
-        for wave in result["waves"]:
-            measures = [find_measure(wave, *which[1:]) for which in TRAVERSERS]
-            beside = times_as_fast(measures[0], measures[3])
-            packets = times_as_fast(measures[0], measures[1])
-            rows.append((result["title"], wave["kind"], wave["rays"], *(with_spread(rate(m)) for m in measures),
-                         with_spread(beside), with_spread(packets)))
-    header = [("scene", "wave", "rays", *(which[0] for which in TRAVERSERS), "bvh", "bvh"),
-              ("", "", "", *(["Mray/s"] * len(TRAVERSERS)), "/ Embree 1", "/ bvh 1 ray")]
-    return table(header, rows)
+    """One row a tracer, through the interface."""
+    for structure in result["structures"]:
+        tracer = structure["tracer"]
+        waves = {kind: find_wave(result, kind) for kind in WAVES}
+        found = {kind: find_measure(wave, tracer, "interface") for kind, wave in waves.items()}
+        build_ms, trace_ms = structure["build"]["median_ns"] / 1e6, found["primary"]["time"]["median_ns"] / 1e6
+        yield (result["title"], f"{result['width']}x{result['height']}", tracer, significant(build_ms), significant(trace_ms),
+               significant(build_ms + trace_ms), f"{structure['memory_bytes'] / MEBI:.1f}",
+               *(with_spread(rate(measure)) for measure in found.values()),
+               *(beside_reference(waves[kind], found[kind]) for kind in ("primary", "bounce")), agreed_text(result, tracer))
 
 
 def show_tracers(data):
-    text = ("Rays to hits on the device, surface included; median ± median absolute deviation. Trace: the primary wave. Any-hit\n"
-            "waves of scenes with translucent or cut-out surfaces are not the same work for Embree itself, and left out there.\n\n")
-    return (text + interface_table(data["results"]) + "\n\nThe traversal alone beside Embree itself, 1, 8 and 16 rays a call, "
-            "default and robust scene; all cores, denormals flushed.\n\n" + traversal_table(data["results"]))
+    header = [("scene", "pixels", "tracer", "build", "trace", "total", "memory", *WAVES, "x reference", "x reference", "agreed"),
+              ("", "", "", "ms", "ms", "ms", "MiB", *(["Mray/s"] * len(WAVES)), "primary", "bounce", "% of rays")]
+    traversals = [(result["title"], tracer, *(with_spread(rate(find_measure(find_wave(result, kind), tracer, "traversal")))
+                                              for kind in WAVES)) for result in data["results"] for tracer in ("bvh", "reference")]
+    return ("Rays to hits on the device, surface included; median ± median absolute deviation. Trace: the primary wave.\n\n" +
+            table(header, [row for result in data["results"] for row in tracer_rows(result)]) +
+            "\n\nThe traversal alone, Mray/s\n\n" + table([("scene", "tracer", *WAVES)], traversals))
 
 
-def show_reach(data):
-    return "The generated family at three sizes: what is wanted of it is in the table at the end.\n\n" + traversal_table(data["results"])
-
-
-CURVES = [("bvh, traversal", "bvh", "auto", "traversal"), ("bvh, hits", "bvh", "auto", "interface"),
-          ("reference, hits", "reference", "auto", "interface"), ("Embree, 1 ray a call", "embree", "1 a call", "raw")]
+CURVES = [("bvh, traversal", "bvh", "traversal"), ("bvh, hits", "bvh", "interface"), ("reference, hits", "reference", "interface")]
 
 
 def curve(results, kind, which, x):

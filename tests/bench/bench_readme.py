@@ -12,9 +12,8 @@ def markers(name):
 
 
 def section(name, title, measured, text):
-    """`measured`: where and when; `text`: tables of fixed width, of which those before the goals are left out."""
+    """`measured`: where and when; `text`: tables of fixed width."""
     begin, end = markers(name)
-    text = text.partition("What is wanted\n")[2] or text
     return f"{begin}\n### {title}\n\n{measured}\n\n```\n{text.strip()}\n```\n{end}"
 
 
@@ -30,7 +29,7 @@ def replaced(document, name, new):
 def measured_line(facts):
     where = "software GL" if facts["software"] else "GPU"
     return (f"Measured {facts['date'][:10]} at {facts['commit']}: {facts['device']} ({where}), {facts['processor']}, "
-            f"{facts['processors']} processors, Embree {facts['embree']}.")
+            f"{facts['processors']} processors.")
 
 
 def write(facts, parts, path=PATH):

@@ -1,63 +1,87 @@
 # SPDX-License-Identifier: MIT
-"""The part `sampled` of the benchmark: in a few minutes, what tracers that sample surfaces cost beside `bvh` on the same waves,
-from rays to hits with surfaces, and how far their answers are from the reference's. Its JSON:
-
-  ldc        results of `bench forms` waves: ldc, bvh
-  abuffer    likewise: every search of abuffer, those of the paper too, and bvh
-
-A result is what `bench forms` prints (its head says what), with "title" added.
+"""The parts `ldc` ('GPU Rendering of Secondary Effects') and `abuffer` ('Ray Tracing via GPU Rasterization'): the table 1 of
+each paper beside ours. Their JSON is `results`, of bench_pictures.py; those of ldc have `paper`, the name of a row of PAPER_LDC,
+those of abuffer `how`, a row of PAPER_ABUFFER. The octree of the A-buffers' paper is not built: its times are the paper's.
 """
-from bench_common import significant, table, with_spread
-from bench_forms import call, form_of, models, ratio, wave_of
+from bench_common import significant, table
+from bench_pictures import GLASS, MIRRORS, form_of, median_ratio, models, ms, pictures, size, told
 
-SIZE = "256x256"
-CELLS = 1024
-SCENES = [("teapot 6K", "common/teapot.obj"), ("dragon 48K", "common/dragon-47k.glb"), ("bunny 69K", "common/bunny-69k.obj"),
-          ("balls 7K", "bvh/spd-balls-4.nff"), ("dragon 871K", "common/dragon-871k.glb")]
-CLOSED = [("dragon 101K", "gltf/chinesedragon.gltf")]
-SEARCHES = ("dda", "linear3", "linear1", "voxels3", "voxels1", "parity3", "parity1")
-WAVES = ("reflection", "bounce", "shadow")
-
-
-def waves(bench, title, model, kinds, names):
-    forms = [argument for name in (*names, "bvh") for argument in ("--form", name)]
-    return call(bench, "waves", title, 3, *model, "--size", "64x64" if bench.tiny else SIZE, "--waves", ",".join(kinds), *forms)
-
-
-def measure(bench):
-    left_out, cells = [], CELLS // 16 if bench.tiny else CELLS
-    data = {"ldc": [waves(bench, title, model, WAVES, [f"ldc:resolution={cells}"]) for title, model in
-                    models(bench, SCENES, left_out)],
-            "abuffer": [waves(bench, title, model, ("reflection", "shadow"),
-                              [f"abuffer:resolution={cells},search={search}" for search in SEARCHES])
-                        for title, model in models(bench, CLOSED, left_out)]}
-    return {**data, "left_out": sorted(set(left_out))}
+# Name: triangles; ms of building (A) and of ray tracing with the picture (B) at 512 and at 1024 on a GeForce 8800 GTX; layers.
+# Then what is rendered here, below FARLIGHT_SCENES.
+PAPER_LDC = {"bunny": (8192, ((7, 61), (19, 115)), 8, "rayspace/bunny-5187.glb"),
+             "car": (20264, ((9, 82), (25, 250)), 12, "ldc/legocar.obj"),
+             "dragon": (120000, ((12, 205), (31, 441)), 7, "gltf/chinesedragon.gltf"),
+             "bust": (300000, ((19, 160), (53, 346)), 6, "ldc/igea-bust.glb"),
+             "skinned figure": (1628, ((5, 44), (16, 95)), 6, "ldc/CesiumMan.glb")}
+CELLS = (512, 1024)
+PLAYS = "skinned figure"
+# ms of construction, tracing and others, by A-buffers and by the paper's octree.
+PAPER_ABUFFER = {"mirrors": ("Figure 1(b)", (13.2, 11.6, 2.7), (42.8, 84.6, 3.8)),
+                 "glass": ("Figure 8 top", (10.8, 8.7, 2.6), (35.6, 79.6, 2.9))}
+LOOKS = {"mirrors": MIRRORS, "glass": GLASS}
+CLOSED = [("spot 5.9K", "gltf/spot.obj", []), ("dragon 101K", "gltf/chinesedragon.gltf", [])]
+SEARCHES = ("linear3", "linear1", "dda")  # the first is the paper's in the table
+TEXELS = 1024
 
 
-def share(wave, what):
-    return significant(100 * wave[what]) if what in wave else "-"
+# ---- layered depth cubes ----------------------------------------------------------------------------
 
 
-def rows_of(result, kinds):
-    """Of each form: how many times as fast as bvh each wave is, and of the first wave how far its answers are."""
-    bvh = form_of(result, "bvh")
-    for form in result["forms"]:
-        if form is not bvh:
-            first = wave_of(form, kinds[0])
-            agree = f"{100 * first['agree']:.2f}" if "agree" in first else "-"
-            yield (result["title"], form["name"].rpartition("search=")[2],
-                   *(with_spread(ratio(bvh, form, kind)) for kind in kinds), agree, share(first, "far"), share(first, "normals"))
+def measure_ldc(bench):
+    left_out, results = [], []
+    forms = {**{f"ldc {n}": ["--tracer", "ldc", "--ldc-resolution", n // 16 if bench.tiny else n] for n in CELLS},
+             "bvh": ["--tracer", "bvh"]}
+    for name, (_, _, _, file) in list(PAPER_LDC.items())[3 if bench.tiny else 0:]:
+        plays = name == PLAYS
+        for _, model, _ in models(bench, [(name, file, [])], left_out, "carousel.glb" if plays else "teapot.glb"):
+            options = [*size(bench, "1280x1024"), "--samples", 1, "--depth", 1, *MIRRORS]
+            moving = ("animate", "--clip", 0, "--frames", "1-8") if plays else ("render",)
+            results.append({"paper": name, **pictures(bench, name, model, forms, options, 2 if plays else 5, moving)})
+    return {"results": results, "left_out": left_out}
 
 
-def show_rows(results, kinds):
-    header = [("scene", "form", *kinds, "agree", "far", "normals"), ("", "", *["x bvh"] * len(kinds), "%", "%", "%")]
-    return table(header, [row for result in results for row in rows_of(result, kinds)])
+def show_ldc(data):
+    lines = []
+    for result in data["results"]:
+        triangles, paper, layers, _ = PAPER_LDC[result["paper"]]
+        low, high = (form_of(result, f"ldc {n}") for n in CELLS)
+        part = "dynamic" if result["paper"] == PLAYS else "static"
+        for n, form, (a, b) in zip(CELLS, (low, high), paper):
+            lines.append((f"{result['paper']}, {result['here']}", n, told(form, f"{part}/layers_needed"),
+                          *ms(form, "build", "rest", "trace"), layers, a, b))
+        growth = [significant(median_ratio(high, low, key)) for key in ("build", "rest", "trace")]
+        beside = ms(form_of(result, "bvh"), "build", "rest", "trace")
+        lines.append(("", "1024 / 512", "", *growth, "", *(significant(paper[1][k] / paper[0][k]) for k in range(2))))
+        lines.append((f"  the paper's has {triangles} triangles", "bvh", "", *beside, "", "", ""))
+    return ("The paper's table 1: 1280x1024, everything a mirror, one bounce. A: building; B: the rest of the picture, of which 'trace'\n"
+            "is the waves alone. The paper's on a GeForce 8800 GTX. The figure plays a clip; its cube is built each frame.\n\n" +
+            table([("scene", "cells", "layers", "A", "B", "trace", "paper:", "A", "B"),
+                   ("", "", "needed", "ms", "ms", "ms", "layers", "ms", "ms")], lines))
 
 
-def show(data):
-    return "\n\n".join((
-        f"Layered depth cubes at {CELLS} cells, {SIZE}. 'Agree': of the reflections both hit, or both miss; 'far': more than 0.0001\n"
-        "of the diagonal from the reference's hit; 'normals': near it, but of another surface.",
-        show_rows(data["ldc"], WAVES),
-        f"The searches of A-buffers at {CELLS} texels; voxels and parity are the paper's own forms.",
-        show_rows(data["abuffer"], ("reflection", "shadow"))))
+# ---- voxels and A-buffers ---------------------------------------------------------------------------
+
+
+def measure_abuffer(bench):
+    left_out, results = [], []
+    texels = ["--tracer", "abuffer", "--abuffer-resolution", TEXELS // 16 if bench.tiny else TEXELS]
+    forms = {**{search: [*texels, "--abuffer-search", search] for search in SEARCHES}, "bvh": ["--tracer", "bvh"]}
+    for (title, model, _), (how, look) in zip(models(bench, CLOSED, left_out), LOOKS.items()):
+        options = [*size(bench, "800x600"), "--samples", 1, "--depth", 3, *look]
+        results.append({"how": how, **pictures(bench, title, model, forms, options)})
+    return {"results": results, "left_out": left_out}
+
+
+def show_abuffer(data):
+    lines = []
+    for result in data["results"]:
+        name, *paper = PAPER_ABUFFER[result["how"]]
+        for form in result["forms"]:
+            rest, trace = form["ms"]["rest"]["median"], form["ms"]["trace"]["median"]
+            lines.append((f"{result['title']}, {result['how']}", form["name"], *ms(form, "build", "trace"),
+                          significant(rest - trace), *ms(form, "frame")))
+        lines += [(f"  the paper, {name}", which, *times, significant(sum(times)))
+                  for which, times in zip(("A-buffers", "octree"), paper)]
+    return (f"The paper's table 1, 800x600, depth 3, {TEXELS} texels; others: all of the picture but building and its rays.\n"
+            "The paper's on a GeForce GTX 780; its search is linear3.\n\n" +
+            table([("picture", "search", "construction", "tracing", "others", "total"), ("", "", "ms", "ms", "ms", "ms")], lines))

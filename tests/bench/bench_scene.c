@@ -2,7 +2,6 @@
 #include "tests/bench/bench_scene.h"
 
 #include "tests/accuracy/test_scenes.h"
-#include "tests/bench/bench_sheets.h"
 #include "tests/fixtures/framing.h"
 
 #include <math.h>
@@ -34,7 +33,8 @@ static void bumpy_sphere(float (*vertices)[3], uint32_t *indices, uint32_t first
     }
 }
 
-struct scene *bench_family_scene(uint32_t triangles)
+/* Nine bumpy spheres on a floor, one mesh: the tree is to be measured, not the number of instances. */
+static struct scene *family_scene(uint32_t triangles)
 {
     uint32_t steps = (uint32_t)lrintf(sqrtf((float)triangles / 18));
     steps = steps < 4 ? 4 : steps;
@@ -125,13 +125,9 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
     if (options->model) {
         if (!load_model(&scene->loaded, options->model, error))
             return false;
-    } else if (!(scene->loaded.scene = options->sheets ? bench_sheets_scene(options->sheets)
-                                                       : bench_family_scene(options->family_triangles))) {
+    } else if (!(scene->loaded.scene = family_scene(options->family_triangles))) {
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the scene");
     }
-    if ((options->mirrors || options->glass) &&
-        !bench_make_alike(scene->loaded.scene, options->mirrors ? BENCH_MIRROR : BENCH_GLASS, error))
-        return false;
     if (!gpu_scene_update(&scene->gpu, scene->loaded.scene, NULL, &changes, NULL, error) ||
         !choose_camera(scene, options, error))
         return false;
@@ -144,26 +140,4 @@ void bench_scene_finish(struct bench_scene *scene)
 {
     gpu_scene_finish(&scene->gpu);
     load_model_finish(&scene->loaded);
-}
-
-bool bench_scene_print(const struct bench_scene *scene, const struct bench_scene_options *options,
-                       const struct gpu_device *device, json_t *measured)
-{
-    json_t *all = json_pack("{s:s, s:I, s:s, s:b}", "scene", options->model ? options->model : "family",
-                            "triangles", (json_int_t)scene->triangle_count, "device", device->info.name,
-                            "software", device->facts.software);
-    const bool done = json_object_update(all, measured) == 0 && json_dumpf(all, stdout, 0) == 0 &&
-                      putchar('\n') == '\n' && fflush(stdout) == 0;
-    json_decref(all);
-    json_decref(measured);
-    return done;
-}
-
-struct frame_camera bench_moved(const struct frame_camera *camera, const float way[3])
-{
-    struct frame_camera to = *camera;
-    float *m = to.world_from_view;
-    for (int k = 0; k < 3; k++)
-        m[4 * k + 3] += way[0] * m[4 * k] + way[1] * m[4 * k + 1] - way[2] * m[4 * k + 2];
-    return to;
 }

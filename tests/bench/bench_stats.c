@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <time.h>
 
 void bench_add(struct bench_runs *runs, uint64_t time_ns)
 {
@@ -46,16 +45,4 @@ json_t *bench_times_json(const struct bench_runs *runs)
     for (unsigned i = 0; i < runs->count; i++)
         json_array_append_new(list, json_integer((json_int_t)runs->times_ns[i]));
     return list;
-}
-
-uint64_t bench_processor_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
-json_t *bench_decibels(double db)
-{
-    return isfinite(db) ? json_real(db) : json_null();
 }

@@ -21,9 +21,5 @@ struct bench_figure {
 void bench_add(struct bench_runs *runs, uint64_t time_ns);       /* beyond BENCH_RUNS_MAX: forgotten */
 struct bench_figure bench_figure(const struct bench_runs *runs); /* all zero where there are no runs */
 json_t *bench_times_json(const struct bench_runs *runs);         /* an array of them */
-json_t *bench_decibels(double db);                               /* null where there is no error */
-
-/* Processor time of all threads of this process, which other work on the machine hardly makes longer. */
-uint64_t bench_processor_ns(void);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Every tracer of the build beside Embree on the same rays of one scene: one JSON object on standard output, what
- * it is doing on standard error. bench.py calls it and makes the tables. `bench tracers --help` has the options.
- * Exit status: 1 if answers are wrong beyond 0.01 % of the rays, edges aside, or something fails; 2 usage. */
+/* Every tracer of the build beside the reference on the same rays of one scene: one JSON object on standard
+ * output, what it is doing on standard error. bench.py calls it and makes the tables. `bench tracers --help` has
+ * the options. Exit status: 1 if answers are wrong beyond 0.01 % of the rays, edges aside, or something fails; 2
+ * usage. */
 #include "tests/bench/bench.h"
 #include "tests/bench/bench_contest.h"
-#include "tests/bench/bench_options.h"
 
 #include "base/clock.h"
 #include "base/parallel.h"
@@ -12,32 +12,58 @@
 #include <epoxy/gl.h>
 #include <jansson.h>
 
+#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define TRACERS_MAX 16u
 #define BUILDS_MAX 3u
-#define COPY_BYTES ((size_t)256 << 20)
+#define RAYS_MAX ((uint64_t)1 << 24)
 
-/* A tracer, or Embree, with what its builds took. */
+static const char usage[] =
+    "usage: bench tracers --model FILE | --family TRIANGLES  [options]\n"
+    "  --size WxH            multiples of 8; default 512x512\n"
+    "  --eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]   else the model's first camera, or one that sees "
+    "all\n"
+    "  --waves LIST          of primary,reflection,shadow,occlusion,bounce; default: all\n"
+    "  --rays-per-pixel N    of every wave but primary; default 1\n"
+    "  --tracers LIST        default: all but naive\n"
+    "  --runs N              after one warm-up; default 5, at most 64\n"
+    "  --device N            which OpenGL device; default: the first hardware, else software\n";
+
+struct options {
+    struct bench_scene_options scene;
+    uint32_t width, height, rays_each, runs;
+    bool waves[BENCH_WAVE_KINDS];
+    const char *tracers; /* names with commas; NULL: all but naive */
+};
+
+/* A tracer and the times of its builds. */
 struct structure {
-    const char *tracer, *form;
     struct tracer *made;
-    struct bench_embree *embree;
     struct bench_runs builds;
-    uint64_t bytes;
 };
 
 struct bench {
-    struct bench_options options;
+    struct options options;
     struct gpu_device *device;
     struct bench_scene scene;
     struct bench_contest contest;
-    struct structure structures[TRACERS_MAX + 4];
+    struct structure structures[TRACERS_MAX];
     unsigned structure_count;
     bool failed;
 };
+
+/* Whether `name` is one of a list of names with commas in between. */
+static bool is_named(const char *list, const char *name)
+{
+    const size_t length = strlen(name);
+    for (const char *at = list; (at = strstr(at, name)); at += length)
+        if ((at == list || at[-1] == ',') && (at[length] == '\0' || at[length] == ','))
+            return true;
+    return false;
+}
 
 /* ---- structures ---- */
 
@@ -50,13 +76,13 @@ static struct trace_view view_of(const struct bench *bench)
     return view;
 }
 
-static bool build_tracer(struct bench *bench, struct structure *structure, const struct tracer_impl *impl,
-                         const struct tracer_options *options, struct error *error)
+static bool build(struct bench *bench, struct structure *structure, const struct tracer_impl *impl,
+                  struct error *error)
 {
     const struct trace_view view = view_of(bench);
     for (unsigned i = 0; i < BUILDS_MAX && i < bench->options.runs; i++) {
         tracer_destroy(structure->made);
-        structure->made = tracer_create(impl, bench->device, options, error);
+        structure->made = tracer_create(impl, bench->device, NULL, error);
         if (!structure->made)
             return false;
         const uint64_t start_ns = clock_now_ns();
@@ -66,65 +92,6 @@ static bool build_tracer(struct bench *bench, struct structure *structure, const
         if (!ok)
             return false;
     }
-    structure->bytes = structure->made->stats.device_bytes;
-    return true;
-}
-
-static bool build_embree(struct bench *bench, struct structure *structure, bool robust, struct error *error)
-{
-    for (unsigned i = 0; i < BUILDS_MAX && i < bench->options.runs; i++) {
-        uint64_t time_ns;
-        bench_embree_destroy(structure->embree);
-        structure->embree = bench_embree_create(&bench->scene.gpu, robust, &time_ns, error);
-        if (!structure->embree)
-            return false;
-        bench_add(&structure->builds, time_ns);
-    }
-    structure->bytes = bench_embree_bytes(structure->embree);
-    return true;
-}
-
-static void add_contenders(struct bench *bench, const struct structure *structure)
-{
-    struct bench_contest *contest = &bench->contest;
-    /* Those that traverse a tree of the scene itself answer exactly; samples of it have their own measure. */
-    const bool is_exact = bench_is_named("bvh,reference,naive", structure->tracer);
-    for (enum bench_way way = BENCH_INTERFACE; way <= BENCH_TRAVERSAL; way++) {
-        if (way == BENCH_TRAVERSAL && !is_exact)
-            continue; /* has no intersections */
-        struct bench_contender *added = bench_contest_add(contest, structure->tracer, structure->form, way);
-        added->tracer_used = structure->made;
-        added->is_exact = is_exact;
-    }
-}
-
-static bool add_tracer(struct bench *bench, const struct tracer_impl *impl, const char *form,
-                       const struct tracer_options *options, struct error *error)
-{
-    struct structure *structure = &bench->structures[bench->structure_count++];
-    *structure = (struct structure){.tracer = impl->name, .form = form};
-    if (!build_tracer(bench, structure, impl, options, error))
-        return false;
-    add_contenders(bench, structure);
-    return true;
-}
-
-static bool add_embree(struct bench *bench, bool robust, struct error *error)
-{
-    static const unsigned packets[3] = {1, 8, 16};
-    static const char *const forms[2][3] = {{"1 a call", "8 a call", "16 a call"},
-                                            {"1 a call, robust", "8 a call, robust", "16 a call, robust"}};
-    struct structure *structure = &bench->structures[bench->structure_count++];
-    *structure = (struct structure){.tracer = "embree", .form = robust ? "robust" : "default"};
-    if (!build_embree(bench, structure, robust, error))
-        return false;
-    for (int i = 0; i < 3; i++) {
-        if (bench->options.quick && packets[i] != 1)
-            continue;
-        struct bench_contender *added = bench_contest_add(&bench->contest, "embree", forms[robust][i], BENCH_RAW);
-        added->embree = structure->embree;
-        added->packet = packets[i];
-    }
     return true;
 }
 
@@ -132,19 +99,19 @@ static bool build_all(struct bench *bench, struct error *error)
 {
     for (unsigned number = 0; number < TRACERS_MAX; number++) {
         const struct tracer_impl *impl = tracer_impl_by_number(number);
-        if (!impl || (bench->options.tracers ? !bench_is_named(bench->options.tracers, impl->name)
-                                             : impl == &tracer_naive_impl))
+        if (!impl ||
+            (bench->options.tracers ? !is_named(bench->options.tracers, impl->name) : impl == &tracer_naive_impl))
             continue;
         fprintf(stderr, "    building %s\n", impl->name);
-        if (!add_tracer(bench, impl, "auto", NULL, error))
+        struct structure *structure = &bench->structures[bench->structure_count++];
+        if (!build(bench, structure, impl, error))
             return false;
-        /* The baseline of the choice of packets. */
-        if (impl == &tracer_bvh_impl && !bench->options.quick &&
-            !add_tracer(bench, impl, "1 ray", &(struct tracer_options){.bvh = {.rays = 1}}, error))
-            return false;
+        /* Tracers that traverse a tree of the scene itself answer exactly, and have intersections. */
+        const bool is_exact = is_named("bvh,reference,naive", impl->name);
+        for (enum bench_way way = BENCH_INTERFACE; way <= (is_exact ? BENCH_TRAVERSAL : BENCH_INTERFACE); way++)
+            bench_contest_add(&bench->contest, structure->made, way)->is_exact = is_exact;
     }
-    fprintf(stderr, "    building embree\n");
-    return add_embree(bench, false, error) && (bench->options.quick || add_embree(bench, true, error));
+    return true;
 }
 
 /* ---- JSON ---- */
@@ -162,19 +129,19 @@ static json_t *structures_json(const struct bench *bench)
     json_t *list = json_array();
     for (unsigned i = 0; i < bench->structure_count; i++) {
         const struct structure *structure = &bench->structures[i];
-        json_array_append_new(list, json_pack("{s:s, s:s, s:o, s:I}", "tracer", structure->tracer, "form",
-                                              structure->form, "build", figure_json(&structure->builds),
-                                              "memory_bytes", (json_int_t)structure->bytes));
+        json_array_append_new(list, json_pack("{s:s, s:o, s:I}", "tracer", structure->made->impl->name, "build",
+                                              figure_json(&structure->builds), "memory_bytes",
+                                              (json_int_t)structure->made->stats.device_bytes));
     }
     return list;
 }
 
 static json_t *contender_json(const struct bench_contender *contender, uint32_t ray_count)
 {
-    static const char *const ways[] = {"interface", "traversal", "raw"};
+    static const char *const ways[] = {"interface", "traversal"};
     const double median_ns = bench_figure(&contender->runs).median_ns;
-    json_t *made = json_pack("{s:s, s:s, s:s, s:o, s:f}", "tracer", contender->tracer, "form", contender->form,
-                             "way", ways[contender->way], "time", figure_json(&contender->runs), "rays_per_s",
+    json_t *made = json_pack("{s:s, s:s, s:o, s:f}", "tracer", contender->tracer->impl->name, "way",
+                             ways[contender->way], "time", figure_json(&contender->runs), "rays_per_s",
                              median_ns > 0 ? 1e9 * (double)ray_count / median_ns : 0.0);
     if (contender->is_compared)
         json_object_set_new(made, "agreement",
@@ -195,73 +162,35 @@ static json_t *wave_json(struct bench *bench, const struct bench_wave *wave)
         json_array_append_new(list, contender_json(contender, wave->ray_count));
         if (!bench_contender_failed(contender, wave->ray_count))
             continue;
-        fprintf(stderr, "bench tracers: %s (%s): %u of %u %s rays differ, %u of them at edges\n",
-                contender->tracer, contender->form, contender->differing, wave->ray_count, fact->name,
+        fprintf(stderr, "bench tracers: %s: %u of %u %s rays differ, %u of them at edges\n",
+                contender->tracer->impl->name, contender->differing, wave->ray_count, fact->name,
                 contender->edges);
         bench->failed = true;
     }
-    return json_pack("{s:s, s:s, s:b, s:i, s:i, s:o}", "kind", fact->name, "order", fact->order, "any",
-                     fact->is_any, "rays", (int)wave->ray_count, "answer_bytes",
-                     fact->is_any ? (int)sizeof(uint32_t) : (int)sizeof(struct hit), "measures", list);
-}
-
-/* Bytes read and written a second by the device's own copy; 0: it has not that much memory. */
-static double copy_bytes_per_s(struct gpu_device *device)
-{
-    struct gpu_buffer from = {0}, to = {0};
-    struct bench_runs runs = {0};
-    struct error error = {0};
-    bool ok = gpu_buffer_reserve(device, &from, COPY_BYTES, &error) &&
-              gpu_buffer_reserve(device, &to, COPY_BYTES, &error);
-    for (int i = 0; ok && i < 6; i++) {
-        const uint64_t start_ns = clock_now_ns();
-        glCopyNamedBufferSubData(from.name, to.name, 0, 0, (GLsizeiptr)COPY_BYTES);
-        glFinish();
-        if (i > 0)
-            bench_add(&runs, clock_now_ns() - start_ns);
-    }
-    gpu_buffer_finish(device, &from);
-    gpu_buffer_finish(device, &to);
-    return runs.count > 0 ? 2e9 * (double)COPY_BYTES / bench_figure(&runs).median_ns : 0;
+    return json_pack("{s:s, s:s, s:b, s:i, s:o}", "kind", fact->name, "order", fact->order, "any", fact->is_any,
+                     "rays", (int)wave->ray_count, "measures", list);
 }
 
 static json_t *environment_json(const struct bench *bench)
 {
     const struct gpu_device_info *info = &bench->device->info;
-    char embree[80] = "";
-    for (unsigned i = 0; i < bench->structure_count; i++)
-        if (bench->structures[i].embree)
-            bench_embree_describe(bench->structures[i].embree, embree, sizeof(embree));
-    json_t *made = json_pack("{s:s, s:s, s:s, s:b, s:i, s:s}", "device", info->name, "vendor", info->vendor,
-                             "version", info->version, "software", bench->device->facts.software, "processors",
-                             (int)parallel_processors(), "embree", embree);
-    if (!bench->device->facts.software)
-        json_object_set_new(made, "copy_bytes_per_s", json_real(copy_bytes_per_s(bench->device)));
-    return made;
+    return json_pack("{s:s, s:s, s:s, s:b, s:i}", "device", info->name, "vendor", info->vendor, "version",
+                     info->version, "software", bench->device->facts.software, "processors",
+                     (int)parallel_processors());
 }
 
 static json_t *result_json(const struct bench *bench, json_t *waves)
 {
     const struct bench_scene *scene = &bench->scene;
-    return json_pack("{s:s, s:I, s:I, s:i, s:i, s:i, s:i, s:i, s:i, s:f, s:o, s:o, s:o}", "scene",
+    return json_pack("{s:s, s:I, s:I, s:i, s:i, s:i, s:i, s:o, s:o, s:o}", "scene",
                      bench->options.scene.model ? bench->options.scene.model : "family", "triangles",
                      (json_int_t)scene->triangle_count, "spheres", (json_int_t)scene->sphere_count, "instances",
-                     (int)scene->gpu.instance_count, "discs", (int)scene->gpu.disc_count, "width",
-                     (int)bench->options.width, "height", (int)bench->options.height, "rays_per_pixel",
-                     (int)bench->options.rays_each, "runs", (int)bench->options.runs, "diagonal",
-                     (double)scene->gpu.diagonal, "environment", environment_json(bench), "structures",
-                     structures_json(bench), "waves", waves);
+                     (int)scene->gpu.instance_count, "width", (int)bench->options.width, "height",
+                     (int)bench->options.height, "rays_per_pixel", (int)bench->options.rays_each, "environment",
+                     environment_json(bench), "structures", structures_json(bench), "waves", waves);
 }
 
 /* ---- waves ---- */
-
-static struct tracer *first_tracer(const struct bench *bench)
-{
-    for (unsigned i = 0; i < bench->structure_count; i++)
-        if (bench->structures[i].made)
-            return bench->structures[i].made;
-    return NULL;
-}
 
 static bool run_wave(struct bench *bench, enum bench_wave_kind kind, const struct ray *camera_rays,
                      const struct hit *hits, json_t *waves, struct error *error)
@@ -293,7 +222,7 @@ static bool run_waves(struct bench *bench, json_t *waves, struct error *error)
     if (ok)
         bench_camera_rays(camera_rays, &bench->scene.camera, bench->options.width, bench->options.height);
     const struct bench_wave primary = {.kind = BENCH_PRIMARY, .rays = camera_rays, .ray_count = pixels};
-    ok = ok && bench_contest_hits(&bench->contest, first_tracer(bench), &primary, hits, error);
+    ok = ok && bench_contest_hits(&bench->contest, bench->structures[0].made, &primary, hits, error);
     for (enum bench_wave_kind kind = 0; ok && kind < BENCH_WAVE_KINDS; kind++)
         if (bench->options.waves[kind])
             ok = run_wave(bench, kind, camera_rays, hits, waves, error);
@@ -315,7 +244,7 @@ static bool run_bench(struct bench *bench, struct error *error)
         (struct bench_contest){.device = bench->device, .scene = &bench->scene, .runs = bench->options.runs};
     json_t *waves = json_array();
     bool ok = build_all(bench, error) &&
-              (first_tracer(bench) || error_set(error, ERROR_INVALID, "--tracers", "no such tracer")) &&
+              (bench->structure_count > 0 || error_set(error, ERROR_INVALID, "--tracers", "no such tracer")) &&
               run_waves(bench, waves, error);
     if (!ok) {
         json_decref(waves);
@@ -330,14 +259,115 @@ static bool run_bench(struct bench *bench, struct error *error)
 
 static void finish(struct bench *bench)
 {
-    for (unsigned i = 0; i < bench->structure_count; i++) {
+    for (unsigned i = 0; i < bench->structure_count; i++)
         tracer_destroy(bench->structures[i].made);
-        bench_embree_destroy(bench->structures[i].embree);
-    }
     if (bench->contest.device)
         bench_contest_finish(&bench->contest);
     bench_scene_finish(&bench->scene);
     gpu_device_destroy(bench->device);
+}
+
+/* ---- command line ---- */
+
+static bool parse_vector(const char *text, float v[3])
+{
+    char rest;
+    return sscanf(text, "%f,%f,%f%c", &v[0], &v[1], &v[2], &rest) == 3;
+}
+
+static bool parse_number(const char *text, uint32_t minimum, uint32_t maximum, uint32_t *value)
+{
+    char *end;
+    unsigned long parsed = strtoul(text, &end, 10);
+    *value = (uint32_t)parsed;
+    return *text >= '0' && *text <= '9' && *end == '\0' && parsed >= minimum && parsed <= maximum;
+}
+
+static bool parse_size(const char *text, uint32_t *width, uint32_t *height)
+{
+    char rest;
+    return sscanf(text, "%ux%u%c", width, height, &rest) == 2 && *width % 8 == 0 && *height % 8 == 0 &&
+           *width >= 8 && *height >= 8 && *width <= 4096 && *height <= 4096;
+}
+
+static bool parse_waves(const char *text, bool waves[BENCH_WAVE_KINDS])
+{
+    unsigned found = 0, asked = 1;
+    for (const char *at = text; *at; at++)
+        asked += *at == ',';
+    for (enum bench_wave_kind kind = 0; kind < BENCH_WAVE_KINDS; kind++)
+        found += waves[kind] = is_named(text, bench_wave_facts[kind].name);
+    return found == asked;
+}
+
+static bool parse_option(int option, const char *text, struct options *options, struct gpu_options *gpu)
+{
+    struct bench_scene_options *scene = &options->scene;
+    uint32_t number;
+    char *end;
+    switch (option) {
+    case 'm':
+        scene->model = text;
+        return true;
+    case 'f':
+        return parse_number(text, 1, 50000000, &scene->family_triangles);
+    case 'e':
+        return scene->has_eye = parse_vector(text, scene->eye);
+    case 'l':
+        return parse_vector(text, scene->look_at);
+    case 'u':
+        return parse_vector(text, scene->up);
+    case 'v':
+        scene->fov_y = strtof(text, &end) * 0.0174532925f;
+        return *end == '\0' && scene->fov_y > 0 && scene->fov_y < 3.1f;
+    case 's':
+        return parse_size(text, &options->width, &options->height);
+    case 'w':
+        return parse_waves(text, options->waves);
+    case 'p':
+        return parse_number(text, 1, 256, &options->rays_each);
+    case 't':
+        options->tracers = text;
+        return true;
+    case 'r':
+        return parse_number(text, 1, BENCH_RUNS_MAX, &options->runs);
+    default:
+        gpu->index = parse_number(text, 0, 63, &number) ? (int)number : -1;
+        return gpu->index >= 0;
+    }
+}
+
+/* False: what is wrong was said on standard error, the usage was not. Strings of argv stay in use. */
+static bool parse(int argc, char **argv, struct options *options, struct gpu_options *gpu)
+{
+    static const struct option names[] = {
+        {"model", 1, NULL, 'm'},   {"family", 1, NULL, 'f'},  {"size", 1, NULL, 's'},
+        {"eye", 1, NULL, 'e'},     {"look-at", 1, NULL, 'l'}, {"up", 1, NULL, 'u'},
+        {"fov", 1, NULL, 'v'},     {"waves", 1, NULL, 'w'},   {"rays-per-pixel", 1, NULL, 'p'},
+        {"tracers", 1, NULL, 't'}, {"runs", 1, NULL, 'r'},    {"device", 1, NULL, 'd'},
+        {NULL, 0, NULL, 0},
+    };
+    *options = (struct options){.width = 512, .height = 512, .rays_each = 1, .runs = 5};
+    options->scene.up[1] = 1;
+    options->scene.fov_y = 0.7f;
+    memset(options->waves, true, sizeof(options->waves));
+    for (int option; (option = getopt_long(argc, argv, "", names, NULL)) != -1;) {
+        if (option == '?')
+            return false;
+        if (!parse_option(option, optarg, options, gpu)) {
+            fprintf(stderr, "bench tracers: no such value: %s\n", optarg);
+            return false;
+        }
+    }
+    if ((options->scene.model != NULL) == (options->scene.family_triangles != 0)) {
+        fprintf(stderr, "bench tracers: one of --model and --family is needed\n");
+        return false;
+    }
+    if ((uint64_t)options->width * options->height * options->rays_each > RAYS_MAX) {
+        fprintf(stderr, "bench tracers: more than 16 Mi rays a wave\n");
+        return false;
+    }
+    return optind == argc;
 }
 
 BENCH(tracers)
@@ -346,11 +376,11 @@ BENCH(tracers)
     struct gpu_options gpu = {.index = -1};
     struct error error = {0};
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
-        fputs(bench_usage, stdout);
+        fputs(usage, stdout);
         return 0;
     }
-    if (!bench_parse(argc, argv, &bench.options, &gpu)) {
-        fputs(bench_usage, stderr);
+    if (!parse(argc, argv, &bench.options, &gpu)) {
+        fputs(usage, stderr);
         return 2;
     }
     bench.device = gpu_device_create(&gpu, &error);

@@ -4,10 +4,9 @@
  * Each viewer has a connection of its own; the first one loads the model, the others come to that scene. After a
  * second of motion it is measured. Prints JSON: "threads_ns", what each thread of the process --pid took of a
  * processor meanwhile, by its name; "batch_frames", of the job beside; "late_ns", by how much each sleep of this
- * process ended late, which is what the machine does to whoever waits; "resumed_ns", each time that motion goes on
- * after a rest, how long until a frame of it is decoded; "rested", how many pictures at rest came; and "frames",
- * an array for each of "columns". Times are nanoseconds of the host's monotonic clock, which the daemon must share
- * where they are its own: received, applied, rendered; encode_begin is since applied. */
+ * process ended late, which is what the machine does to whoever waits; and "frames", an array for each of
+ * "columns". Times are nanoseconds of the host's monotonic clock, which the daemon must share where they are its
+ * own: received, applied, rendered; encode_begin is since applied. */
 #include "tests/bench/bench.h"
 
 #include "lib/farlight.h"
@@ -32,7 +31,7 @@
 #define WARM_UP_NS SECOND_NS
 #define FIRST_MS 300000u /* the first picture builds and compiles */
 #define SWAY_RADIANS 0.5
-#define CLIP_NS (1000 * SECOND_NS) /* of time, which clips repeat in: seconds stay precise */
+#define DEPTH 4u /* bounces */
 #define SWAY_SECONDS 4.0
 #define SCENE_NAME "bench"
 #define TAU 6.283185307179586
@@ -47,11 +46,6 @@ static const char usage[] =
     "  --viewers N       default 1\n"
     "  --weight N        of each viewer; default: the daemon's\n"
     "  --adapt           quality and size follow the link\n"
-    "  --moving-rate FPS bounces and size follow what rendering takes\n"
-    "  --integrator I    default whitted\n"
-    "  --depth N         bounces; default 4\n"
-    "  --clip N          the model's clip of that number plays\n"
-    "  --rest S          after each second of motion it rests so long, in raw pictures\n"
     "  --batch           another client has a batch job rendered meanwhile\n"
     "  --environment F   of the model\n"
     "  --key FILE        the daemon's key\n"
@@ -60,9 +54,8 @@ static const char usage[] =
 struct options {
     const char *address, *model, *environment, *key;
     uint32_t width, height, encoding, looks, viewers, weight, pid;
-    uint32_t integrator, depth, clip;
-    double seconds, rate, rest, moving_rate;
-    bool adapt, batch, plays;
+    double seconds, rate;
+    bool adapt, batch;
 };
 
 struct viewer {
@@ -71,21 +64,16 @@ struct viewer {
     struct fl_view *view;
     struct viewer_camera camera; /* where it rests */
     uint64_t next_look_ns, last_command, shown_command;
-    uint64_t resumed_command, resumed_ns; /* motion went on with it; 0: a frame has shown it */
-    bool rests;
     uint64_t sent_ns[LOOKS_REMEMBERED]; /* of each command, modulo: more than the library remembers */
     struct decoder *decoder;
     struct pixmap picture;
 };
 
 static struct viewer viewers[VIEWERS_MAX];
-static json_t *resumed; /* see above */
-static json_int_t rested;
 static struct options options = {.width = 1280,
                                  .height = 720,
                                  .encoding = PROTOCOL_ENCODING_JPEG,
                                  .looks = 1000,
-                                 .depth = 4,
                                  .viewers = 1,
                                  .seconds = 5,
                                  .rate = 1000};
@@ -124,9 +112,9 @@ static void add_threads(json_t *threads, int sign)
 
 /* ---- frames ------------------------------------------------------------------------------------------ */
 
-static const char *const columns[] = {
-    "viewer",       "command", "width", "height", "bytes", "sent",  "received", "applied",    "rendered", "stages",
-    "encode_begin", "encode",  "queue", "send",   "begun", "whole", "decode",   "depth_less", "samples"};
+static const char *const columns[] = {"viewer",   "command", "width",    "height", "bytes",        "sent",
+                                      "received", "applied", "rendered", "stages", "encode_begin", "encode",
+                                      "queue",    "send",    "begun",    "whole",  "decode"};
 
 static bool is_of_renderer(enum protocol_stage stage)
 {
@@ -161,9 +149,7 @@ static json_t *row_of(const struct fl_frame *frame, const struct viewer *viewer,
                                taken_ns[PROTOCOL_STAGE_SEND],
                                frame->begun_ns,
                                whole_ns,
-                               decode_ns,
-                               frame->depth_less,
-                               frame->samples};
+                               decode_ns};
     _Static_assert(sizeof(values) / sizeof(values[0]) == sizeof(columns) / sizeof(columns[0]), "a value for each");
     json_t *row = json_array();
     for (size_t i = 0; i < sizeof(values) / sizeof(values[0]); i++)
@@ -184,12 +170,6 @@ static bool take_frame(struct viewer *viewer, struct fl_frame *frame, json_t *ro
     }
     if (rows && frame->command)
         json_array_append_new(rows, row_of(frame, viewer, whole_ns, decode_ns));
-    if (viewer->resumed_command && frame->command >= viewer->resumed_command) {
-        if (rows)
-            json_array_append_new(resumed, json_integer((json_int_t)(whole_ns - viewer->resumed_ns)));
-        viewer->resumed_command = 0;
-    }
-    rested += rows && !frame->moving;
     fl_frame_destroy(frame);
     return true;
 }
@@ -200,18 +180,7 @@ static bool look(struct viewer *viewer, uint64_t now, struct fl_error *error)
 {
     const double phase = TAU * (double)now / (double)SECOND_NS / SWAY_SECONDS;
     struct viewer_camera camera = viewer->camera;
-    const bool was_at_rest = viewer->rests;
-    if (options.rest > 0)
-        viewer->rests = fmod((double)now / (double)SECOND_NS, 1 + options.rest) >= 1;
-    if (viewer->rests && was_at_rest)
-        return true;
-    if (was_at_rest) {
-        viewer->resumed_command = viewer->last_command + 1;
-        viewer->resumed_ns = now;
-    }
-    struct fl_view_camera seen = {.moving = !viewer->rests,
-                                  .time_s =
-                                      options.plays ? (float)((double)(now % CLIP_NS) / (double)SECOND_NS) : 0};
+    struct fl_view_camera seen = {.moving = true};
     camera_orbit(&camera, SWAY_RADIANS * sin(phase), SWAY_RADIANS / 4 * cos(phase));
     camera_export(&camera, &seen);
     viewer->sent_ns[(viewer->last_command + 1) % LOOKS_REMEMBERED] = monotonic_now_ns();
@@ -318,23 +287,12 @@ static bool begin_view(struct viewer *viewer, struct fl_error *error)
     terms.width = options.width;
     terms.height = options.height;
     terms.samples = 1;
-    terms.depth = options.depth;
-    terms.integrator = (enum protocol_integrator)options.integrator;
+    terms.depth = DEPTH;
     terms.encoding = (enum protocol_encoding)options.encoding;
     terms.frames_per_second = (float)options.rate;
-    terms.still_encoding = options.rest > 0 ? PROTOCOL_ENCODING_RAW : terms.encoding;
+    terms.still_encoding = terms.encoding;
     terms.weight = options.weight;
     terms.adapt = options.adapt;
-    terms.moving_rate = (float)options.moving_rate;
-    struct record_clip_use use = {.speed = 1, .loop = 1};
-    const struct fl_clip_info *clip = options.plays ? fl_scene_clip(viewer->scene, options.clip) : NULL;
-    if (options.plays && !clip)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "--clip", "the model has no such clip");
-    if (clip) {
-        use.clip = clip->clip;
-        terms.clips = &use;
-        terms.clips_count = 1;
-    }
     struct fl_scene_bounds bounds;
     viewer->view = fl_view_start(viewer->scene, &terms, error);
     struct fl_frame *frame = viewer->view ? fl_view_next(viewer->view, FIRST_MS, error) : NULL;
@@ -385,7 +343,6 @@ static bool measure(json_t *result, struct fl_error *error)
     json_t *threads = json_object(), *rows = json_array(), *late = json_array();
     json_int_t batch_frames = 0;
     bool ok = true;
-    resumed = json_array();
     for (uint32_t i = 0; ok && i < options.viewers; i++)
         ok = come(&viewers[i], error);
     for (uint32_t i = 0; ok && i < options.viewers; i++)
@@ -404,8 +361,6 @@ static bool measure(json_t *result, struct fl_error *error)
     json_object_set_new(result, "threads_ns", threads);
     json_object_set_new(result, "batch_frames", json_integer(batch_frames));
     json_object_set_new(result, "late_ns", late);
-    json_object_set_new(result, "resumed_ns", resumed);
-    json_object_set_new(result, "rested", json_integer(rested));
     json_object_set_new(result, "frames", rows);
     return ok;
 }
@@ -435,14 +390,6 @@ static bool parse_encoding(const char *text)
     return false;
 }
 
-static bool parse_integrator(const char *text)
-{
-    enum protocol_integrator integrator = PROTOCOL_INTEGRATOR_WHITTED;
-    const bool known = protocol_integrator_parse(text, &integrator);
-    options.integrator = integrator;
-    return known;
-}
-
 static bool parse_option(int option, const char *text)
 {
     char rest;
@@ -455,8 +402,6 @@ static bool parse_option(int option, const char *text)
         return parse_real(text, &options.seconds);
     case 'r':
         return parse_real(text, &options.rate);
-    case 'R':
-        return parse_real(text, &options.rest);
     case 'l':
         return parse_number(text, 0, 10000, &options.looks);
     case 'n':
@@ -467,15 +412,6 @@ static bool parse_option(int option, const char *text)
         return parse_number(text, 1, INT32_MAX, &options.pid);
     case 'a':
         return options.adapt = true;
-    case 'm':
-        return parse_real(text, &options.moving_rate);
-    case 'i':
-        return parse_integrator(text);
-    case 'd':
-        return parse_number(text, 0, 32, &options.depth);
-    case 'c':
-        options.plays = true;
-        return parse_number(text, 0, 1000, &options.clip);
     case 'b':
         return options.batch = true;
     case 'v':
@@ -492,12 +428,11 @@ static bool parse_option(int option, const char *text)
 static bool parse(int argc, char **argv)
 {
     static const struct option known[] = {
-        {"size", 1, NULL, 's'},   {"encoding", 1, NULL, 'e'},    {"seconds", 1, NULL, 't'},
-        {"rate", 1, NULL, 'r'},   {"looks", 1, NULL, 'l'},       {"viewers", 1, NULL, 'n'},
-        {"weight", 1, NULL, 'w'}, {"adapt", 0, NULL, 'a'},       {"batch", 0, NULL, 'b'},
-        {"key", 1, NULL, 'k'},    {"pid", 1, NULL, 'p'},         {"environment", 1, NULL, 'v'},
-        {"rest", 1, NULL, 'R'},   {"moving-rate", 1, NULL, 'm'}, {"integrator", 1, NULL, 'i'},
-        {"depth", 1, NULL, 'd'},  {"clip", 1, NULL, 'c'},        {NULL, 0, NULL, 0},
+        {"size", 1, NULL, 's'},   {"encoding", 1, NULL, 'e'}, {"seconds", 1, NULL, 't'},
+        {"rate", 1, NULL, 'r'},   {"looks", 1, NULL, 'l'},    {"viewers", 1, NULL, 'n'},
+        {"weight", 1, NULL, 'w'}, {"adapt", 0, NULL, 'a'},    {"batch", 0, NULL, 'b'},
+        {"key", 1, NULL, 'k'},    {"pid", 1, NULL, 'p'},      {"environment", 1, NULL, 'v'},
+        {NULL, 0, NULL, 0},
     };
     int option;
     while ((option = getopt_long(argc, argv, "", known, NULL)) != -1)

@@ -14,7 +14,7 @@
              width, the mean); or `why` there is no such link here. Nothing is wanted of the narrower one: it is full also
              where rendering is slow
   load       processes that wanted to run, a minute's mean, before and after
-  wanted     rows as in bench_reach.py
+  wanted     rows as in bench_wanted.py
 
 Stages are those that the frame names, by the daemon's clock: the renderer's, encode and send, and decoding; not queue, which
 is waiting. What others do on the machine meanwhile is in all times; shares are of one run.
@@ -28,7 +28,7 @@ import tempfile
 
 from bench_client import Daemon
 from bench_common import Failure, bundled, command, figure, say, shared, significant, table, with_spread
-from bench_reach import row
+from bench_wanted import row
 
 SHARE_MIN = 0.95
 P50_MS_MAX, P99_MS_MAX = 2, 6

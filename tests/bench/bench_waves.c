@@ -10,16 +10,13 @@
 #define OFFSET 1e-5f
 #define OCCLUSION_REACH 0.1f /* of the diagonal */
 #define FAR 1e30f
-#define INDEX_OF_REFRACTION 1.5f
 
 const struct bench_wave_fact bench_wave_facts[BENCH_WAVE_KINDS] = {
-    [BENCH_PRIMARY] = {"primary", "coherent", false, true, true},
-    [BENCH_REFLECTION] = {"reflection", "partly", false, false, false},
-    [BENCH_REFRACTION] = {"refraction", "partly", false, false, false},
-    [BENCH_SHADOW] = {"shadow", "coherent", true, true, false},
-    [BENCH_OCCLUSION] = {"occlusion", "incoherent", true, false, false},
-    [BENCH_BOUNCE] = {"bounce", "incoherent", false, false, false},
-    [BENCH_SHUFFLED] = {"shuffled", "incoherent", false, false, true},
+    [BENCH_PRIMARY] = {"primary", "coherent", false, true},
+    [BENCH_REFLECTION] = {"reflection", "partly", false, false},
+    [BENCH_SHADOW] = {"shadow", "coherent", true, false},
+    [BENCH_OCCLUSION] = {"occlusion", "incoherent", true, false},
+    [BENCH_BOUNCE] = {"bounce", "incoherent", false, false},
 };
 
 /* The direction is made unit; *length is what it was. */
@@ -50,7 +47,7 @@ void bench_camera_rays(struct ray *rays, const struct frame_camera *camera, uint
     }
 }
 
-void bench_unpack_unit(float out[3], uint32_t bits)
+static void unpack_unit(float out[3], uint32_t bits)
 {
     float x = (float)(int16_t)(bits & 0xffff) / 32767, y = (float)(int16_t)(bits >> 16) / 32767;
     out[2] = 1 - fabsf(x) - fabsf(y);
@@ -61,37 +58,19 @@ void bench_unpack_unit(float out[3], uint32_t bits)
         out[k] /= length;
 }
 
-/* By Snell's law, `n` looking to the outside; false: nothing passes. */
-static bool refract_ray(float out[3], const float d[3], const float n[3], float cosine)
-{
-    const float side = cosine > 0 ? -1.0f : 1.0f,
-                ratio = cosine > 0 ? INDEX_OF_REFRACTION : 1 / INDEX_OF_REFRACTION;
-    const float squared = 1 - ratio * ratio * (1 - cosine * cosine);
-    if (!(squared > 0))
-        return false;
-    for (int k = 0; k < 3; k++)
-        out[k] = ratio * d[k] + (ratio * fabsf(cosine) - sqrtf(squared)) * side * n[k];
-    return true;
-}
-
 static void from_hit(struct ray *ray, enum bench_wave_kind kind, const struct ray *from, const struct hit *hit,
                      const struct bench_scene *scene, uint64_t *seed)
 {
     const float diagonal = scene->gpu.diagonal, *d = from->direction_t_max;
     float n[3], origin[3], direction[3];
-    bench_unpack_unit(n, hit->normal_geometric);
+    unpack_unit(n, hit->normal_geometric);
     float cosine = n[0] * d[0] + n[1] * d[1] + n[2] * d[2], side = cosine > 0 ? -1.0f : 1.0f;
     /* A point on the unit sphere around the tip of the normal: directions in proportion to their cosine. */
     float z = test_uniform(seed, -0.999f, 0.999f), phi = test_uniform(seed, 0, 2 * PI_F), r = sqrtf(1 - z * z);
     const float on_sphere[3] = {r * cosf(phi), r * sinf(phi), z};
-    float through[3];
-    const bool passes = kind == BENCH_REFRACTION && refract_ray(through, d, n, cosine);
     for (int k = 0; k < 3; k++) {
-        origin[k] =
-            from->origin_t_min[k] + hit->distance * d[k] + OFFSET * diagonal * (passes ? -side : side) * n[k];
-        if (passes)
-            direction[k] = through[k];
-        else if (kind == BENCH_REFLECTION || kind == BENCH_REFRACTION)
+        origin[k] = from->origin_t_min[k] + hit->distance * d[k] + OFFSET * diagonal * side * n[k];
+        if (kind == BENCH_REFLECTION)
             direction[k] = d[k] - 2 * cosine * n[k];
         else if (kind == BENCH_SHADOW)
             direction[k] = scene->light_world[k] - origin[k];
@@ -106,27 +85,12 @@ static void from_hit(struct ray *ray, enum bench_wave_kind kind, const struct ra
     set_ray(ray, origin, direction, OFFSET * diagonal, t_max);
 }
 
-static void shuffle(struct ray *rays, uint32_t count, uint64_t *seed)
-{
-    for (uint32_t i = count - 1; i > 0; i--) {
-        uint32_t j = (uint32_t)((uint64_t)test_random(seed) * (i + 1) >> 32);
-        struct ray moved = rays[i];
-        rays[i] = rays[j];
-        rays[j] = moved;
-    }
-}
-
 uint32_t bench_secondary_rays(struct ray *rays, enum bench_wave_kind kind, const struct ray *camera_rays,
                               const struct hit *hits, uint32_t count, uint32_t rays_each,
                               const struct bench_scene *scene)
 {
     uint64_t seed = 7;
     uint32_t made = 0;
-    if (kind == BENCH_SHUFFLED) {
-        memcpy(rays, camera_rays, count * sizeof(*rays));
-        shuffle(rays, count, &seed);
-        return count;
-    }
     for (uint32_t i = 0; i < count; i++)
         for (uint32_t k = 0; k < rays_each && hits[i].distance >= 0; k++)
             from_hit(&rays[made++], kind, &camera_rays[i], &hits[i], scene, &seed);

@@ -13,31 +13,25 @@
 enum bench_wave_kind {
     BENCH_PRIMARY,    /* of the camera, 8x8 tiles in Morton order: coherent, closest */
     BENCH_REFLECTION, /* mirrored where those hit: partly coherent, closest */
-    BENCH_REFRACTION, /* through the surface where those hit, as into glass or out of it: partly coherent, closest
-                       */
     BENCH_SHADOW,     /* to one point: coherent, any */
     BENCH_OCCLUSION,  /* cosine-weighted, a tenth of the diagonal long: incoherent, any */
     BENCH_BOUNCE,     /* cosine-weighted, without end: incoherent, closest */
-    BENCH_SHUFFLED,   /* those of the camera in random order: incoherent neighbours, closest */
     BENCH_WAVE_KINDS
 };
 
 struct bench_wave_fact {
     const char *name, *order; /* "coherent", "partly", "incoherent" */
     bool is_any;
-    bool coherent;      /* what Embree is told */
     bool shared_origin; /* as struct wave has it */
 };
 extern const struct bench_wave_fact bench_wave_facts[BENCH_WAVE_KINDS];
 
 /* Width and height are multiples of 8. */
 void bench_camera_rays(struct ray *rays, const struct frame_camera *camera, uint32_t width, uint32_t height);
-/* `rays_each` rays of `kind` (not PRIMARY) for each of `count` camera rays that hit something, next to each other;
- * SHUFFLED takes all of them once. Returns how many these are. The same input gives the same rays. */
+/* `rays_each` rays of `kind` (not PRIMARY) for each of `count` camera rays that hit something, next to each other.
+ * Returns how many these are. The same input gives the same rays. */
 uint32_t bench_secondary_rays(struct ray *rays, enum bench_wave_kind kind, const struct ray *camera_rays,
                               const struct hit *hits, uint32_t count, uint32_t rays_each,
                               const struct bench_scene *scene);
-/* A normal of a hit. */
-void bench_unpack_unit(float out[3], uint32_t bits);
 
 #endif

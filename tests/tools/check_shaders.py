@@ -16,10 +16,9 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
-# Of the daemon, and of programs that measure: a name is looked for in both, as those programs have both built in.
 BATCH = 40  # programs in one run of the compiler
 END_OF_FILE = "end_of_file_"  # a name that separates what the preprocessor writes of one file from that of the next
-ROOTS = (pathlib.Path("shaders"), pathlib.Path("tests/bench"))
+SHADERS = pathlib.Path("shaders")
 # Program -> its stages, and the defines of which it has one combination always.
 TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RAYS": "1", **parts}
            for parts in ({}, {"NAIVE_PARTS": "1"})] + [
@@ -36,13 +35,10 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
     {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"},
     {"TRAVERSE": '"quadtree/traverse.glsl"', "TRACER_QUADTREE": "1", "PACKET_RAYS": "1"}] + [
     {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
-    for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"}, {"ABUFFER_STEPS": "1", "ABUFFER_PARITY": "1"})] + [
-    {"TRAVERSE": f'"svo/{traversal}.glsl"', "TRACER_SVO": "1", "PACKET_RAYS": "1", **tree}
-    for traversal, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
+    for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"}, {"ABUFFER_STEPS": "1", "ABUFFER_PARITY": "1"})]
 CHOICES = {
     "trace/wave.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
     "tree/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}], [{}, {"BVH_ONE_ORDER": "1"}]],
-    "reduce/horn.comp": [[{"HORN_" + stage: "1"} for stage in "COUNT ADD GATHER".split()]],
     "rayspace/leaves.comp": [[{"LEAVES_" + stage: "1"} for stage in "TEST RANK SETTLE".split()]],
     "abuffer/voxels.comp": [[{"VOXELS_" + stage: "1"} for stage in "JUDGE REACH_X REACH_Y REACH_Z".split()]],
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
@@ -60,13 +56,12 @@ CHOICES = {
                        [{"BUILD_PASS": number} for number in "012"]],
     "abuffer/build.frag": [[{"PRIMITIVE_KIND": "0", "ALL_IMAGES": "1"},
                             {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1", "ALL_IMAGES": "1"}], [{}, {"WITHOUT_STEEP": "1"}]],
-    "svo/voxelise.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}]],
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",),
         "HAS_ANISOTROPY_MAP": ("HAS_ANISOTROPY",)}
 # Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
-WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE", "TRACER_SVO")}
+WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE")}
 # Of a sample a pixel, without a lens and other layers of the picture.
 WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
 WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
@@ -76,8 +71,7 @@ MAY_MOVE = ("render/path.comp", "render/distributed.comp", "render/ground.comp",
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
-          "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"],
-          "svo/voxelise.frag": ["raster/draw.vert", "raster/draw.geom", "svo/voxelise.frag"]}
+          "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"]}
 # What a stage declares, and the limit that is asked of a driver for it (server/gpu/limits.def); none: nothing is there.
 LIMITS = pathlib.Path("server/gpu/limits.def")
 LIMIT = re.compile(r"^LIMIT\((\w+), +(\d+),", re.MULTILINE)
@@ -127,7 +121,7 @@ DEFINED = re.compile(r"\bdefined[ \t]*\(?[ \t]*(\w+)")
 
 
 def file_of(path):
-    return next(root / path for root in ROOTS if (root / path).is_file())
+    return SHADERS / path
 
 
 def expand(path, defines, files):
@@ -290,8 +284,7 @@ def hazards_of(path):
 
 def main():
     stages = {stage for program, stages in STAGES.items() for stage in stages if stage != program}
-    found = sorted(str(path.relative_to(root)) for suffix in ("comp", "vert", "frag") for root in ROOTS
-                   for path in root.rglob("*." + suffix))
+    found = sorted(str(path.relative_to(SHADERS)) for suffix in ("comp", "vert", "frag") for path in SHADERS.rglob("*." + suffix))
     found = [program for program in found if program not in stages]
     all_variants = [variant for program in found for variant in variants(program)]
     batches = [all_variants[i:i + BATCH] for i in range(0, len(all_variants), BATCH)]
@@ -301,8 +294,8 @@ def main():
     needed = {limit: max(one.get(limit, 0) for _, one in results) for _, of in results for limit in of}
     complaints += [f"{LIMITS}: asks for {asked} of {limit}, of which programs need {needed[limit]}"
                    for limit, asked in LIMIT.findall(LIMITS.read_text()) if needed.get(limit, int(asked)) < int(asked)]
-    complaints += [line for root in ROOTS for suffix in ("comp", "vert", "geom", "frag", "glsl")
-                   for path in sorted(root.rglob("*." + suffix)) for line in hazards_of(path)]
+    complaints += [line for suffix in ("comp", "vert", "geom", "frag", "glsl")
+                   for path in sorted(SHADERS.rglob("*." + suffix)) for line in hazards_of(path)]
     print("\n".join(complaints), end="\n" if complaints else "")
     print(f"{len(all_variants)} variants of {len(found)} programs, {len(complaints)} complaints", file=sys.stderr)
     return 1 if complaints else 0

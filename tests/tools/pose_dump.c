@@ -9,7 +9,7 @@
  * 1: it says why. */
 #include "scene/affine.h"
 #include "scene/pose.h"
-#include "tests/bench/load_model.h"
+#include "tests/fixtures/load_model.h"
 
 #include <math.h>
 #include <stdio.h>
