@@ -158,67 +158,6 @@ TEST(blended_panes_count_by_half)
     frame_result_finish(&result);
 }
 
-/* ---- batches, frames, requests ---- */
-
-static void a_corner(struct fixture *fixture)
-{
-    const float wall[12] = {0, 0, 1, -1.0f, 0, 1, 0, 0, -1, 0, 0, 0};
-    uint32_t material = fixture_material(fixture)->base.id;
-    fixture_square(fixture, 2.0f, material, NULL);
-    fixture_square(fixture, 2.0f, material, wall);
-    fixture_sphere(fixture, 0.3f, 0.2f, 0.4f, 0.4f, material);
-    fixture->request.ao_falloff = 1.0f;
-    fixture->request.ao_distance = 0.0f;
-}
-
-static void assert_same(const struct frame_result *a, const struct frame_result *b)
-{
-    assert_int_equal(a->size_bytes, b->size_bytes);
-    assert_memory_equal(a->pixels, b->pixels, a->size_bytes);
-}
-
-TEST(the_picture_is_the_same_however_its_rays_are_batched)
-{
-    struct fixture *fixture = *state;
-    begin(fixture, TRACER_NAIVE);
-    a_corner(fixture);
-    fixture->request.samples = 4;
-    fixture->request.ao_rays = 33;
-    struct frame_result large = fixture_render(fixture);
-    frame_renderer_set_capacity(fixture->renderer, 200, 300);
-    struct frame_result small = fixture_render(fixture);
-    assert_same(&large, &small);
-    assert_int_equal(large.shadow_rays, small.shadow_rays);
-    frame_result_finish(&large);
-    frame_result_finish(&small);
-    frame_renderer_set_capacity(fixture->renderer, 0, 0);
-}
-
-TEST(frames_of_few_samples_add_up_to_one_of_many)
-{
-    struct fixture *fixture = *state;
-    struct frame_result parts = {0};
-    begin(fixture, TRACER_NAIVE);
-    a_corner(fixture);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 6;
-    struct frame_result whole = fixture_render(fixture);
-    fixture->request.ao_rays = 9; /* another picture: begins from new */
-    parts = fixture_render(fixture);
-    assert_int_equal(parts.samples, 6);
-    frame_result_finish(&parts);
-    fixture->request.ao_rays = 0;
-    fixture->request.samples = 2;
-    for (uint32_t i = 1; i <= 3; i++) {
-        frame_result_finish(&parts);
-        parts = fixture_render(fixture);
-        assert_int_equal(parts.samples, 2 * i);
-    }
-    assert_same(&whole, &parts);
-    frame_result_finish(&whole);
-    frame_result_finish(&parts);
-}
-
 TEST(a_tenth_of_the_diagonal_is_the_default_distance)
 {
     struct fixture *fixture = *state;

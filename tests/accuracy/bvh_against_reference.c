@@ -17,7 +17,7 @@
 
 #include <float.h>
 
-#define SIDE 256u
+#define SIDE 160u
 #define RAY_COUNT (SIDE * SIDE)
 #define EDGE_STEPS 6.0f
 /* One ray, moved so many ways: at the tip of a triangle of one degree one in 360 falls on it. Most need few. */
@@ -414,24 +414,24 @@ TEST(bvh_agrees_with_the_reference_on_a_triangle_soup_in_mirrored_squeezed_and_n
     expect_agreement(test_scene_soup());
 }
 
-TEST(bvh_agrees_with_the_reference_on_spheres_among_triangles)
+TEST_LONG(bvh_agrees_with_the_reference_on_spheres_among_triangles)
 {
     expect_agreement(test_scene_spheres());
 }
 
-TEST(bvh_agrees_with_the_reference_on_cutouts_glass_panes_and_a_disc)
+TEST_LONG(bvh_agrees_with_the_reference_on_cutouts_glass_panes_and_a_disc)
 {
     expect_agreement(test_scene_translucent());
 }
 
-TEST(bvh_agrees_with_the_reference_on_40K_bumpy_triangles_in_instances)
+TEST_LONG(bvh_agrees_with_the_reference_on_40K_bumpy_triangles_in_instances)
 {
     expect_agreement(bumpy_scene());
 }
 
 /* What the comparison forgives must not be what it is there to find: on a surface that is a thousand times wider
  * than a rounding step, nearly no wrong answer lies on an edge. */
-TEST(a_wrong_answer_within_a_surface_is_no_edge)
+TEST_LONG(a_wrong_answer_within_a_surface_is_no_edge)
 {
     struct arena arena;
     arena_init(&arena, bumpy_scene());

@@ -78,7 +78,7 @@ static double contrast(const struct frame_result *picture, const struct frame_re
  * must. */
 static void expect_detail_without_noise(struct fixture *fixture)
 {
-    struct frame_result truth = rendered(fixture, DENOISE_OFF, 1024, 7);
+    struct frame_result truth = rendered(fixture, DENOISE_OFF, 256, 7);
     for (uint32_t samples = 1; samples <= 16; samples *= 4) {
         struct frame_result noisy = rendered(fixture, DENOISE_OFF, samples, 1);
         struct frame_result denoised = rendered(fixture, DENOISE_ON, samples, 1);
@@ -97,7 +97,7 @@ TEST(a_texture_keeps_its_detail_while_its_noise_goes)
 }
 
 /* The same as the wall itself: of a mirror's own normal and albedo one sample would be left as it is. */
-TEST(so_it_does_in_a_mirror)
+TEST_LONG(so_it_does_in_a_mirror)
 {
     struct fixture *fixture = *state;
     a_checker(fixture, BACK);
@@ -144,7 +144,7 @@ static void small_balls(struct fixture *fixture)
 
 /* Around a pixel one or two see such a surface, or none: if these alone said what is usual there, much of what the
  * balls mirror would be taken for specks. */
-TEST(what_small_balls_mirror_is_no_speck)
+TEST_LONG(what_small_balls_mirror_is_no_speck)
 {
     struct fixture *fixture = *state;
     small_balls(fixture);
@@ -162,7 +162,7 @@ TEST(what_small_balls_mirror_is_no_speck)
     frame_result_finish(&truth);
 }
 
-TEST(pictures_without_noise_stay_as_they_are)
+TEST_LONG(pictures_without_noise_stay_as_they_are)
 {
     struct fixture *fixture = *state;
     static const unsigned integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_RAYCAST};
@@ -199,7 +199,7 @@ TEST(a_hard_shadow_stays_hard)
 
 /* A filter that did not end would leave its blur: here it moves the picture by less than its noise is, and that
  * falls as samples are added. */
-TEST(with_many_samples_the_denoised_picture_is_the_noisy_one)
+TEST_LONG(with_many_samples_the_denoised_picture_is_the_noisy_one)
 {
     struct fixture *fixture = *state;
     a_checker(fixture, FRONT);
@@ -216,7 +216,7 @@ TEST(with_many_samples_the_denoised_picture_is_the_noisy_one)
     assert_true(before < 0.005);
 }
 
-TEST(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
+TEST_LONG(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);

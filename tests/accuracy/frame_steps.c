@@ -143,7 +143,7 @@ TEST(no_step_is_long_where_rays_are_slow)
     }
 }
 
-TEST(every_tracer_finds_the_same_in_parts)
+TEST_LONG(every_tracer_finds_the_same_in_parts)
 {
     struct fixture *fixture = *state;
     a_crowded_scene(fixture);
@@ -335,7 +335,7 @@ static bool take_way(struct fixture *fixture, const struct way *way)
     return tracer_impl_by_number(way->tracer) != NULL;
 }
 
-TEST(structures_built_in_steps_are_the_same)
+TEST_LONG(structures_built_in_steps_are_the_same)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
@@ -359,7 +359,7 @@ TEST(structures_built_in_steps_are_the_same)
 }
 
 /* After any number of pieces: nothing is left of it, and what comes after it is right. */
-TEST(a_structure_without_waiting_frames_is_forgotten)
+TEST_LONG(a_structure_without_waiting_frames_is_forgotten)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);

@@ -67,7 +67,7 @@ static void ask(void)
 }
 
 /* The fit's own bounds, and 0.002 for the quadrature; of the mean, what those of its cosines add up to. */
-TEST(fibres_send_out_what_their_fit_says)
+TEST_LONG(fibres_send_out_what_their_fit_says)
 {
     double low = 0.0, high = 0.0, mean_off = 0.0;
     if (!device)
@@ -157,7 +157,7 @@ static void ask_pairs(const float material[4], float there[VIEWS][VIEWS])
     shader_probe_finish(&program);
 }
 
-TEST(cloth_that_light_shines_through_is_reciprocal)
+TEST_LONG(cloth_that_light_shines_through_is_reciprocal)
 {
     static const float materials[][4] = {
         {0.8f, 0.0f, 1.5f, 0.3f}, {0.4f, 0.5f, 1.5f, 0.9f}, {1.0f, 0.0f, 1.0f, 0.1f}};
