@@ -43,7 +43,7 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(distributed_rays_see_what_the_references_see)
+TEST_LONG(distributed_rays_see_what_the_references_see)
 {
     struct fixture *fixture = *state;
     fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
@@ -54,7 +54,7 @@ TEST(distributed_rays_see_what_the_references_see)
 }
 
 /* What moved lies in a cube of its own: rays see both as one, and each other's reflections and shadows. */
-TEST(what_moves_is_seen_with_what_stands_still)
+TEST_LONG(what_moves_is_seen_with_what_stands_still)
 {
     struct fixture *fixture = *state;
     float m[12];
@@ -105,7 +105,7 @@ static double share(uint64_t part, const struct wave_comparison *wave)
 
 /* The planes of samples alone give 0.06 % of these hits far off, 0.9 % with another facet's normal, and 41 dB.
  * What is left are triangles without samples, and silhouettes of surfaces that are within a cell of each other. */
-TEST(first_hits_are_those_of_triangles)
+TEST_LONG(first_hits_are_those_of_triangles)
 {
     struct fixture *fixture = *state;
     add_facets(fixture);
@@ -150,7 +150,7 @@ static void add_beads(struct fixture *fixture)
 
 /* Two cells in radius: from one texel's centre to the next their normals turn by 30 degrees. By
  * the samples alone 94 % of these hits are more than five degrees off. */
-TEST(small_spheres_have_their_own_normals)
+TEST_LONG(small_spheres_have_their_own_normals)
 {
     struct fixture *fixture = *state;
     add_beads(fixture);

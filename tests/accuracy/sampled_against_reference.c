@@ -1,16 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Tracers that sample against the reference, at the resolution that is their default: on whole pictures, and on
  * the same waves of secondary rays. They are held to the size of a cell and to what can be seen, not to rounding.
- *
- * Models are those of the folder FARLIGHT_SCENES. Each test prints what it measured. FARLIGHT_TEST_PICTURES=folder
- * keeps the pictures. */
+ * Each test prints what it measured. FARLIGHT_TEST_PICTURES=folder keeps the pictures. */
 #include "tests/accuracy/against_reference.h"
 
-#include "tests/bench/load_model.h"
 #include "render/frame_state.h"
 #include "tests/harness/test.h"
-
-#include <unistd.h>
 
 #define AO_RAYS 64u
 
@@ -59,13 +54,6 @@ static const struct row {
      ABUFFER_SEARCH_LINEAR3,
      {36, 34, 34},
      {.agreed = 0.995, .median_cells = 0.1, .max_cells = 0.1}},
-    {"abuffer, linear1",
-     TRACER_ABUFFER,
-     {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
-     3,
-     ABUFFER_SEARCH_LINEAR1,
-     {36, 34, 34},
-     {.agreed = 0.995, .median_cells = 0.1, .max_cells = 0.1}},
 };
 enum { ROWS = sizeof(rows) / sizeof(rows[0]) };
 
@@ -101,8 +89,7 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
     struct frame_result expected = render(fixture, exact_tracer(), &rows[0], name);
     for (const struct row *row = rows; row < rows + ROWS; row++) {
         const double asked = row->psnr_min[kind];
-        if (asked == 0 ||
-            (row->search == ABUFFER_SEARCH_LINEAR1 && !getenv("FARLIGHT_TEST_LONG"))) /* as linear3's */
+        if (asked == 0)
             continue;
         struct frame_result got = render(fixture, row->tracer, row, name);
         double reached = psnr(&got, &expected);
@@ -115,48 +102,41 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
     frame_result_finish(&expected);
 }
 
-static void expect_scene_like_the_reference(struct fixture *fixture, void (*add)(struct fixture *fixture),
-                                            const char *name, enum picture_kind kind)
+/* Stored samples are filtered to a cell, which is narrower than a pixel here, and not to a ray's footprint: with
+ * one sample a pixel textures alias more than exact hits, with several both tend to the same picture. */
+static const struct {
+    const char *name;
+    void (*add)(struct fixture *fixture);
+    enum picture_kind kind;
+    uint32_t samples;
+} scenes[] = {
+    {"mirrors", add_mirrors, CLOSED, 1},
+    {"textures in a mirror", add_textured, CLOSED, 4},
+    {"every texture", add_every_texture, CLOSED, 1},
+    {"glass", add_glass, CLOSED, 1},
+    {"spheres", add_spheres, CLOSED, 1},
+    {"cutouts over a mirror", add_cutout, HOLES, 1},
+};
+
+static void expect_scenes_like_the_references(struct fixture *fixture, size_t first, size_t end)
 {
-    add(fixture);
-    request_picture(fixture, 5);
-    expect_like_the_reference(fixture, name, kind);
+    for (size_t i = first; i < end; i++) {
+        fixture_clear((void **)&fixture);
+        scenes[i].add(fixture);
+        request_picture(fixture, 5);
+        fixture->request.samples = scenes[i].samples;
+        expect_like_the_reference(fixture, scenes[i].name, scenes[i].kind);
+    }
 }
 
 TEST(mirrors_are_like_the_references)
 {
-    expect_scene_like_the_reference(*state, add_mirrors, "mirrors", CLOSED);
+    expect_scenes_like_the_references(*state, 0, 1);
 }
 
-/* Stored samples are filtered to a cell, which is narrower than a pixel here, and not to a ray's footprint: with
- * one sample a pixel they alias more than exact hits, with several both tend to the same picture. */
-TEST(textures_in_a_mirror_are_like_the_references)
+TEST_LONG(textures_glass_spheres_and_cutouts_are_like_the_references)
 {
-    struct fixture *fixture = *state;
-    add_textured(fixture);
-    request_picture(fixture, 5);
-    fixture->request.samples = 4;
-    expect_like_the_reference(fixture, "textures in a mirror", CLOSED);
-}
-
-TEST(every_sort_of_texture_is_like_the_references)
-{
-    expect_scene_like_the_reference(*state, add_every_texture, "every texture", CLOSED);
-}
-
-TEST(glass_is_like_the_references)
-{
-    expect_scene_like_the_reference(*state, add_glass, "glass", CLOSED);
-}
-
-TEST(spheres_are_like_the_references)
-{
-    expect_scene_like_the_reference(*state, add_spheres, "spheres", CLOSED);
-}
-
-TEST(cutouts_are_like_the_references)
-{
-    expect_scene_like_the_reference(*state, add_cutout, "cutouts over a mirror", HOLES);
+    expect_scenes_like_the_references(*state, 1, sizeof(scenes) / sizeof(scenes[0]));
 }
 
 /* ---- ambient occlusion ---- */
@@ -164,6 +144,7 @@ TEST(cutouts_are_like_the_references)
 static void expect_occlusion_like_the_references(struct fixture *fixture, const char *name)
 {
     struct frame_request *request = &fixture->request;
+    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     request->width = request->height = SIDE / 2;
     request->format = PIXEL_FORMAT_RGBA8;
     request->integrator = INTEGRATOR_AO;
@@ -172,16 +153,14 @@ static void expect_occlusion_like_the_references(struct fixture *fixture, const 
     expect_like_the_reference(fixture, name, OCCLUSION);
 }
 
-TEST(occlusion_of_closed_shapes_is_like_the_references)
+TEST_LONG(occlusion_of_closed_shapes_is_like_the_references)
 {
-    struct fixture *fixture = *state;
-    add_mirrors(fixture);
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    expect_occlusion_like_the_references(fixture, "occlusion");
+    add_mirrors(*state);
+    expect_occlusion_like_the_references(*state, "occlusion");
 }
 
 /* A corner of a room, and in it what is not closed either: nothing has an inside. */
-TEST(occlusion_of_open_shapes_is_like_the_references)
+TEST_LONG(occlusion_of_open_shapes_is_like_the_references)
 {
     struct fixture *fixture = *state;
     static const float walls[3][12] = {{1, 0, 0, 0, 0, 0, 1, -1, 0, -1, 0, 0},
@@ -197,72 +176,20 @@ TEST(occlusion_of_open_shapes_is_like_the_references)
         turned(m, 0.7f, 0.4f * (float)i, 1.3f * (float)(i - 1), -0.4f, 0.3f * (float)(i - 1) - 0.6f);
         fixture_node(fixture, NODE_MESH, mesh, m);
     }
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     expect_occlusion_like_the_references(fixture, "occlusion in a corner");
 }
 
-/* Where a scene lies. */
-struct extent {
-    float lower_world[3], upper_world[3];
-    float diagonal; /* metres; lights belong to it */
-};
-
-static struct extent scene_extent(struct fixture *fixture)
+/* Metres; lights belong to it. */
+static float scene_diagonal(struct fixture *fixture)
 {
     struct gpu_scene gpu;
     struct scene_changes changes;
     struct error error = {0};
-    struct extent extent;
     gpu_scene_init(&gpu, fixture->device);
     assert_true(gpu_scene_update(&gpu, fixture->scene, NULL, &changes, NULL, &error));
-    memcpy(extent.lower_world, gpu.lower_world, sizeof(extent.lower_world));
-    memcpy(extent.upper_world, gpu.upper_world, sizeof(extent.upper_world));
-    extent.diagonal = gpu.diagonal;
+    const float diagonal = gpu.diagonal;
     gpu_scene_finish(&gpu);
-    return extent;
-}
-
-/* A camera that sees all of it, from a little above. */
-static void look_at_all(struct fixture *fixture)
-{
-    struct extent extent = scene_extent(fixture);
-    float target[3], eye[3];
-    for (int k = 0; k < 3; k++) {
-        static const float from[3] = {0.3f, 0.35f, 0.9f};
-        target[k] = 0.5f * (extent.lower_world[k] + extent.upper_world[k]);
-        eye[k] = target[k] + 1.1f * extent.diagonal * from[k];
-    }
-    assert_true(frame_camera_look_at(&fixture->request.camera, eye, target, (const float[]){0, 1, 0}, 0.8f));
-}
-
-TEST(occlusion_of_models_is_like_the_references)
-{
-    struct fixture *fixture = *state;
-    static const char *const models[] = {"common/teapot.obj", "common/dragon-47k.glb"};
-    const char *folder = getenv("FARLIGHT_SCENES");
-    if (!folder) {
-        printf("FARLIGHT_SCENES names no folder of models\n");
-        skip();
-    }
-    for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? sizeof(models) / sizeof(models[0]) : 1); i++) {
-        char path[512];
-        struct loaded_model model;
-        struct error error = {0};
-        snprintf(path, sizeof(path), "%s/%s", folder, models[i]);
-        if (access(path, R_OK) != 0) {
-            printf("there is no %s\n", path);
-            continue;
-        }
-        fixture_clear(state);
-        if (!load_model(&model, path, &error))
-            fail_msg("%s: %s", path, error.text);
-        scene_destroy(fixture->scene);
-        fixture->scene = model.scene;
-        model.scene = NULL;
-        look_at_all(fixture);
-        expect_occlusion_like_the_references(fixture, models[i]);
-        load_model_finish(&model);
-    }
+    return diagonal;
 }
 
 /* ---- rays ---- */
@@ -288,7 +215,7 @@ static struct agreement compare_rays(struct fixture *fixture, const struct row *
     fixture->request.depth = row->depth;
     use_search(fixture, row);
     const float cell_metres = metres_of_a_cell(fixture, row->tracer);
-    const double cells = (double)(scene_extent(fixture).diagonal / cell_metres); /* errors come in diagonals */
+    const double cells = (double)(scene_diagonal(fixture) / cell_metres); /* errors come in diagonals */
     fixture->request.tracer = exact_tracer();
     fixture->request.compare = true;
     fixture->request.compare_with = row->tracer;
@@ -337,7 +264,7 @@ static void expect_agreement(const char *name, const struct agreement *found, co
 
 /* Shapes as mirrors and then as glass, two of each so that there is something to be mirrored. Only the material is
  * edited: what samples shapes is built once for both. */
-TEST(secondary_rays_agree_with_the_reference)
+TEST_LONG(secondary_rays_agree_with_the_reference)
 {
     struct fixture *fixture = *state;
     static const struct {
