@@ -71,24 +71,39 @@ static double width_after(struct cone cone, double distance)
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(a_concave_mirror_has_its_focus_at_half_its_radius)
-{
-    struct cone parallel =
-        cone_of(*state, (struct cone_case){.width = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f});
-    assert_near(width_after(parallel, 1.5), 0.0, 1e-8);
-    assert_near(width_after(parallel, 3.0), -0.01, 1e-8); /* as wide again, turned over */
-    /* 1 / object + 1 / image = 2 / radius: from 4.5 m to 2.25 m */
-    struct cone point = cone_of(
-        *state,
-        (struct cone_case){.width = 0.045f, .spread = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f});
-    assert_near(width_after(point, 2.25), 0.0, 1e-7);
-}
+/* Widths after a distance: a mirror's focus is at half its radius, and 1 / object + 1 / image = 2 / radius; a flat
+ * one changes nothing; solid angles add up, and a cone that closes in to a point stays open by the angle there. */
+static const struct {
+    const char *name;
+    struct cone_case asked;
+    double distance, width;
+} formulas[] = {
+    {"parallel light in its focus", {.width = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f}, 1.5, 0.0},
+    {"and turned over", {.width = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f}, 3.0, -0.01},
+    {"from 4.5 m to 2.25 m",
+     {.width = 0.045f, .spread = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f},
+     2.25,
+     0.0},
+    {"a flat mirror, at once", {.width = 0.2f, .spread = 0.3f, .operation = MIRRORED}, 0.0, 0.2},
+    {"a flat mirror, farther on", {.width = 0.2f, .spread = 0.3f, .operation = MIRRORED}, 1.0, 0.5},
+    {"scattered, at once", {.width = 0.1f, .spread = 0.3f, .operation = SCATTERED, .curvature = 0.16f}, 0.0, 0.1},
+    {"scattered, farther on",
+     {.width = 0.1f, .spread = 0.3f, .operation = SCATTERED, .curvature = 0.16f},
+     1.0,
+     0.6},
+    {"scattered where it closes",
+     {.width = 1.0f, .spread = -1.0f, .operation = SCATTERED, .curvature = 0.01f},
+     1.0,
+     0.1},
+};
 
-TEST(a_flat_mirror_changes_no_cone)
+TEST(cones_are_mirrored_and_scattered_by_the_formulas)
 {
-    struct cone same = cone_of(*state, (struct cone_case){.width = 0.2f, .spread = 0.3f, .operation = MIRRORED});
-    assert_near(same.width, 0.2f, 0.0);
-    assert_near(same.spread, 0.3f, 0.0);
+    for (size_t i = 0; i < sizeof(formulas) / sizeof(formulas[0]); i++) {
+        const double width = width_after(cone_of(*state, formulas[i].asked), formulas[i].distance);
+        if (!(fabs(width - formulas[i].width) < 1e-6))
+            fail_msg("%s: %.8f wide, expected %g", formulas[i].name, width, formulas[i].width);
+    }
 }
 
 TEST(a_glass_ball_has_the_focus_of_a_ball_lens)
@@ -128,18 +143,6 @@ TEST(a_flat_boundary_keeps_area_times_solid_angle_times_the_square_of_the_index)
         assert_near((double)bent.width * (double)bent.spread * 1.5, 0.01 * 0.02, 1e-9);
         assert_near((double)bent.width * (double)bent.width / (double)behind, 1e-4 / (double)before, 1e-9);
     }
-}
-
-TEST(solid_angles_add_up)
-{
-    struct cone wide = cone_of(
-        *state, (struct cone_case){.width = 0.1f, .spread = 0.3f, .operation = SCATTERED, .curvature = 0.16f});
-    assert_near(wide.width, 0.1f, 0.0);
-    assert_near(wide.spread, 0.5f, 1e-6);
-    /* a cone that closes in to a point 1 m away stays open by the angle there */
-    struct cone closing = cone_of(
-        *state, (struct cone_case){.width = 1.0f, .spread = -1.0f, .operation = SCATTERED, .curvature = 0.01f});
-    assert_near(width_after(closing, 1.0), 0.1, 1e-6);
 }
 
 /* ---- what a hit tells of its surface ---- */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Tracers that sample against the reference, at the resolution that is their default: on whole pictures, and on
- * the same waves of secondary rays. They are held to the size of a cell and to what can be seen, not to rounding.
- * Each test prints what it measured. FARLIGHT_TEST_PICTURES=folder keeps the pictures. */
+/* Whole pictures by tracers that sample against the reference, at the resolution that is their default. They are
+ * held to the size of a cell and to what can be seen, not to rounding. Each test prints what it measured.
+ * FARLIGHT_TEST_PICTURES=folder keeps the pictures. */
 #include "tests/accuracy/against_reference.h"
 
 #include "render/frame_state.h"
@@ -9,51 +9,27 @@
 
 #define AO_RAYS 64u
 
-/* Of secondary rays that two tracers answered. */
-struct agreement {
-    uint64_t rays;
-    double agreed;       /* the share of them for which both have a hit, or none */
-    double median_cells; /* of differences of distances, in the worst wave */
-    double max_cells;    /* what 99 in 100 of them are below, in the worst wave */
-};
-
-/* What is asked of each: of pictures in dB, and of rays. */
+/* Asked of each tracer, in dB; 0: not asked. Whether there is a hole is decided for a cell as a whole, so its rims
+ * are a cell's steps, and each of many rims shows. What has holes is no body. */
 enum picture_kind { CLOSED, HOLES, OCCLUSION, PICTURE_KINDS };
 static const struct row {
     const char *name;
     unsigned tracer;
     struct tracer_options options;
-    uint32_t depth;  /* of rays that are compared */
     unsigned search; /* of abuffer, whose structure is the same for each */
-    /* Whether there is a hole is decided for a cell as a whole, so its rims are a cell's steps, and each of many
-     * rims shows. What has holes is no body. 0: not asked. */
     double psnr_min[PICTURE_KINDS];
-    /* By planes of samples, one in 100 distances is off where a surface bends within a texel; dda holds what it
-     * finds against triangles, and is off by what floats round but for the rays that meet none, fewer than one in
-     * 100. */
-    struct agreement rays;
 } rows[] = {
-    {"ldc",
-     TRACER_LDC,
-     {.ldc = {.resolution = 1024}},
-     5,
-     0,
-     {38, 34, 0},
-     {.agreed = 0.99, .median_cells = 0.25, .max_cells = INFINITY}},
+    {"ldc", TRACER_LDC, {.ldc = {.resolution = 1024}}, 0, {38, 34, 0}},
     {"abuffer, dda",
      TRACER_ABUFFER,
      {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
-     3,
      ABUFFER_SEARCH_DDA,
-     {36, 34, 34},
-     {.agreed = 0.995, .median_cells = 0.1, .max_cells = 0.01}},
+     {36, 34, 34}},
     {"abuffer, linear3",
      TRACER_ABUFFER,
      {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
-     3,
      ABUFFER_SEARCH_LINEAR3,
-     {36, 34, 34},
-     {.agreed = 0.995, .median_cells = 0.1, .max_cells = 0.1}},
+     {36, 34, 34}},
 };
 enum { ROWS = sizeof(rows) / sizeof(rows[0]) };
 
@@ -177,123 +153,4 @@ TEST_LONG(occlusion_of_open_shapes_is_like_the_references)
         fixture_node(fixture, NODE_MESH, mesh, m);
     }
     expect_occlusion_like_the_references(fixture, "occlusion in a corner");
-}
-
-/* Metres; lights belong to it. */
-static float scene_diagonal(struct fixture *fixture)
-{
-    struct gpu_scene gpu;
-    struct scene_changes changes;
-    struct error error = {0};
-    gpu_scene_init(&gpu, fixture->device);
-    assert_true(gpu_scene_update(&gpu, fixture->scene, NULL, &changes, NULL, &error));
-    const float diagonal = gpu.diagonal;
-    gpu_scene_finish(&gpu);
-    return diagonal;
-}
-
-/* ---- rays ---- */
-
-/* As a small picture says it. */
-static float metres_of_a_cell(struct fixture *fixture, unsigned tracer)
-{
-    fixture->request.tracer = tracer;
-    fixture->request.width = fixture->request.height = 16;
-    struct frame_result result = fixture_render(fixture);
-    fixture->request.width = fixture->request.height = SIDE;
-    const float cell_metres =
-        structure_row(&result.structure, tracer == TRACER_LDC ? "static/cell" : "cell").measure;
-    frame_result_finish(&result);
-    assert_true(cell_metres > 0);
-    return cell_metres;
-}
-
-/* The reference's own waves, its secondary rays answered by another tracer too. */
-static struct agreement compare_rays(struct fixture *fixture, const struct row *row, const char *name)
-{
-    fixture->request.tracer_options = row->options;
-    fixture->request.depth = row->depth;
-    use_search(fixture, row);
-    const float cell_metres = metres_of_a_cell(fixture, row->tracer);
-    const double cells = (double)(scene_diagonal(fixture) / cell_metres); /* errors come in diagonals */
-    fixture->request.tracer = exact_tracer();
-    fixture->request.compare = true;
-    fixture->request.compare_with = row->tracer;
-    struct frame_result result = fixture_render(fixture);
-    fixture->request.compare = false;
-    struct agreement found = {0};
-    uint64_t disagreed = 0, compared = 0;
-    for (uint32_t i = 0; i < result.comparison_count; i++) {
-        const struct wave_comparison *wave = &result.comparisons[i];
-        static const char *const kinds[] = {"primary", "secondary", "shadow"};
-        uint64_t apart = wave->only_first + wave->only_second;
-        double agreed = 1 - (double)apart / (double)(wave->rays ? wave->rays : 1);
-        double median_cells = (double)wave->distance_median * cells,
-               max_cells = (double)wave->distance_p99 * cells;
-        printf("%s, wave %u, %s: %llu rays, %.3f %% agree on hit or miss, median distance %.4f cells, 99 %% below "
-               "%.3f\n",
-               name, wave->wave, kinds[wave->kind], (unsigned long long)wave->rays, 100 * agreed, median_cells,
-               max_cells);
-        if (wave->kind != RAY_SECONDARY)
-            continue;
-        found.rays += wave->rays;
-        disagreed += apart;
-        if (wave->both_hit > 100) {
-            found.median_cells = fmax(found.median_cells, median_cells);
-            found.max_cells = fmax(found.max_cells, max_cells);
-            compared++;
-        }
-    }
-    frame_result_finish(&result);
-    assert_in_range(found.rays, SIDE * SIDE / 20, UINT64_MAX); /* else nothing would have been shown */
-    assert_true(compared > 0);
-    found.agreed = 1 - (double)disagreed / (double)found.rays;
-    return found;
-}
-
-static void expect_agreement(const char *name, const struct agreement *found, const struct agreement *asked)
-{
-    if (!(found->agreed >= asked->agreed))
-        fail_msg("%s: %.3f %% of %llu rays agree on hit or miss", name, 100 * found->agreed,
-                 (unsigned long long)found->rays);
-    if (!(found->median_cells <= asked->median_cells))
-        fail_msg("%s: the median distance is %.3f cells off", name, found->median_cells);
-    if (!(found->max_cells <= asked->max_cells))
-        fail_msg("%s: one in 100 distances is %.3f cells off", name, found->max_cells);
-}
-
-/* Shapes as mirrors and then as glass, two of each so that there is something to be mirrored. Only the material is
- * edited: what samples shapes is built once for both. */
-TEST_LONG(secondary_rays_agree_with_the_reference)
-{
-    struct fixture *fixture = *state;
-    static const struct {
-        const char *name;
-        enum shape shape;
-        uint32_t steps;
-    } shapes[] = {{"a torus", SHAPE_TORUS, 128}, {"a bumpy sphere", SHAPE_BUMPY, 224}};
-    for (size_t i = 0; i < sizeof(shapes) / sizeof(shapes[0]); i++) {
-        fixture_clear(state);
-        const uint32_t id = add_mirror(fixture, 1.0f, 1.0f, 1.0f);
-        add_shape(fixture, shapes[i].shape, shapes[i].steps, id, 1, 0.4f, -0.9f, 0, 0);
-        add_shape(fixture, shapes[i].shape, shapes[i].steps, id, 1, 1.1f, 0.95f, 0.2f, 0.4f);
-        fixture_light(fixture, LIGHT_POINT, 2.5f, 4, 3, 300);
-        request_picture(fixture, 5);
-        fixture_look(fixture, 1.5f, 2.2f, 4.5f, 0.7f);
-        for (int inside = 0; inside < 2; inside++) {
-            if (inside) {
-                struct scene_material *material = &fixture_edit(fixture, OBJECT_MATERIAL)->set.material;
-                *material = *scene_material(fixture->scene, id);
-                material->metallic = 0.0f;
-                material->transmission = 1.0f;
-                material->ior = 1.5f;
-            }
-            for (const struct row *row = rows; row < rows + ROWS; row++) {
-                char name[96];
-                snprintf(name, sizeof(name), "%s%s, %s", shapes[i].name, inside ? " of glass" : "", row->name);
-                const struct agreement found = compare_rays(fixture, row, name);
-                expect_agreement(name, &found, &row->rays);
-            }
-        }
-    }
 }
