@@ -56,7 +56,7 @@ static bool same_tile(const struct frame_result *a, const struct frame_result *b
     return true;
 }
 
-TEST(a_tile_stops_by_its_error_and_is_that_of_a_picture_of_so_many_samples)
+TEST_LONG(a_tile_stops_by_its_error_and_is_that_of_a_picture_of_so_many_samples)
 {
     struct fixture *fixture = *state;
     static const uint32_t counts[] = {16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024};
@@ -107,7 +107,7 @@ static double error_of_tile(const struct frame_result *result, const struct fram
     return sqrt(squares) / (light + 0.03);
 }
 
-TEST(the_error_against_the_converged_picture_is_below_the_limit)
+TEST_LONG(the_error_against_the_converged_picture_is_below_the_limit)
 {
     struct fixture *fixture = *state;
     half_noisy(fixture);
@@ -146,7 +146,7 @@ static double error_of_picture(const struct frame_result *result, const struct f
  * are few. Light is stratified, so the gain is small: of pictures with 16 samples everywhere a fifth, with 32 a
  * fiftieth.
  */
-TEST(a_picture_that_stops_by_its_noise_is_nearer_to_the_truth_denoised)
+TEST_LONG(a_picture_that_stops_by_its_noise_is_nearer_to_the_truth_denoised)
 {
     struct fixture *fixture = *state;
     half_noisy(fixture);

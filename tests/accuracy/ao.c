@@ -5,10 +5,16 @@
 #include "tests/harness/test.h"
 
 #define FAR_AWAY 1000.0f
-static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_REFERENCE};
+static const unsigned tracers[] = {TRACER_BVH, TRACER_NAIVE, TRACER_REFERENCE};
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
 enum { EDGE = 32 };
+
+/* bvh, or all. */
+static size_t tracer_count(void)
+{
+    return getenv("FARLIGHT_TEST_LONG") ? COUNT(tracers) : 1;
+}
 
 static void begin(struct fixture *fixture, unsigned tracer)
 {
@@ -50,7 +56,7 @@ EACH_TEST(fixture_clear, NULL)
 TEST(an_open_plane_and_rays_that_leave_the_scene_are_unoccluded)
 {
     struct fixture *fixture = *state;
-    for (size_t t = 0; t < COUNT(tracers); t++) {
+    for (size_t t = 0; t < tracer_count(); t++) {
         begin(fixture, tracers[t]);
         fixture_square(fixture, 1.0f, fixture_material(fixture)->base.id, NULL);
         fixture->request.samples = 2;
@@ -71,7 +77,7 @@ TEST(a_wall_hides_its_share_of_the_sky)
     struct fixture *fixture = *state;
     const float wall[12] = {0, 0, 1, -2.0f, 0, 1, 0, 0, -1, 0, 0, 0}; /* the square's x is -z here */
     enum { SAMPLES = 16, RAYS = 16 };
-    for (size_t t = 1; t < COUNT(tracers); t++) {
+    for (size_t t = 0; t < tracer_count(); t++) {
         begin(fixture, tracers[t]);
         uint32_t material = fixture_material(fixture)->base.id;
         fixture_square(fixture, 10.0f, material, NULL);
@@ -113,7 +119,7 @@ TEST(nearer_surfaces_occlude_more)
     struct fixture *fixture = *state;
     static const float reaches[] = {FAR_AWAY, 3.0f, 2.0f, 1.2f, 0.5f}, falloffs[] = {0.0f, 0.5f, 1.0f, 2.0f, 8.0f};
     enum { SAMPLES = 2, RAYS = 16 };
-    begin(fixture, TRACER_REFERENCE);
+    begin(fixture, TRACER_BVH);
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
     fixture_look(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
     fixture->request.samples = SAMPLES;
@@ -142,7 +148,7 @@ TEST(blended_panes_count_by_half)
 {
     struct fixture *fixture = *state;
     const float above[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.0f};
-    begin(fixture, TRACER_REFERENCE);
+    begin(fixture, TRACER_BVH);
     struct scene_material *pane = fixture_material(fixture);
     pane->alpha_mode = ALPHA_BLEND;
     pane->base_colour[3] = 0.5f;
@@ -158,71 +164,10 @@ TEST(blended_panes_count_by_half)
     frame_result_finish(&result);
 }
 
-/* ---- batches, frames, requests ---- */
-
-static void a_corner(struct fixture *fixture)
-{
-    const float wall[12] = {0, 0, 1, -1.0f, 0, 1, 0, 0, -1, 0, 0, 0};
-    uint32_t material = fixture_material(fixture)->base.id;
-    fixture_square(fixture, 2.0f, material, NULL);
-    fixture_square(fixture, 2.0f, material, wall);
-    fixture_sphere(fixture, 0.3f, 0.2f, 0.4f, 0.4f, material);
-    fixture->request.ao_falloff = 1.0f;
-    fixture->request.ao_distance = 0.0f;
-}
-
-static void assert_same(const struct frame_result *a, const struct frame_result *b)
-{
-    assert_int_equal(a->size_bytes, b->size_bytes);
-    assert_memory_equal(a->pixels, b->pixels, a->size_bytes);
-}
-
-TEST(the_picture_is_the_same_however_its_rays_are_batched)
-{
-    struct fixture *fixture = *state;
-    begin(fixture, TRACER_NAIVE);
-    a_corner(fixture);
-    fixture->request.samples = 4;
-    fixture->request.ao_rays = 33;
-    struct frame_result large = fixture_render(fixture);
-    frame_renderer_set_capacity(fixture->renderer, 200, 300);
-    struct frame_result small = fixture_render(fixture);
-    assert_same(&large, &small);
-    assert_int_equal(large.shadow_rays, small.shadow_rays);
-    frame_result_finish(&large);
-    frame_result_finish(&small);
-    frame_renderer_set_capacity(fixture->renderer, 0, 0);
-}
-
-TEST(frames_of_few_samples_add_up_to_one_of_many)
-{
-    struct fixture *fixture = *state;
-    struct frame_result parts = {0};
-    begin(fixture, TRACER_NAIVE);
-    a_corner(fixture);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 6;
-    struct frame_result whole = fixture_render(fixture);
-    fixture->request.ao_rays = 9; /* another picture: begins from new */
-    parts = fixture_render(fixture);
-    assert_int_equal(parts.samples, 6);
-    frame_result_finish(&parts);
-    fixture->request.ao_rays = 0;
-    fixture->request.samples = 2;
-    for (uint32_t i = 1; i <= 3; i++) {
-        frame_result_finish(&parts);
-        parts = fixture_render(fixture);
-        assert_int_equal(parts.samples, 2 * i);
-    }
-    assert_same(&whole, &parts);
-    frame_result_finish(&whole);
-    frame_result_finish(&parts);
-}
-
 TEST(a_tenth_of_the_diagonal_is_the_default_distance)
 {
     struct fixture *fixture = *state;
-    begin(fixture, TRACER_REFERENCE);
+    begin(fixture, TRACER_BVH);
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
     fixture_look(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
     fixture->request.ao_rays = 64;
@@ -247,7 +192,7 @@ static void refuse(struct fixture *fixture, const char *field)
 TEST(impossible_requests_are_refused_with_the_field)
 {
     struct fixture *fixture = *state;
-    begin(fixture, TRACER_NAIVE);
+    begin(fixture, TRACER_BVH);
     fixture_commit(fixture);
     static const float wrong[] = {-1.0f, NAN, INFINITY};
     for (size_t i = 0; i < COUNT(wrong); i++) {

@@ -39,7 +39,7 @@ static void visit_materials(struct bsdf_probe probes[2], const float *roughnesse
 
 /* ---- what is chosen ---- */
 
-TEST(sampled_directions_follow_the_stated_density)
+TEST_LONG(sampled_directions_follow_the_stated_density)
 {
     static const float roughnesses[] = {0.45f, 0.7f, 1.0f};
     struct densities densities = {0};
@@ -56,12 +56,11 @@ TEST(sampled_directions_follow_the_stated_density)
 /* What rough facets send into each other comes out again: as fits of it say, which are within 0.007 (the
  * polynomials of facet_albedo.glsl), 0.025 where the index is above 2.4. Along a grain a fit for facets without
  * one stands in: it is off by up to 0.05, and chosen so that no more comes out than went in. */
-TEST(white_materials_send_on_what_arrives_and_no_more)
+TEST_LONG(white_materials_send_on_what_arrives_and_no_more)
 {
     static const float roughnesses[] = {0.0f, 0.15f, 0.5f, 1.0f, 0.05f, 0.3f, 0.7f, 0.85f};
     struct albedos albedos = {.min_even = {1, 1}, .min_grain = {1, 1}};
-    visit_materials(*state, roughnesses, COUNT(roughnesses) / (getenv("FARLIGHT_TEST_LONG") ? 1 : 2), sum_up,
-                    &albedos);
+    visit_materials(*state, roughnesses, COUNT(roughnesses), sum_up, &albedos);
     print_message("maximum albedo, less five standard errors: %.5f (%s), of an index of 4 %.5f\n", albedos.max,
                   albedos.where, albedos.max_dense);
     for (int ward = 0; ward < 2; ward++) {
@@ -76,7 +75,7 @@ TEST(white_materials_send_on_what_arrives_and_no_more)
 
 /* ---- light and view in each other's place ---- */
 
-TEST(reflectance_is_the_same_both_ways)
+TEST_LONG(reflectance_is_the_same_both_ways)
 {
     struct bsdf_probe *probes = *state;
     static const float roughnesses[] = {0.2f, 0.5f, 0.9f}, metallics[] = {0.0f, 0.5f, 1.0f};
@@ -121,7 +120,7 @@ TEST(reflectance_is_the_same_both_ways)
     assert_true(off < 1e-3); /* slopes of facets are differences of directions: their roundings by alpha of 0.04 */
 }
 
-TEST(ggx_is_that_of_the_other_integrators)
+TEST_LONG(ggx_is_that_of_the_other_integrators)
 {
     struct bsdf_probe *probes = *state;
     double off = 0.0;
@@ -149,6 +148,66 @@ TEST(ggx_is_that_of_the_other_integrators)
             }
     print_message("off by %.1e at most\n", off);
     assert_true(off < 1e-4);
+}
+
+/* ---- mirrors and layers of glTF's extensions ---- */
+
+/* KHR_materials_specular, clearcoat and iridescence: mirrors weaker than Fresnel's equations have it, stronger,
+ * none, and one that takes all; coats; films, of which those of 400 nm bend most. Bounds of albedos: fits' 0.007,
+ * and of coats over rough metal those of common/coat.glsl; of rough facets under films three stand in for all,
+ * which is off by up to 0.01 (common/film.glsl); over metal what a film does not mirror is gone. */
+static const struct layered {
+    struct bsdf_case c;
+    int probe;
+    double albedo_min, albedo_max;
+} layered[] = {
+    {{.ior = 1.5f, .specular = 0.5f, .specular_colour = 1.0f}, OTHER_MIRRORS, 0.985, 1.001},
+    {{.ior = 1.5f, .specular = 1.0f, .specular_colour = 6.0f}, OTHER_MIRRORS, 0.985, 1.001},
+    {{.ior = 1.5f, .specular = 0.0f, .specular_colour = 1.0f}, OTHER_MIRRORS, 0.985, 1.001},
+    {{.ior = 1.5f, .specular = 1.0f, .specular_colour = 25.0f}, OTHER_MIRRORS, 0.985, 1.001},
+    {{.ior = 1.5f, .transmission = 1.0f, .specular = 0.5f, .specular_colour = 6.0f}, OTHER_MIRRORS, 0.985, 1.001},
+    {{.metallic = 1.0f, .ior = 1.5f, .coat = 1.0f, .coat_roughness = 0.0f}, COATED, 0.945, 1.012},
+    {{.metallic = 1.0f, .ior = 1.5f, .coat = 1.0f, .coat_roughness = 0.9f}, COATED, 0.945, 1.012},
+    {{.ior = 1.5f, .coat = 1.0f, .coat_roughness = 0.4f}, COATED, 0.945, 1.012},
+    {{.transmission = 1.0f, .ior = 1.5f, .coat = 1.0f, .coat_roughness = 0.4f}, COATED, 0.945, 1.012},
+    /* A turned coat mirrors some light into the surface: its density alone is asked for. */
+    {{.metallic = 0.5f, .ior = 1.5f, .coat = 1.0f, .coat_roughness = 0.4f, .coat_turn = 0.3f}, COATED, 0.0, 1.012},
+    {{.ior = 1.5f, .film = 1.0f, .film_ior = 1.3f, .film_nm = 400.0f}, WITH_FILM, 0.98, 1.01},
+    {{.ior = 1.5f, .film = 1.0f, .film_ior = 1.8f, .film_nm = 400.0f}, WITH_FILM, 0.98, 1.01},
+    {{.ior = 1.5f, .film = 1.0f, .film_ior = 1.8f, .film_nm = 1200.0f}, WITH_FILM, 0.98, 1.01},
+    {{.ior = 1.5f, .transmission = 1.0f, .film = 1.0f, .film_ior = 1.8f, .film_nm = 300.0f},
+     WITH_FILM,
+     0.98,
+     1.01},
+    {{.ior = 1.5f, .metallic = 1.0f, .film = 1.0f, .film_ior = 2.0f, .film_nm = 250.0f}, WITH_FILM, 0.0, 1.001},
+};
+
+TEST_LONG(layers_follow_their_density_and_keep_the_light)
+{
+    static const float roughnesses[] = {0.1f, 0.4f, 0.9f};
+    static const double cosines[] = {1.0, 0.6, 0.2};
+    struct bsdf_probe *probes = *state;
+    for (size_t k = 0; k < COUNT(layered); k++) {
+        struct densities densities = {0};
+        struct albedos albedos = {.min_even = {1, 1}, .min_grain = {1, 1}};
+        for (size_t r = 0; r < COUNT(roughnesses); r++)
+            for (size_t v = 0; v < COUNT(cosines); v++) {
+                struct bsdf_case c = layered[k].c;
+                c.roughness = roughnesses[r];
+                c.base = 1.0f;
+                look_from(&c, cosines[v]);
+                sum_up(&probes[layered[k].probe], &c, false, &albedos);
+                if (v == 1 && r > 0 &&
+                    (c.coat <= 0.0f || c.coat_roughness > 0.0f)) /* smooth lobes have no density */
+                    hold_against_its_density(&probes[layered[k].probe], &c, false, &densities);
+            }
+        print_message("row %zu: %.1f deviations off at most; albedo %.3f to %.5f (%s)\n", k, densities.max_z,
+                      albedos.min_even[0], albedos.max, albedos.where);
+        assert_true(densities.max_z < 5.5); /* as above */
+        assert_true(densities.max_weight_off < 1e-4);
+        assert_true(albedos.max <= layered[k].albedo_max);
+        assert_true(albedos.min_even[0] > layered[k].albedo_min);
+    }
 }
 
 ALL_TESTS(bsdf_probes_open, bsdf_probes_close)

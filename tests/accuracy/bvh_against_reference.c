@@ -17,7 +17,7 @@
 
 #include <float.h>
 
-#define SIDE 256u
+#define SIDE 160u
 #define RAY_COUNT (SIDE * SIDE)
 #define EDGE_STEPS 6.0f
 /* One ray, moved so many ways: at the tip of a triangle of one degree one in 360 falls on it. Most need few. */
@@ -50,50 +50,6 @@ static void expect_ok(bool ok, const struct error *error)
 {
     if (!ok)
         fail_msg("%s: %s", error->field, error->text);
-}
-
-/* ---- a scene of ten thousand triangles ---- */
-
-static void add_bumpy_sphere(struct test_edits *edits, uint32_t id, uint32_t steps)
-{
-    uint32_t each = steps + 1, triangles = 2 * steps * steps;
-    float(*vertices)[3] = malloc((size_t)each * each * sizeof(*vertices));
-    uint32_t *indices = malloc(3 * (size_t)triangles * sizeof(*indices)), *out = indices;
-    for (uint32_t i = 0; i < each * each; i++) {
-        float theta = 3.14159265f * (float)(i / each) / (float)steps;
-        float phi = 6.2831853f * (float)(i % each) / (float)steps;
-        float radius = 1 + 0.05f * sinf(17 * theta) * sinf(13 * phi);
-        vertices[i][0] = radius * sinf(theta) * cosf(phi);
-        vertices[i][1] = radius * cosf(theta);
-        vertices[i][2] = radius * sinf(theta) * sinf(phi);
-    }
-    for (uint32_t i = 0; i < steps * steps; i++, out += 6) {
-        uint32_t a = i / steps * each + i % steps, b = a + each;
-        memcpy(out, (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, 6 * sizeof(*out));
-    }
-    test_mesh(edits, id, (const float(*)[3])vertices, each * each, indices, triangles);
-    free(vertices);
-    free(indices);
-}
-
-static struct scene *bumpy_scene(void)
-{
-    static const float floor_corners[4][3] = {{-6, -1, -6}, {6, -1, -6}, {6, -1, 6}, {-6, -1, 6}};
-    static const uint32_t floor_indices[6] = {0, 1, 2, 0, 2, 3};
-    struct test_edits edits = {.scene = test_scene_create()};
-    float m[12];
-    add_bumpy_sphere(&edits, 1, 72);
-    test_mesh(&edits, 2, floor_corners, 4, floor_indices, 2);
-    test_node(&edits, 1, 0, NODE_MESH, 2, NULL);
-    test_node(&edits, 2, 0, NODE_MESH, 1, NULL);
-    test_transform(m, -1, 1, 1, 1, 0.7f, 2.5f, 0.2f, 0.3f);
-    test_node(&edits, 3, 0, NODE_MESH, 1, m);
-    test_transform(m, 0.6f, 1.5f, 0.9f, 2, 0.9f, -2.5f, 0.4f, -0.5f);
-    test_node(&edits, 4, 0, NODE_MESH, 1, m);
-    test_transform(m, 0.5f, 0.5f, -0.5f, 0, 2.1f, 0.3f, -0.5f, 2.4f);
-    test_node(&edits, 5, 0, NODE_MESH, 1, m);
-    test_commit(&edits);
-    return edits.scene;
 }
 
 /* ---- rays ---- */
@@ -414,41 +370,14 @@ TEST(bvh_agrees_with_the_reference_on_a_triangle_soup_in_mirrored_squeezed_and_n
     expect_agreement(test_scene_soup());
 }
 
-TEST(bvh_agrees_with_the_reference_on_spheres_among_triangles)
+TEST_LONG(bvh_agrees_with_the_reference_on_spheres_among_triangles)
 {
     expect_agreement(test_scene_spheres());
 }
 
-TEST(bvh_agrees_with_the_reference_on_cutouts_glass_panes_and_a_disc)
+TEST_LONG(bvh_agrees_with_the_reference_on_cutouts_glass_panes_and_a_disc)
 {
     expect_agreement(test_scene_translucent());
-}
-
-TEST(bvh_agrees_with_the_reference_on_40K_bumpy_triangles_in_instances)
-{
-    expect_agreement(bumpy_scene());
-}
-
-/* What the comparison forgives must not be what it is there to find: on a surface that is a thousand times wider
- * than a rounding step, nearly no wrong answer lies on an edge. */
-TEST(a_wrong_answer_within_a_surface_is_no_edge)
-{
-    struct arena arena;
-    arena_init(&arena, bumpy_scene());
-    make_primary(&arena);
-    struct hit *hits = trace(&arena, arena.bvh, arena.rays, RAY_COUNT, RAYS_PRIMARY);
-    uint32_t tried = 0, called_edges = 0;
-    for (uint32_t i = 0; i < RAY_COUNT; i += 97) {
-        if (hits[i].distance < 0)
-            continue;
-        hits[i].distance = i % 2 ? -1.0f : hits[i].distance * 1.001f;
-        tried++;
-        called_edges += is_on_edge(&arena, RAYS_PRIMARY, i, hits);
-    }
-    free(hits);
-    arena_finish(&arena);
-    assert_in_range(tried, 100, RAY_COUNT);
-    assert_in_range(called_edges, 0, tried / 100);
 }
 
 /* Debian's Embree ends the process at a ray whose numbers it does not take, in the world or in an instance. */
@@ -456,7 +385,7 @@ TEST(rays_that_embree_would_end_the_process_at_hit_nothing)
 {
     static const float odd[] = {NAN, INFINITY, -INFINITY, 1e19f, -3e38f, 4e17f};
     struct arena arena;
-    arena_init(&arena, bumpy_scene());
+    arena_init(&arena, test_scene_soup());
     make_inside(&arena);
     for (uint32_t i = 0; i < 64; i++) {
         float *of = i % 2 ? arena.rays[i].origin_t_min : arena.rays[i].direction_t_max;
@@ -482,21 +411,21 @@ TEST(a_transform_that_embree_cannot_invert_is_refused_by_name)
 {
     const struct tracer_update all = {.changed = CHANGED_SCENE};
     struct arena arena;
-    arena_init(&arena, bumpy_scene());
+    arena_init(&arena, test_scene_soup());
     for (int round = 0; round < 2; round++) {
         struct test_edits edits = {.scene = arena.scene};
         struct scene_changes changes;
         struct error error = {0};
         float m[12], scale = round == 0 ? 1e-12f : 1e-3f;
         test_transform(m, scale, scale, scale, 1, 0.3f, 0, 0, 0);
-        test_node(&edits, 4, 0, NODE_MESH, 1, m);
+        test_node(&edits, 2, 0, NODE_MESH, 10, m);
         test_commit(&edits);
         expect_ok(gpu_scene_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
         bool ok = tracer_update(arena.reference, &arena.gpu, &all, &error);
         assert_int_equal(ok, round == 1);
         assert_int_equal(error.kind, round == 0 ? ERROR_UNSUPPORTED : ERROR_NONE);
         if (round == 0)
-            assert_string_equal(error.field, "node 4.parent_from_node");
+            assert_string_equal(error.field, "node 2.parent_from_node");
     }
     arena_finish(&arena);
 }
@@ -505,16 +434,16 @@ TEST(a_scene_beyond_what_embree_sees_is_refused)
 {
     const struct tracer_update all = {.changed = CHANGED_SCENE};
     struct arena arena;
-    struct test_edits edits = {.scene = bumpy_scene()};
+    struct test_edits edits = {.scene = test_scene_soup()};
     struct scene_changes changes;
     struct error error = {0};
     float m[12];
     arena_init(&arena, edits.scene);
     /* In the space of what is small, what is large lies beyond Embree's numbers. */
     test_transform(m, 1e-8f, 1e-8f, 1e-8f, 1, 0.3f, 0, 0, 0);
-    test_node(&edits, 4, 0, NODE_MESH, 1, m);
+    test_node(&edits, 2, 0, NODE_MESH, 10, m);
     test_transform(m, 5e9f, 5e9f, 5e9f, 1, 0.3f, 0, 0, 0);
-    test_node(&edits, 3, 0, NODE_MESH, 1, m);
+    test_node(&edits, 3, 0, NODE_MESH, 10, m);
     test_commit(&edits);
     expect_ok(gpu_scene_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
     assert_false(tracer_update(arena.reference, &arena.gpu, &all, &error));
@@ -530,7 +459,7 @@ TEST(embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards)
     const uint64_t limit = device->memory_limit_bytes;
     struct arena arena;
     struct error error = {0};
-    arena_init(&arena, bumpy_scene());
+    arena_init(&arena, test_scene_soup());
     const uint64_t needed = arena.reference->stats.device_bytes, used = device->memory_used_bytes;
     assert_true(needed > 0);
     tracer_destroy(arena.reference);

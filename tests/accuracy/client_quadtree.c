@@ -31,40 +31,6 @@ static void expect_same_nodes(struct sides *sides)
     assert_true(other <= (device->facts.software ? 0 : LAYERS * slice_nodes / 1000));
 }
 
-/* ---- what nodes claim ---- */
-
-/* As in nodes.comp: of w, for what rounds. */
-#define ROUNDING 2.384e-7
-
-/* The most that the plane which stands for a texel is off at the texel's centre, as a share of what the bound
- * allows there; and the share of leaves among the planes. */
-struct claim {
-    double worst, leaves;
-};
-
-static struct claim claim_of(const struct sides *sides, const uint32_t (*nodes)[2], uint32_t layer)
-{
-    struct quadtree_uniforms u = sides->daemon.store.uniforms;
-    struct claim claim = {0};
-    uint32_t texels = 0;
-    for (uint32_t i = 0; i < COUNT; i++) {
-        const uint32_t x = i % WIDTH, y = i / WIDTH;
-        const double w = (double)sides->w[layer][i], near = fmax(1 - (double)u.bounds[3] * w, 0);
-        struct tree_plane plane;
-        const uint32_t level = tree_find(&u, nodes, 0, x, y, &plane);
-        const double at = tree_plane_at(&plane, level, x >> level, y >> level, x + 0.5, y + 0.5);
-        if (w == 0) {
-            assert_true(plane.w == 0);
-            continue;
-        }
-        claim.worst = fmax(claim.worst, (fabs(at - w) - ROUNDING * w) / ((double)u.bounds[0] * near * near));
-        claim.leaves += pow(0.25, level);
-        texels++;
-    }
-    claim.leaves /= texels;
-    return claim;
-}
-
 TEST(nodes_over_the_same_leaves_are_the_same_bits)
 {
     struct sides *sides = made_up();
@@ -74,25 +40,6 @@ TEST(nodes_over_the_same_leaves_are_the_same_bits)
     load_bundled(&model, "carousel.glb");
     sides = rendered(model.scene);
     expect_same_nodes(sides);
-    sides_destroy(sides);
-    load_model_finish(&model);
-}
-
-/* The daemon has the planes of primitives, the client differences of depths: other leaves, and other nodes. */
-TEST(planes_of_both_are_where_the_layers_are_within_the_bound)
-{
-    struct loaded_model model;
-    load_bundled(&model, "carousel.glb");
-    struct sides *sides = rendered(model.scene);
-    for (uint32_t l = 0; l < LAYERS; l++) {
-        const uint32_t(*daemon)[2] =
-            (const void *)(sides->daemon.nodes + l * sides->daemon.store.uniforms.slice_nodes);
-        const struct claim own = claim_of(sides, daemon, l), other = claim_of(sides, client_nodes(sides, l), l);
-        print_message("layer %u: off by %.3f and %.3f of the bound, %.1f and %.1f %% leaves\n", l, own.worst,
-                      other.worst, 100 * own.leaves, 100 * other.leaves);
-        assert_true(own.worst <= 1 && other.worst <= 1);
-        assert_true(l > 0 || (own.worst > 0.2 && other.worst > 0.2)); /* else merging would stop too early */
-    }
     sides_destroy(sides);
     load_model_finish(&model);
 }

@@ -78,7 +78,7 @@ static double contrast(const struct frame_result *picture, const struct frame_re
  * must. */
 static void expect_detail_without_noise(struct fixture *fixture)
 {
-    struct frame_result truth = rendered(fixture, DENOISE_OFF, 1024, 7);
+    struct frame_result truth = rendered(fixture, DENOISE_OFF, 256, 7);
     for (uint32_t samples = 1; samples <= 16; samples *= 4) {
         struct frame_result noisy = rendered(fixture, DENOISE_OFF, samples, 1);
         struct frame_result denoised = rendered(fixture, DENOISE_ON, samples, 1);
@@ -97,7 +97,7 @@ TEST(a_texture_keeps_its_detail_while_its_noise_goes)
 }
 
 /* The same as the wall itself: of a mirror's own normal and albedo one sample would be left as it is. */
-TEST(so_it_does_in_a_mirror)
+TEST_LONG(so_it_does_in_a_mirror)
 {
     struct fixture *fixture = *state;
     a_checker(fixture, BACK);
@@ -108,61 +108,7 @@ TEST(so_it_does_in_a_mirror)
     expect_detail_without_noise(fixture);
 }
 
-/* Balls of four pixels across, of rough metal, that mirror panels that glow behind the eye. */
-static void small_balls(struct fixture *fixture)
-{
-    enum { ROW = 8 };
-    float centres_radii[ROW * ROW][4] = {{0}};
-    path_begin(fixture, TRACER_BVH, 1);
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
-    struct scene_material *metal = fixture_material(fixture), *glow = fixture_material(fixture);
-    metal->metallic = 1.0f;
-    metal->roughness = 0.3f;
-    for (int c = 0; c < 3; c++) {
-        glow->base_colour[c] = 0.0f;
-        glow->emission[c] = 5.0f;
-    }
-    fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, metal->base.id);
-    struct scene_spheres *balls = &fixture->edits[fixture->edit_count - 2].set.spheres;
-    for (int i = 0; i < ROW * ROW; i++) {
-        centres_radii[i][0] = 0.25f * ((float)(i % ROW) - 3.5f);
-        centres_radii[i][1] = 0.25f * ((float)(i / ROW) - 3.5f);
-        centres_radii[i][3] = 0.125f;
-    }
-    blob_unref(balls->centres_radii);
-    balls->centres_radii = fixture_blob(centres_radii, sizeof(centres_radii));
-    balls->sphere_count = balls->ranges->count = ROW * ROW;
-    for (int i = 0; i < 4; i++) {
-        const float x = i % 2 ? 3.0f : -3.0f, y = i / 2 ? 3.0f : -3.0f;
-        const float place[12] = {-1, 0, 0, x, 0, 1, 0, y, 0, 0, -1, 9};
-        fixture_square(fixture, 2.8f, glow->base.id, place);
-    }
-    fixture_environment(fixture, 0.1f, 0.1f, 0.1f);
-    fixture->request.camera.fov_y = 0.0f;
-    fixture->request.camera.ortho_height = 2.0f;
-}
-
-/* Around a pixel one or two see such a surface, or none: if these alone said what is usual there, much of what the
- * balls mirror would be taken for specks. */
-TEST(what_small_balls_mirror_is_no_speck)
-{
-    struct fixture *fixture = *state;
-    small_balls(fixture);
-    struct frame_result truth = rendered(fixture, DENOISE_OFF, 1024, 7);
-    for (uint32_t samples = 4; samples <= 16; samples *= 4) {
-        double squares[2] = {0.0, 0.0};
-        for (uint64_t seed = 1; seed <= 4; seed++)
-            for (int on = 0; on < 2; on++) {
-                struct frame_result picture = rendered(fixture, on ? DENOISE_ON : DENOISE_OFF, samples, seed);
-                squares[on] += pow(distance(&picture, &truth), 2.0);
-                frame_result_finish(&picture);
-            }
-        assert_true(squares[1] <= squares[0]);
-    }
-    frame_result_finish(&truth);
-}
-
-TEST(pictures_without_noise_stay_as_they_are)
+TEST_LONG(pictures_without_noise_stay_as_they_are)
 {
     struct fixture *fixture = *state;
     static const unsigned integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_RAYCAST};
@@ -199,7 +145,7 @@ TEST(a_hard_shadow_stays_hard)
 
 /* A filter that did not end would leave its blur: here it moves the picture by less than its noise is, and that
  * falls as samples are added. */
-TEST(with_many_samples_the_denoised_picture_is_the_noisy_one)
+TEST_LONG(with_many_samples_the_denoised_picture_is_the_noisy_one)
 {
     struct fixture *fixture = *state;
     a_checker(fixture, FRONT);
@@ -216,7 +162,7 @@ TEST(with_many_samples_the_denoised_picture_is_the_noisy_one)
     assert_true(before < 0.005);
 }
 
-TEST(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
+TEST_LONG(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);

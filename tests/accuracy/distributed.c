@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The integrator `distributed` has no bias, and its error falls as 1 / sqrt(n) or faster: against whitted where
  * both mean the same, against itself at many samples, and against what rough mirrors and windows do with light. */
-#include "tests/accuracy/render_fixture.h"
+#include "tests/accuracy/path_fixture.h"
 
 #include "trace/tracer.h"
 #include "tests/harness/test.h"
-
-enum { EDGE = 16, PIXELS = EDGE * EDGE };
 
 /* ---- scenes ---- */
 
@@ -131,143 +129,84 @@ static void picture(struct fixture *fixture, uint32_t samples, uint64_t seed, do
 
 static void begin(struct fixture *fixture, void (*build)(struct fixture *fixture))
 {
-    fixture_clear((void **)&fixture);
-    fixture->request.width = fixture->request.height = EDGE;
+    path_begin(fixture, TRACER_BVH, 4);
+    fixture->request.filter = FILTER_BLACKMAN_HARRIS;
     fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
-    fixture->request.primary = PRIMARY_TRACE;
     motion_of_scene = build == in_motion ? &falling : NULL;
     build(fixture);
 }
 
-struct moments {
-    double sum, squares;
-    uint32_t count;
-};
-
-static void add(struct moments *moments, double value)
-{
-    moments->sum += value;
-    moments->squares += value * value;
-    moments->count++;
-}
-
-static double mean_of(const struct moments *moments)
-{
-    return moments->sum / moments->count;
-}
-
-/* Of the mean. */
-static double standard_error_of(const struct moments *moments)
-{
-    double mean = mean_of(moments), variance = fmax(moments->squares / moments->count - mean * mean, 0.0);
-    return sqrt(variance / (moments->count - 1));
-}
-
-/* ---- against whitted ---- */
-
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(where_all_is_smooth_the_mean_is_whitteds_picture)
+/* What whitted cuts off (PATH_WEIGHT_MIN) is 1/1024 of what lies there, some 0.5, a few times at most; 1e-3 of it.
+ */
+TEST_LONG(where_all_is_smooth_the_mean_is_whitteds_picture)
 {
+    enum { BLOCKS = 16, ACROSS = EDGE / 4, SAMPLES = 64 };
     struct fixture *fixture = *state;
-    enum { SEEDS = 16, BLOCKS = 16, SAMPLES = 64 };
-    double own[PIXELS], whitted[PIXELS];
-    struct moments differences[BLOCKS] = {0}, whole = {0};
+    double own[PIXELS], whitted[PIXELS], blocks[BLOCKS][SEEDS] = {{0}}, whole[SEEDS] = {0};
     begin(fixture, smooth_things);
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
-        double sums[BLOCKS] = {0}, sum = 0.0;
         fixture->request.integrator = INTEGRATOR_WHITTED; /* the same places in the pixels */
         picture(fixture, SAMPLES, seed, whitted);
         fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
         picture(fixture, SAMPLES, seed, own);
         for (uint32_t i = 0; i < PIXELS; i++) {
-            sums[i / EDGE / 4 * 4 + i % EDGE / 4] += (own[i] - whitted[i]) / (PIXELS / BLOCKS);
-            sum += (own[i] - whitted[i]) / PIXELS;
+            blocks[i / EDGE / ACROSS * 4 + i % EDGE / ACROSS][seed] += (own[i] - whitted[i]) / (PIXELS / BLOCKS);
+            whole[seed] += (own[i] - whitted[i]) / PIXELS;
         }
-        for (int b = 0; b < BLOCKS; b++)
-            add(&differences[b], sums[b]);
-        add(&whole, sum);
     }
-    print_message("all: off by %+.1e (standard error %.1e)\n", mean_of(&whole), standard_error_of(&whole));
-    /* Student's t with 15 degrees of freedom is beyond 5 in 1 of 6000 cases, of which there are 17. What whitted
-     * cuts off (PATH_WEIGHT_MIN) is 1/1024 of what lies there, some 0.5, a few times at most; 1e-3 of it. */
-    assert_near(mean_of(&whole), 0.0, 5.0 * standard_error_of(&whole) + 1e-3);
+    assert_mean(mean_of(whole, SEEDS), 0.0, 1e-3);
     for (int b = 0; b < BLOCKS; b++)
-        assert_near(mean_of(&differences[b]), 0.0, 5.0 * standard_error_of(&differences[b]) + 1e-3);
-    assert_true(standard_error_of(&whole) < 2e-3); /* else nothing is shown */
+        assert_mean(mean_of(blocks[b], SEEDS), 0.0, 1e-3);
+    assert_true(mean_of(whole, SEEDS).error < 2e-3); /* else nothing is shown */
 }
 
-/* ---- against itself ---- */
-
-/* Bias and slope of the error over 4, 16, 64 and 256 samples, against 4096 of the reference's. */
-static void expect_convergence(struct fixture *fixture, const char *name, double slope_max)
+/* Bias and slope of the error over 4, 16, 64 and 256 samples, against 4096 of the reference's. Independent samples
+ * have a slope of -0.5. 4096 errors know a deviation to 1 %, more where the errors of a few pixels are large; 0.03
+ * of the slope. */
+TEST_LONG(soft_things_converge_without_bias_as_fast_as_independent_samples)
 {
-    enum { STEPS = 4, SEEDS = 4, TRUTH_SAMPLES = 4096 };
-    double truth[PIXELS], found[PIXELS], x_sum = 0.0, y_sum = 0.0, xx = 0.0, xy = 0.0;
-    fixture->request.tracer = tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : 0;
-    picture(fixture, TRUTH_SAMPLES, 99, truth);
-    fixture->request.tracer = 0;
-    for (uint32_t step = 0, samples = 4; step < STEPS; step++, samples *= 4) {
-        struct moments means = {0}, offs = {0};
-        for (uint64_t seed = 0; seed < SEEDS; seed++) {
-            double sum = 0.0;
-            picture(fixture, samples, seed, found);
-            for (uint32_t i = 0; i < PIXELS; i++) {
-                add(&offs, found[i] - truth[i]);
-                sum += (found[i] - truth[i]) / PIXELS;
+    enum { STEPS = 4, REPEATS = 4, TRUTH_SAMPLES = 4096 };
+    static const struct {
+        const char *name;
+        void (*build)(struct fixture *fixture);
+    } scenes[] = {{"soft shadow", a_soft_shadow},
+                  {"gloss", gloss},
+                  {"frosted glass", frosted_glass},
+                  {"out of focus", out_of_focus},
+                  {"in motion", in_motion}};
+    struct fixture *fixture = *state;
+    for (size_t k = 0; k < COUNT(scenes); k++) {
+        double truth[PIXELS], found[PIXELS], x_sum = 0.0, y_sum = 0.0, xx = 0.0, xy = 0.0;
+        begin(fixture, scenes[k].build);
+        fixture->request.tracer = tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : TRACER_BVH;
+        picture(fixture, TRUTH_SAMPLES, 99, truth);
+        fixture->request.tracer = TRACER_BVH;
+        for (uint32_t step = 0, samples = 4; step < STEPS; step++, samples *= 4) {
+            double sum = 0.0, squares = 0.0;
+            for (uint64_t seed = 0; seed < REPEATS; seed++) {
+                picture(fixture, samples, seed, found);
+                for (uint32_t i = 0; i < PIXELS; i++) {
+                    sum += (found[i] - truth[i]) / (REPEATS * PIXELS);
+                    squares += (found[i] - truth[i]) * (found[i] - truth[i]) / (REPEATS * PIXELS);
+                }
             }
-            add(&means, sum);
+            double x = log(samples), y = log(sqrt(squares));
+            print_message("%-14s %4u samples: off by %+.1e in the mean, %.1e each\n", scenes[k].name, samples, sum,
+                          sqrt(squares));
+            /* Pixels are independent. The truth has an error, too: at most a quarter of the last step's. */
+            assert_near(sum, 0.0, 4.5 * sqrt(squares / (REPEATS * PIXELS)) + 1e-5);
+            x_sum += x;
+            y_sum += y;
+            xx += x * x;
+            xy += x * y;
         }
-        double rms = sqrt(offs.squares / offs.count), x = log(samples), y = log(rms);
-        /* Pixels are independent: the standard error of the mean of all. */
-        double standard_error = rms / sqrt(offs.count);
-        print_message("%-14s %4u samples: off by %+.1e in the mean (standard error %.1e), %.1e each\n", name,
-                      samples, mean_of(&offs), standard_error, rms);
-        /* The truth has an error, too: that of 256 / 4096 of the samples, at most a quarter of the last step's. */
-        assert_near(mean_of(&offs), 0.0, 4.5 * standard_error + 1e-5);
-        x_sum += x;
-        y_sum += y;
-        xx += x * x;
-        xy += x * y;
+        double slope = (STEPS * xy - x_sum * y_sum) / (STEPS * xx - x_sum * x_sum);
+        if (!(slope <= -0.47))
+            fail_msg("%s: slope %.2f", scenes[k].name, slope);
     }
-    double slope = (STEPS * xy - x_sum * y_sum) / (STEPS * xx - x_sum * x_sum);
-    print_message("%-14s slope %.2f\n", name, slope);
-    assert_true(slope <= slope_max);
-}
-
-/* Independent samples have a slope of -0.5. 1024 errors know a deviation to 2 %, more where the errors of a few
- * pixels are large; twice that makes 0.03 of the slope. */
-#define SLOPE_MAX (-0.47)
-
-TEST(soft_shadows_converge_without_bias)
-{
-    begin(*state, a_soft_shadow);
-    expect_convergence(*state, "soft shadow", SLOPE_MAX);
-}
-
-TEST(glossy_reflections_converge_without_bias)
-{
-    begin(*state, gloss);
-    expect_convergence(*state, "gloss", SLOPE_MAX);
-}
-
-TEST(frosted_glass_converges_without_bias)
-{
-    begin(*state, frosted_glass);
-    expect_convergence(*state, "frosted glass", SLOPE_MAX);
-}
-
-TEST(depth_of_field_converges_without_bias)
-{
-    begin(*state, out_of_focus);
-    expect_convergence(*state, "out of focus", SLOPE_MAX);
-}
-
-TEST(motion_blur_converges_without_bias)
-{
-    begin(*state, in_motion);
-    expect_convergence(*state, "in motion", SLOPE_MAX);
 }
 
 /* A ball that glows before nothing, a pixel within its way: the share of the time that it is there. */

@@ -258,7 +258,7 @@ TEST(the_short_way_of_eyes_finds_what_their_rays_do)
     };
     (void)state;
     if (!tracer_impl_by_number(TRACER_QUADTREE)) {
-        printf("the build leaves the tracer out\n");
+        printf("skipped: the build leaves the tracer out\n");
         skip();
     }
     struct scene *scene = scene_of_things();
@@ -290,7 +290,7 @@ TEST(eyes_that_need_rays_have_no_short_way)
                             far = {{1, 0, 0}, 0, 1, 0};
     (void)state;
     if (!tracer_impl_by_number(TRACER_QUADTREE)) {
-        printf("the build leaves the tracer out\n");
+        printf("skipped: the build leaves the tracer out\n");
         skip();
     }
     struct scene *scene = scene_of_things();

@@ -122,7 +122,7 @@ TEST(colours_are_those_of_all_wavelengths)
 }
 
 /* A film of no thickness, and one that is as dense as what is below it, is none: Schlick's curve is left. */
-TEST(no_film_is_no_film)
+TEST_LONG(no_film_is_no_film)
 {
     enum { CASES = 8 };
     struct film_case cases[CASES];

@@ -155,7 +155,7 @@ static double noise_of(struct fixture *fixture, float clamp, uint32_t samples, d
 
 /* Paths from a floor find a small light, which a plate hides from it, by way of a mirror above both. A rougher
  * mirror sends the floor as much light in all, as both are large, but to other places. */
-TEST(mirrors_behind_rough_surfaces_cast_their_light_with_less_noise)
+TEST_LONG(mirrors_behind_rough_surfaces_cast_their_light_with_less_noise)
 {
     struct fixture *fixture = *state;
     double means[2], mean;

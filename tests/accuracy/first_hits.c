@@ -34,72 +34,52 @@ static void assert_chosen(struct fixture *fixture, unsigned tracer, enum primary
     frame_result_finish(&other);
 }
 
-TEST(a_device_of_which_nothing_is_known_rasterises)
+#define MIXTURE_SHARE (8.0f / (96 * 72)) /* 3 spheres, 4 triangles and a disc on so many pixels */
+
+/* `one`, `several`: primitives a pixel from which tracing was measured to be faster, of one sample and of several.
+ */
+static const struct {
+    unsigned tracer;
+    bool measured;
+    float one, several;
+    uint32_t samples, width, height;
+    enum primary_kind expected;
+} rows[] = {
+    {TRACER_BVH, false, 0.0f, 0.0f, 4, 96, 72, PRIMARY_RASTER},
+    {TRACER_BVH, true, 1e9f, 0.0f, 4, 96, 72, PRIMARY_TRACE},
+    {TRACER_BVH, true, 0.0f, 1e9f, 4, 96, 72, PRIMARY_RASTER},
+    {TRACER_BVH, true, 1e9f, MIXTURE_SHARE - 1e-6f, 4, 96, 72, PRIMARY_TRACE},
+    {TRACER_BVH, true, 1e9f, MIXTURE_SHARE + 1e-6f, 4, 96, 72, PRIMARY_RASTER},
+    {TRACER_BVH, false, 0.0f, 0.0f, 16, 4, 3, PRIMARY_RASTER}, /* many primitives a pixel are not enough */
+    {TRACER_NAIVE, true, 0.0f, 0.0f, 4, 96, 72, PRIMARY_RASTER},
+    {TRACER_LDC, true, 0.0f, 0.0f, 4, 96, 72, PRIMARY_RASTER},
+    {TRACER_ABUFFER, true, 0.0f, 0.0f, 4, 96, 72, PRIMARY_RASTER},
+    {TRACER_REFERENCE, false, 0.0f, 0.0f, 4, 96, 72, PRIMARY_TRACE},
+};
+
+static void expect_choices(struct fixture *fixture, bool of_bvh)
 {
-    struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.samples = 4;
-    device->measured = (struct gpu_measured){0};
-    assert_chosen(fixture, TRACER_BVH, PRIMARY_RASTER);
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        if ((rows[i].tracer == TRACER_BVH) != of_bvh || !tracer_impl_by_number(rows[i].tracer))
+            continue;
+        take_as_measured(rows[i].one, rows[i].several);
+        device->measured.known = rows[i].measured;
+        fixture->request.samples = rows[i].samples;
+        fixture->request.width = rows[i].width;
+        fixture->request.height = rows[i].height;
+        assert_chosen(fixture, rows[i].tracer, rows[i].expected);
+    }
 }
 
 TEST(bvh_traces_first_hits_where_that_was_measured_to_be_faster)
 {
-    struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.samples = 4;
-    take_as_measured(1e9f, 0.0f);
-    assert_chosen(fixture, TRACER_BVH, PRIMARY_TRACE);
-    take_as_measured(0.0f, 1e9f);
-    assert_chosen(fixture, TRACER_BVH, PRIMARY_RASTER);
+    expect_choices(*state, true);
 }
 
-/* 3 spheres, 4 triangles and a disc on 96 x 72 pixels. */
-TEST(the_number_of_primitives_a_pixel_decides)
+TEST_LONG(tracers_that_sample_rasterise_first_hits_and_the_reference_traces_them)
 {
-    struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.samples = 4;
-    take_as_measured(1e9f, 8.0f / (96 * 72) - 1e-6f);
-    assert_chosen(fixture, TRACER_BVH, PRIMARY_TRACE);
-    take_as_measured(1e9f, 8.0f / (96 * 72) + 1e-6f);
-    assert_chosen(fixture, TRACER_BVH, PRIMARY_RASTER);
-}
-
-/* Many primitives a pixel are not enough. */
-TEST(software_gl_rasterises_scenes_of_few_primitives)
-{
-    struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.samples = 16;
-    fixture->request.width = 4;
-    fixture->request.height = 3;
-    device->measured = (struct gpu_measured){0};
-    assert_chosen(fixture, TRACER_BVH, PRIMARY_RASTER);
-}
-
-TEST(tracers_that_sample_and_brute_force_keep_rasterised_first_hits)
-{
-    struct fixture *fixture = *state;
-    static const unsigned tracers[] = {TRACER_LDC, TRACER_ABUFFER, TRACER_NAIVE};
-    fixture_mixture(fixture);
-    fixture->request.samples = 4;
-    take_as_measured(0.0f, 0.0f);
-    for (size_t i = 0; i < sizeof(tracers) / sizeof(tracers[0]); i++)
-        assert_chosen(fixture, tracers[i], PRIMARY_RASTER);
-}
-
-TEST(the_reference_traces_its_first_hits_on_every_device)
-{
-    struct fixture *fixture = *state;
-    if (!tracer_impl_by_number(TRACER_REFERENCE)) {
-        printf("this build is without Embree\n");
-        skip();
-    }
-    fixture_mixture(fixture);
-    fixture->request.samples = 4;
-    device->measured = (struct gpu_measured){0};
-    assert_chosen(fixture, TRACER_REFERENCE, PRIMARY_TRACE);
+    expect_choices(*state, false);
 }
 
 /* The choice may not change with the number of samples that a frame adds. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames whose waves are queued without waiting for their counts, as on a GPU: the same pictures as of frames that
- * wait, and how often the host waits. The device is taken for hardware, whatever it is. */
+/* Frames whose waves are queued without waiting for their counts, as on a GPU: how often the host waits, and what
+ * it does where there is too little room for what was queued. The device is taken for hardware, whatever it is. */
 #include "protocol/tracers.h"
 #include "render/frame_state.h"
 #include "render/layers.h"
@@ -29,16 +29,15 @@ static int take_for_what_it_is(void **state)
 ALL_TESTS(take_for_hardware, take_for_what_it_is)
 EACH_TEST(fixture_clear, NULL)
 
-/* One that waits for its counts, and one that does not. */
-static void render_both(struct fixture *fixture, struct frame_result *waiting, struct frame_result *ahead)
+/* One picture, so that most tests share their programs. */
+static void build(struct fixture *fixture)
 {
-    frame_renderer_queue_ahead(fixture->renderer, false);
-    *waiting = fixture_render(fixture);
-    frame_renderer_queue_ahead(fixture->renderer, true);
-    *ahead = fixture_render(fixture);
-    assert_same_picture(waiting, ahead);
-    assert_int_equal(ahead->shadow_rays, waiting->shadow_rays);
-    assert_int_equal(ahead->secondary_rays, waiting->secondary_rays);
+    fixture_mixture(fixture);
+    fixture->request.width = 24;
+    fixture->request.height = 18;
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 64;
 }
 
 /* The second of two frames: the first compiles, and brings the scene to the device. */
@@ -67,14 +66,17 @@ static void assert_ahead_is_as_waiting(struct fixture *fixture, const char *what
     frame_result_finish(&ahead);
 }
 
-TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
+TEST(the_host_waits_once_for_a_picture_that_is_the_same)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.width = 24;
-    fixture->request.height = 18;
-    fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 64;
-    static const struct form {
+    build(fixture);
+    assert_ahead_is_as_waiting(fixture, "whitted, bvh");
+}
+
+TEST_LONG(the_host_waits_once_whatever_the_integrator_tracer_and_layers)
+{
+    struct fixture *fixture = *state;
+    static const struct {
         unsigned integrator, depth, samples;
     } forms[] = {{INTEGRATOR_WHITTED, 4, 1},
                  {INTEGRATOR_DISTRIBUTED, 4, 4},
@@ -82,13 +84,10 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
                  {INTEGRATOR_AO, 1, 2},
                  {INTEGRATOR_RAYCAST, 4, 1}};
     static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_LDC, TRACER_ABUFFER, TRACER_RAYSPACE};
+    build(fixture);
     for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++)
         for (size_t k = 0; k < sizeof(tracers) / sizeof(tracers[0]); k++) {
             char what[64];
-            /* Those of rays of every kind, and by every tracer; the others do not meet in new ways. */
-            if (tracers[k] != TRACER_BVH && forms[i].integrator != INTEGRATOR_WHITTED &&
-                forms[i].integrator != INTEGRATOR_PATH && !getenv("FARLIGHT_TEST_LONG"))
-                continue;
             fixture->request.integrator = forms[i].integrator;
             fixture->request.depth = forms[i].depth;
             fixture->request.samples = forms[i].samples;
@@ -97,60 +96,19 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
             snprintf(what, sizeof(what), "integrator %u, tracer %u", forms[i].integrator, tracers[k]);
             assert_ahead_is_as_waiting(fixture, what);
         }
-}
-
-/* Its hits are listed behind those of what is rasterised, and its shadow rays may come in batches of their own. */
-TEST(a_ground_is_the_same_however_its_rays_are_cut)
-{
-    struct fixture *fixture = *state;
-    static const unsigned integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_DISTRIBUTED, INTEGRATOR_PATH,
-                                           INTEGRATOR_AO};
-    fixture_mixture(fixture);
-    struct scene_material *glow = fixture_material(fixture);
-    const float up[12] = {1, 0, 0, 0.3f, 0, 1, 0, 0.9f, 0, 0, 1, 0.2f};
-    glow->double_sided = true;
-    glow->emission[0] = glow->emission[1] = glow->emission[2] = 4.0f;
-    fixture_square(fixture, 0.3f, glow->base.id, up);
-    fixture->request.width = 24;
-    fixture->request.height = 18;
-    fixture->request.samples = 2;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.background = BACKGROUND_TRANSPARENT;
-    fixture_look(fixture, 0.5f, 5.0f, 6.0f, 1.2f);
-    fixture->request.ground = (struct frame_ground){
-        .centre_world = {0.0f, -2.0f, 0.0f}, .normal_world = {0.0f, 1.0f, 0.0f}, .radius = 100.0f};
-    for (size_t i = 0; i < sizeof(integrators) / sizeof(integrators[0]); i++) {
-        fixture->request.integrator = integrators[i];
-        fixture->request.primary = i % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
-        assert_ahead_is_as_waiting(fixture, "a ground");
-        struct frame_result whole = render(fixture, false);
-        frame_renderer_set_capacity(fixture->renderer, 100, 130);
-        struct frame_result cut = render(fixture, false);
-        frame_renderer_set_capacity(fixture->renderer, 0, 0);
-        assert_same_picture(&whole, &cut);
-        assert_int_equal(whole.shadow_rays, cut.shadow_rays);
-        uint32_t shadowed = 0;
-        for (uint32_t k = 0; k < 24 * 18; k++)
-            shadowed +=
-                fixture_pixel(&whole, k % 24, k / 24)[3] > 0.2f && fixture_pixel(&whole, k % 24, k / 24)[3] < 0.8f;
-        assert_true(shadowed > 4);
-        frame_result_finish(&whole);
-        frame_result_finish(&cut);
-    }
+    fixture->request.layers = (1u << LAYER_COUNT) - 1;
+    assert_ahead_is_as_waiting(fixture, "all layers");
 }
 
 /* Only the device knows how many rays there are. Slices have other sizes where they are queued: a hierarchy of its
  * own each, so tests differ a little. */
-TEST(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
+TEST_LONG(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
+    build(fixture);
     fixture->request.width = 48;
     fixture->request.height = 36;
     fixture->request.tracer = TRACER_RAYSPACE;
-    fixture->request.integrator = INTEGRATOR_WHITTED;
-    fixture->request.depth = 4;
-    fixture->request.primary = PRIMARY_TRACE;
     static const char *const kinds[RAY_COUNT] = {"primary", "secondary", "shadow"};
     for (uint32_t mode = RAYSPACE_MODE_JOINT; mode <= RAYSPACE_MODE_FLAT; mode++) {
         fixture->request.tracer_options.rayspace.mode = mode;
@@ -177,68 +135,34 @@ TEST(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
     frame_result_finish(&rasterised);
 }
 
-/* Other sizes of slices, and lists that are made by other scans. */
-TEST(hardware_and_software_give_the_same_picture)
-{
-    struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.width = 300;
-    fixture->request.height = 200;
-    device->facts.software = true;
-    struct frame_result software = fixture_render(fixture);
-    device->facts.software = false;
-    struct frame_result hardware = fixture_render(fixture);
-    assert_same_picture(&software, &hardware);
-    assert_int_equal(hardware.secondary_rays, software.secondary_rays);
-    frame_result_finish(&software);
-    frame_result_finish(&hardware);
-}
-
-TEST(layers_are_the_same)
-{
-    struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.layers = (1u << LAYER_COUNT) - 1;
-    fixture->request.samples = 4;
-    struct frame_result waiting, ahead;
-    render_both(fixture, &waiting, &ahead);
-    frame_result_finish(&waiting);
-    frame_result_finish(&ahead);
-}
-
 TEST(a_slice_that_overflows_on_the_device_is_done_again_in_order)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.depth = 6;
-    for (unsigned primary = PRIMARY_RASTER; primary <= PRIMARY_TRACE; primary++)
-        for (unsigned samples = 1; samples <= 3; samples += 2) {
-            fixture->request.primary = primary;
-            fixture->request.samples = samples;
-            frame_renderer_set_capacity(fixture->renderer, 0, 0);
-            frame_renderer_queue_ahead(fixture->renderer, false);
-            struct frame_result whole = fixture_render(fixture);
-            frame_renderer_set_capacity(fixture->renderer, 512, 512);
-            frame_renderer_queue_ahead(fixture->renderer, true);
-            struct frame_result split = fixture_render(fixture);
-            assert_true(split.splits > 0);
-            assert_same_picture(&whole, &split);
-            assert_int_equal(split.secondary_rays, whole.secondary_rays);
-            assert_int_equal(split.shadow_rays, whole.shadow_rays);
-            frame_result_finish(&split);
-            frame_result_finish(&whole);
-        }
+    build(fixture);
+    for (unsigned samples = 1; samples <= 3; samples += 2) {
+        fixture->request.samples = samples;
+        frame_renderer_set_capacity(fixture->renderer, 0, 0);
+        struct frame_result whole = render(fixture, false);
+        frame_renderer_set_capacity(fixture->renderer, 128, 128);
+        struct frame_result split = render(fixture, true);
+        assert_true(split.splits > 0);
+        assert_same_picture(&whole, &split);
+        assert_int_equal(split.secondary_rays, whole.secondary_rays);
+        assert_int_equal(split.shadow_rays, whole.shadow_rays);
+        frame_result_finish(&split);
+        frame_result_finish(&whole);
+    }
 }
 
 TEST(one_pixel_that_overflows_gets_larger_buffers)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.width = 8;
-    fixture->request.height = 6;
-    struct frame_result whole = fixture_render(fixture);
+    build(fixture);
+    fixture->request.width = 6;
+    fixture->request.height = 4;
+    struct frame_result whole = render(fixture, false);
     frame_renderer_set_capacity(fixture->renderer, 1, 1);
-    struct frame_result grown = fixture_render(fixture);
+    struct frame_result grown = render(fixture, true);
     assert_true(grown.splits > 0);
     assert_same_picture(&whole, &grown);
     frame_result_finish(&whole);
@@ -258,10 +182,12 @@ TEST(rays_behind_the_last_queued_wave_are_not_lost)
     }
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
     fixture->request.depth = 1;
+    fixture->request.tracer = TRACER_BVH;
     fixture->request.integrator = INTEGRATOR_RAYCAST;
     fixture->request.layer_opacity = 0.1f;
-    struct frame_result waiting, ahead;
-    render_both(fixture, &waiting, &ahead);
+    struct frame_result waiting = render(fixture, false), ahead = render(fixture, true);
+    assert_same_picture(&waiting, &ahead);
+    assert_int_equal(ahead.secondary_rays, waiting.secondary_rays);
     assert_true(waiting.secondary_rays >= PANES);
     frame_result_finish(&waiting);
     frame_result_finish(&ahead);
@@ -271,9 +197,10 @@ TEST(a_frame_that_is_given_up_leaves_nothing_behind)
 {
     struct fixture *fixture = *state;
     struct error error = {0};
-    fixture_mixture(fixture);
-    struct frame_result whole = fixture_render(fixture);
-    frame_renderer_set_capacity(fixture->renderer, 512, 512);
+    build(fixture);
+    struct frame_result whole = render(fixture, false);
+    frame_renderer_queue_ahead(fixture->renderer, true);
+    frame_renderer_set_capacity(fixture->renderer, 128, 128);
     for (unsigned steps = 1; steps < 40; steps += 6) {
         struct frame_result none = {0};
         assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
@@ -304,7 +231,7 @@ static unsigned steps_of(struct fixture *fixture, uint64_t step_ns, struct frame
 }
 
 /* By its time stamps: no slice is as short as a nanosecond, each is shorter than a second. */
-TEST(slices_are_as_large_as_the_device_can_do_in_a_step)
+TEST_LONG(slices_are_as_large_as_the_device_can_do_in_a_step)
 {
     struct fixture *fixture = *state;
     struct frame_result large = {0}, small = {0};
@@ -332,11 +259,7 @@ TEST(slices_are_as_large_as_the_device_can_do_in_a_step)
 TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    fixture->request.integrator = INTEGRATOR_WHITTED;
-    fixture->request.depth = 3;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.primary = PRIMARY_TRACE;
+    build(fixture);
     struct frame_result expected = render(fixture, true);
     fixture->request.tracer_options.bench.bvh_elements = 5;
     struct frame_result got = render(fixture, true);
@@ -364,8 +287,9 @@ TEST(slices_are_no_larger_than_the_device_has_memory_and_texels_for)
                 {"little memory", (uint64_t)256 << 20, 1u << 27, 1u << 13},
                 {"no more texels than OpenGL promises", (uint64_t)8 << 30, 1u << 16, 1u << 13},
                 {"hardly any memory", 1 << 20, 1u << 27, 1u << 12}};
-    fixture_mixture(fixture);
+    build(fixture);
     fixture->request.width = fixture->request.height = 128;
+    fixture->request.depth = 0;
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         device->facts.memory.bytes = rows[i].memory_bytes;
         device->facts.texture_buffer_texels_max = rows[i].texels;

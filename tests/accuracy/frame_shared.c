@@ -57,7 +57,7 @@ static struct frame_result finish(struct frame_renderer *renderer)
 
 /* ---- the same to the bit ------------------------------------------------------------------------- */
 
-enum { VIEWS = 6, PASSES = 3 };
+enum { VIEWS = 6, VIEWS_SHORT = 2, PASSES = 2 };
 
 /* Every integrator and primary way, sizes of several slices, cameras of their own, layers, a comparison. */
 static struct frame_request view_request(struct fixture *fixture, uint32_t view)
@@ -105,14 +105,13 @@ static void keep(struct frame_result *kept, struct frame_result *result)
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(frames_in_turns_are_those_of_each_alone)
+static void expect_same_in_turns(struct fixture *fixture, uint32_t views)
 {
-    struct fixture *fixture = *state;
     struct frame_result alone[VIEWS][PASSES] = {0};
     struct frame_renderer *renderers[VIEWS];
     struct frame_request requests[VIEWS];
     build_scene(fixture);
-    for (uint32_t view = 0; view < VIEWS; view++) {
+    for (uint32_t view = 0; view < views; view++) {
         requests[view] = view_request(fixture, view);
         renderers[view] = another_renderer(fixture);
         for (int pass = 0; pass < PASSES; pass++) {
@@ -125,8 +124,8 @@ TEST(frames_in_turns_are_those_of_each_alone)
     }
     int passes[VIEWS] = {0};
     bool running[VIEWS] = {false};
-    for (uint32_t left = VIEWS; left > 0;) {
-        for (uint32_t view = 0; view < VIEWS; view++) {
+    for (uint32_t left = views; left > 0;) {
+        for (uint32_t view = 0; view < views; view++) {
             struct frame_result result = {0};
             struct error error = {0};
             if (passes[view] == PASSES)
@@ -149,11 +148,21 @@ TEST(frames_in_turns_are_those_of_each_alone)
             left -= ++passes[view] == PASSES;
         }
     }
-    for (uint32_t view = 0; view < VIEWS; view++) {
+    for (uint32_t view = 0; view < views; view++) {
         for (int pass = 0; pass < PASSES; pass++)
             frame_result_finish(&alone[view][pass]);
         frame_renderer_destroy(renderers[view]);
     }
+}
+
+TEST(frames_in_turns_are_those_of_each_alone)
+{
+    expect_same_in_turns(*state, VIEWS_SHORT);
+}
+
+TEST_LONG(so_are_those_of_all_integrators_tracers_layers_and_comparisons)
+{
+    expect_same_in_turns(*state, VIEWS);
 }
 
 /* ---- who may begin ------------------------------------------------------------------------------- */
@@ -302,7 +311,7 @@ TEST(samples_are_not_added_to_those_from_before_others_moved_something)
 }
 
 /* Whichever way a picture is read back; of several bands and planes, in turns, and after one that was dropped. */
-TEST(pictures_that_are_copied_behind_are_the_same)
+TEST_LONG(pictures_that_are_copied_behind_are_the_same)
 {
     struct fixture *fixture = *state;
     struct error error = {0};

@@ -120,20 +120,20 @@ TEST(no_step_is_long_where_rays_are_slow)
         uint32_t samples, ao_rays, layers;
         enum primary_kind primary;
     } forms[] = {
+        {"path", INTEGRATOR_PATH, 2, 0, 0, PRIMARY_TRACE},
         {"whitted", INTEGRATOR_WHITTED, 1, 0, 0, PRIMARY_RASTER},
         {"whitted, traced", INTEGRATOR_WHITTED, 2, 0, 0, PRIMARY_TRACE},
         {"distributed", INTEGRATOR_DISTRIBUTED, 2, 0, 0, PRIMARY_TRACE},
         {"raycast", INTEGRATOR_RAYCAST, 1, 0, 0, PRIMARY_TRACE},
         {"ao, 8 rays", INTEGRATOR_AO, 1, 8, 0, PRIMARY_RASTER},
         {"ao, 24 rays", INTEGRATOR_AO, 1, 24, 0, PRIMARY_TRACE}, /* more than there is room for at once */
-        {"path", INTEGRATOR_PATH, 2, 0, 0, PRIMARY_TRACE},
         {"layer ao", INTEGRATOR_RAYCAST, 1, 8, 1u << LAYER_AO, PRIMARY_RASTER},
     };
     a_crowded_scene(fixture);
     fixture_commit(fixture);
     fixture->request.width = 128;
     fixture->request.height = 72;
-    for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++) {
+    for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? sizeof(forms) / sizeof(forms[0]) : 1); i++) {
         fixture->request.integrator = forms[i].integrator;
         fixture->request.samples = forms[i].samples;
         fixture->request.ao_rays = forms[i].ao_rays;
@@ -143,7 +143,7 @@ TEST(no_step_is_long_where_rays_are_slow)
     }
 }
 
-TEST(every_tracer_finds_the_same_in_parts)
+TEST_LONG(every_tracer_finds_the_same_in_parts)
 {
     struct fixture *fixture = *state;
     a_crowded_scene(fixture);
@@ -335,7 +335,7 @@ static bool take_way(struct fixture *fixture, const struct way *way)
     return tracer_impl_by_number(way->tracer) != NULL;
 }
 
-TEST(structures_built_in_steps_are_the_same)
+TEST_LONG(structures_built_in_steps_are_the_same)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
@@ -359,7 +359,7 @@ TEST(structures_built_in_steps_are_the_same)
 }
 
 /* After any number of pieces: nothing is left of it, and what comes after it is right. */
-TEST(a_structure_without_waiting_frames_is_forgotten)
+TEST_LONG(a_structure_without_waiting_frames_is_forgotten)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
@@ -399,7 +399,7 @@ TEST(frames_that_wait_for_one_structure_build_it_together)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
-    for (const struct way *way = ways; way < ways + WAYS; way++) {
+    for (const struct way *way = ways; way < ways + (getenv("FARLIGHT_TEST_LONG") ? WAYS : 1); way++) {
         struct frame_result expected = {0}, results[2] = {{0}};
         struct error error = {0};
         if (!way->has_pieces || !take_way(fixture, way))

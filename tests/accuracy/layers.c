@@ -98,7 +98,7 @@ TEST(planes_are_where_they_are_and_look_to_the_eye)
             fixture->edits[0].set.node.object = node - 1;
         }
         fixture->request.primary = way % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
-        for (size_t i = 0; i < sizeof(tracers) / sizeof(tracers[0]); i++) {
+        for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? sizeof(tracers) / sizeof(tracers[0]) : 1); i++) {
             struct error none = {0};
             fixture->request.tracer = tracers[i];
             if (tracer_find(tracers[i], "", &none))
@@ -123,7 +123,7 @@ TEST(depth_is_along_the_view_of_an_orthographic_camera_too)
 }
 
 /* Stored samples: what they hold to the size of a cell. */
-TEST(sampled_structures_have_layers_too)
+TEST_LONG(sampled_structures_have_layers_too)
 {
     struct fixture *fixture = *state;
     const float c = cosf(0.3f), s = sinf(0.3f);
@@ -267,7 +267,7 @@ TEST(identifiers_are_the_clients)
 }
 
 /* A ball on a floor: the layer holds what the integrator of that name shows, where something is. */
-TEST(openness_is_that_of_the_integrator_ao)
+TEST_LONG(openness_is_that_of_the_integrator_ao)
 {
     struct fixture *fixture = *state;
     const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -0.5f, 0, -1, 0, 0};
@@ -368,7 +368,7 @@ TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is)
 
 /* Whatever the slices, and how often they are done again: the picture is what it is alone, and so are the layers.
  */
-TEST(neither_the_picture_nor_the_layers_depend_on_each_other)
+TEST_LONG(neither_the_picture_nor_the_layers_depend_on_each_other)
 {
     struct fixture *fixture = *state;
     const size_t plane_bytes = 32 * 32 * 16;
@@ -397,7 +397,7 @@ TEST(neither_the_picture_nor_the_layers_depend_on_each_other)
     }
 }
 
-TEST(frames_that_go_on_hold_what_one_of_all_samples_does)
+TEST_LONG(frames_that_go_on_hold_what_one_of_all_samples_does)
 {
     struct fixture *fixture = *state;
     add_mirrors(fixture);

@@ -43,18 +43,8 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(distributed_rays_see_what_the_references_see)
-{
-    struct fixture *fixture = *state;
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
-    fixture->request.samples = 4;
-    add_mirrors(fixture);
-    request_cubes(fixture);
-    expect_like_the_reference(fixture, "mirrors, distributed", PSNR_MIRRORS_MIN);
-}
-
 /* What moved lies in a cube of its own: rays see both as one, and each other's reflections and shadows. */
-TEST(what_moves_is_seen_with_what_stands_still)
+TEST_LONG(what_moves_is_seen_with_what_stands_still)
 {
     struct fixture *fixture = *state;
     float m[12];
@@ -105,7 +95,7 @@ static double share(uint64_t part, const struct wave_comparison *wave)
 
 /* The planes of samples alone give 0.06 % of these hits far off, 0.9 % with another facet's normal, and 41 dB.
  * What is left are triangles without samples, and silhouettes of surfaces that are within a cell of each other. */
-TEST(first_hits_are_those_of_triangles)
+TEST_LONG(first_hits_are_those_of_triangles)
 {
     struct fixture *fixture = *state;
     add_facets(fixture);
@@ -130,43 +120,6 @@ TEST(first_hits_are_those_of_triangles)
     frame_result_finish(&result);
     fixture->request.compare = false;
     expect_like_the_reference(fixture, "facets, all traced", PSNR_MIN);
-}
-
-static void add_beads(struct fixture *fixture)
-{
-    float centres_radii[64][4];
-    for (int i = 0; i < 64; i++) {
-        centres_radii[i][0] = 0.25f * (float)(i % 8) - 0.875f;
-        centres_radii[i][1] = 0.25f * (float)(i / 8) - 0.875f;
-        centres_radii[i][2] = 0.02f * (float)(i % 5);
-        centres_radii[i][3] = 0.03f;
-    }
-    fixture_sphere(fixture, 0, 0, 0, 1, add_matte(fixture, 0.7f, 0.7f, 0.7f));
-    struct scene_spheres *spheres = &fixture->edits[fixture->edit_count - 2].set.spheres;
-    blob_unref(spheres->centres_radii);
-    spheres->centres_radii = fixture_blob(centres_radii, sizeof(centres_radii));
-    spheres->sphere_count = spheres->ranges->count = 64;
-}
-
-/* Two cells in radius: from one texel's centre to the next their normals turn by 30 degrees. By
- * the samples alone 94 % of these hits are more than five degrees off. */
-TEST(small_spheres_have_their_own_normals)
-{
-    struct fixture *fixture = *state;
-    add_beads(fixture);
-    request_cubes(fixture);
-    fixture_look(fixture, 0.2f, 0.3f, 2.6f, 0.7f);
-    fixture->request.tracer_options.ldc.resolution = 128;
-    fixture->request.width = fixture->request.height = 512;
-    fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.tracer = TRACER_LDC;
-    fixture->request.compare = true;
-    fixture->request.compare_with = exact_tracer();
-    struct frame_result result = fixture_render(fixture);
-    const struct wave_comparison *wave = &result.comparisons[0];
-    printf("%.3f %% normals\n", 100 * share(wave->other_surface, wave));
-    assert_true(share(wave->other_surface, wave) < 0.002);
-    frame_result_finish(&result);
 }
 
 /* ---- frames ---- */

@@ -1,17 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* What the tracer quadtree says that it has seen is the first hit of the reference: for eyes round the view that
- * its structure belongs to, and all pixels that each of them sees. Models are those of the folder FARLIGHT_SCENES.
- * Each test prints what share of the pixels is known, by layers. */
+ * its structure belongs to, and all pixels that each of them sees. Each test prints what share of the pixels is
+ * known, by layers. */
 #include "tests/accuracy/test_scenes.h"
-#include "tests/fixtures/load_model.h"
 #include "tests/fixtures/device.h"
 
 #include "gpu_scene/scene.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "trace/tracer.h"
-
-#include <unistd.h>
 
 #define SIDE 256u
 #define PIXELS (SIDE * SIDE)
@@ -144,7 +141,7 @@ static void skip_without_quadtree(void)
 {
     if (tracer_impl_by_number(TRACER_QUADTREE))
         return;
-    printf("the build leaves the tracer out\n");
+    printf("skipped: the build leaves the tracer out\n");
     skip();
 }
 
@@ -322,9 +319,10 @@ static struct share compare(struct room *room, struct tracer *tracer, double off
 
 static void expect_seen_is_first(struct room *room, const char *name)
 {
-    for (int planes = 0; planes < 2; planes++) {
+    const bool is_long = getenv("FARLIGHT_TEST_LONG") != NULL; /* else planes of two layers */
+    for (int planes = is_long ? 0 : 1; planes < 2; planes++) {
         uint64_t known_before = 0;
-        for (uint32_t layers = 1; layers <= LAYERS; layers++) {
+        for (uint32_t layers = is_long ? 1 : 2; layers <= (is_long ? LAYERS : 2); layers++) {
             const struct tracer_options options = {
                 .quadtree = {.layers = layers,
                              .faces = QUADTREE_FACES_VIEW,
@@ -384,189 +382,4 @@ TEST(what_is_seen_of_a_room_is_the_first_hit_of_the_reference)
     struct scene *scene = scene_of_a_room();
     expect_seen_of(scene, "a room", (const float[3]){0.51f, 0.4f, 0.9f}, 0.02f);
     scene_destroy(scene);
-}
-
-/* ---- from texel to texel ---- */
-
-/* What is wrong lies within a texel of an outline, so its share falls as the side of a texel does: to a half at
- * twice the resolution. The outlines are those of some dozens of straight edges, each of which falls on texels by
- * chance and is wrong by 0 to 1/2 of one all along: a sum of 50 of them is off by a tenth or two, at either
- * resolution. */
-#define WRONG_AT_TWICE_MAX 0.6
-
-/* From what the eye sees to anywhere in the room. */
-static void make_bounces(struct room *room)
-{
-    static const float room_half[3] = {3.5f, 1.2f, 3.5f}; /* round 0 */
-    uint64_t seed = 5;
-    make_rays(room, (const float[3]){0, 0, 0});
-    trace(room, room->exact, room->hits);
-    for (uint32_t i = 0; i < PIXELS; i++) {
-        struct ray *ray = &room->host_rays[i];
-        const float distance = room->hits[i].distance;
-        for (int k = 0; k < 3; k++) {
-            ray->origin_t_min[k] += distance * (1 - 1e-4f) * ray->direction_t_max[k];
-            ray->direction_t_max[k] = room_half[k] * test_uniform(&seed, -1, 1) - ray->origin_t_min[k];
-        }
-        if (distance < 0)
-            ray->direction_t_max[3] = -1; /* none */
-    }
-}
-
-static double wrong_share_of_bounces(struct room *room, uint32_t resolution)
-{
-    const struct tracer_options options = {
-        .quadtree = {.layers = LAYERS, .resolution = resolution, .pixels = BOUND_PIXELS, .radius = room->radius}};
-    struct tracer *tracer = bring(room, TRACER_QUADTREE, &options);
-    uint32_t known = 0, wrong = 0;
-    trace(room, tracer, room->hits);
-    tracer_destroy(tracer);
-    for (uint32_t i = 0; i < PIXELS; i++) {
-        const float got = room->hits[i].distance, expected = room->expected[0][i].distance;
-        if (room->hits[i].material & HIT_UNKNOWN)
-            continue;
-        known++;
-        wrong += (got < 0) != (expected < 0) || fabsf(got - expected) > 1e-3f * expected + 1e-5f;
-    }
-    printf("%u texels: of %u rays %u are known, %u of them (%.2f %%) wrong\n", resolution, PIXELS, known, wrong,
-           100.0 * wrong / known);
-    assert_true(known >= PIXELS / 2 && wrong >= 100); /* else it says little */
-    return (double)wrong / known;
-}
-
-TEST(what_is_wrong_of_bounces_in_a_cube_falls_as_the_side_of_a_texel)
-{
-    struct room *room = calloc(1, sizeof(*room));
-    (void)state;
-    skip_without_quadtree();
-    struct scene *scene = scene_of_a_room();
-    room_init(room, scene);
-    look_from(room, 0.1f, 0.3f, 1.5f);
-    room->radius = 0.1f;
-    room->exact = bring_exact(room);
-    make_bounces(room);
-    trace(room, room->exact, room->expected[0]);
-    double shares[4];
-    for (uint32_t i = 0; i < 4; i++)
-        shares[i] = wrong_share_of_bounces(room, 128u << i);
-    for (uint32_t i = 0; i + 2 < 4; i++)
-        assert_true(shares[i + 2] <= WRONG_AT_TWICE_MAX * WRONG_AT_TWICE_MAX * shares[i]);
-    room_finish(room);
-    scene_destroy(scene);
-}
-
-/* ---- any hit ---- */
-
-/* Rays that graze the edge of a thing, which goes on by less than a texel into the gap beside it: 0.6 % of those
- * that are stopped by one layer, whose gaps are large, and 0.1 % by three. Without that texel it was twice as
- * much. */
-#define UNLIKE_OTHERS_MAX 0.01
-
-/* Small things in the open before a square: between them there are gaps in all layers. */
-static struct scene *scene_of_leaves(void)
-{
-    struct test_edits edits = {.scene = test_scene_create()};
-    float m[12];
-    test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
-    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    test_soup_mesh(&edits, 2, 400, 0.05f, 12);
-    add_square(&edits, 1, 0, 1.5f, 1.5f, -3);
-    for (uint32_t i = 0; i < 3; i++) {
-        test_transform(m, 1, 0.8f, 1, 0, 0.7f * (float)i, (float)i - 1, 0.2f * (float)i, -1.5f);
-        test_node(&edits, 10 + i, 0, NODE_MESH, 2, m);
-    }
-    test_commit(&edits);
-    return edits.scene;
-}
-
-/* Half of the rays end among the things, the others leave the scene. */
-static void end_rays(struct room *room)
-{
-    for (uint32_t i = 0; i < PIXELS; i += 2)
-        room->host_rays[i].direction_t_max[3] = fminf(room->host_rays[i].direction_t_max[3], 1);
-}
-
-static void trace_shadows(struct room *room, struct tracer *tracer, uint32_t *visibilities)
-{
-    struct error error = {0};
-    const struct wave wave = {
-        .kind = WAVE_ANY, .ray_count = PIXELS, .rays = &room->rays, .visibility = &room->answers};
-    expect_ok(tracer_trace(tracer, &room->gpu, &wave, &error), &error);
-    gpu_buffer_read(device, &room->answers, 0, visibilities, PIXELS * sizeof(*visibilities));
-}
-
-/* A shadow ray that does not end behind what the view sees asks for hits alone, and passes gaps without a look at
- * them. Others look: both meet something, or are taken to have met it, for the same rays. */
-TEST(shadow_rays_are_stopped_where_others_meet_something)
-{
-    struct room *room = calloc(1, sizeof(*room));
-    uint32_t *visibilities = malloc(PIXELS * sizeof(*visibilities));
-    (void)state;
-    skip_without_quadtree();
-    struct scene *scene = scene_of_leaves();
-    room_init(room, scene);
-    look_from(room, 0.1f, 0.3f, 1.5f);
-    room->radius = 0.1f;
-    room->exact = bring_exact(room);
-    make_bounces(room);
-    end_rays(room);
-    trace(room, room->exact, room->expected[0]);
-    for (uint32_t layers = 1; layers <= LAYERS; layers++) {
-        const struct tracer_options options = {
-            .quadtree = {.layers = layers, .resolution = 256, .pixels = BOUND_PIXELS, .radius = room->radius}};
-        struct tracer *tracer = bring(room, TRACER_QUADTREE, &options);
-        trace(room, tracer, room->hits);
-        trace_shadows(room, tracer, visibilities);
-        tracer_destroy(tracer);
-        uint32_t stopped = 0, passing = 0, other = 0, wrong = 0, wrong_of_others = 0;
-        for (uint32_t i = 0; i < PIXELS; i++) {
-            const bool is_alive = room->host_rays[i].direction_t_max[3] > 0, is_stopped = visibilities[i] == 0;
-            const bool meets = room->hits[i].distance >= 0, is_shadow = room->expected[0][i].distance >= 0;
-            stopped += is_alive && is_stopped;
-            passing += is_alive && !is_stopped;
-            other += is_alive && is_stopped != meets;
-            wrong += is_alive && is_stopped != is_shadow;
-            wrong_of_others += is_alive && meets != is_shadow;
-        }
-        printf(
-            "%u layers: %u shadow rays are stopped, %u pass, %u are not as others, %u are wrong, of others %u\n",
-            layers, stopped, passing, other, wrong, wrong_of_others);
-        assert_true(stopped >= 1000 && passing >= 1000); /* else it says little */
-        assert_true(other <= UNLIKE_OTHERS_MAX * stopped);
-        assert_true(wrong <= wrong_of_others + UNLIKE_OTHERS_MAX * stopped);
-    }
-    room_finish(room);
-    scene_destroy(scene);
-    free(visibilities);
-}
-
-/* ---- models ---- */
-
-/* Inside of the one. In front of the other. */
-TEST(what_is_seen_of_models_is_the_first_hit_of_the_reference)
-{
-    static const struct {
-        const char *path;
-        float place[3], radius;
-    } models[] = {{"screenspace/classroom.obj", {0.55f, 0.55f, 0.7f}, 0.015f},
-                  {"common/dragon-47k.glb", {0.5f, 0.6f, 3.0f}, 0.05f}};
-    const char *folder = getenv("FARLIGHT_SCENES");
-    (void)state;
-    if (!folder) {
-        printf("FARLIGHT_SCENES names no folder of models\n");
-        skip();
-    }
-    for (size_t i = 0; i < sizeof(models) / sizeof(models[0]); i++) {
-        char path[512];
-        struct loaded_model model;
-        struct error error = {0};
-        snprintf(path, sizeof(path), "%s/%s", folder, models[i].path);
-        if (access(path, R_OK) != 0) {
-            printf("%s is not there\n", path);
-            continue;
-        }
-        expect_ok(load_model(&model, path, &error), &error);
-        expect_seen_of(model.scene, models[i].path, models[i].place, models[i].radius);
-        load_model_finish(&model);
-    }
 }

@@ -72,7 +72,7 @@ static void skip_without(void)
     struct error error = {0};
     if (tracer_find(TRACER_QUADTREE, "tracer", &error))
         return;
-    printf("%s\n", error.text);
+    printf("skipped: %s\n", error.text);
     skip();
 }
 

@@ -71,24 +71,39 @@ static double width_after(struct cone cone, double distance)
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(a_concave_mirror_has_its_focus_at_half_its_radius)
-{
-    struct cone parallel =
-        cone_of(*state, (struct cone_case){.width = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f});
-    assert_near(width_after(parallel, 1.5), 0.0, 1e-8);
-    assert_near(width_after(parallel, 3.0), -0.01, 1e-8); /* as wide again, turned over */
-    /* 1 / object + 1 / image = 2 / radius: from 4.5 m to 2.25 m */
-    struct cone point = cone_of(
-        *state,
-        (struct cone_case){.width = 0.045f, .spread = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f});
-    assert_near(width_after(point, 2.25), 0.0, 1e-7);
-}
+/* Widths after a distance: a mirror's focus is at half its radius, and 1 / object + 1 / image = 2 / radius; a flat
+ * one changes nothing; solid angles add up, and a cone that closes in to a point stays open by the angle there. */
+static const struct {
+    const char *name;
+    struct cone_case asked;
+    double distance, width;
+} formulas[] = {
+    {"parallel light in its focus", {.width = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f}, 1.5, 0.0},
+    {"and turned over", {.width = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f}, 3.0, -0.01},
+    {"from 4.5 m to 2.25 m",
+     {.width = 0.045f, .spread = 0.01f, .operation = MIRRORED, .curvature = -1.0f / 3.0f},
+     2.25,
+     0.0},
+    {"a flat mirror, at once", {.width = 0.2f, .spread = 0.3f, .operation = MIRRORED}, 0.0, 0.2},
+    {"a flat mirror, farther on", {.width = 0.2f, .spread = 0.3f, .operation = MIRRORED}, 1.0, 0.5},
+    {"scattered, at once", {.width = 0.1f, .spread = 0.3f, .operation = SCATTERED, .curvature = 0.16f}, 0.0, 0.1},
+    {"scattered, farther on",
+     {.width = 0.1f, .spread = 0.3f, .operation = SCATTERED, .curvature = 0.16f},
+     1.0,
+     0.6},
+    {"scattered where it closes",
+     {.width = 1.0f, .spread = -1.0f, .operation = SCATTERED, .curvature = 0.01f},
+     1.0,
+     0.1},
+};
 
-TEST(a_flat_mirror_changes_no_cone)
+TEST(cones_are_mirrored_and_scattered_by_the_formulas)
 {
-    struct cone same = cone_of(*state, (struct cone_case){.width = 0.2f, .spread = 0.3f, .operation = MIRRORED});
-    assert_near(same.width, 0.2f, 0.0);
-    assert_near(same.spread, 0.3f, 0.0);
+    for (size_t i = 0; i < sizeof(formulas) / sizeof(formulas[0]); i++) {
+        const double width = width_after(cone_of(*state, formulas[i].asked), formulas[i].distance);
+        if (!(fabs(width - formulas[i].width) < 1e-6))
+            fail_msg("%s: %.8f wide, expected %g", formulas[i].name, width, formulas[i].width);
+    }
 }
 
 TEST(a_glass_ball_has_the_focus_of_a_ball_lens)
@@ -128,107 +143,6 @@ TEST(a_flat_boundary_keeps_area_times_solid_angle_times_the_square_of_the_index)
         assert_near((double)bent.width * (double)bent.spread * 1.5, 0.01 * 0.02, 1e-9);
         assert_near((double)bent.width * (double)bent.width / (double)behind, 1e-4 / (double)before, 1e-9);
     }
-}
-
-TEST(solid_angles_add_up)
-{
-    struct cone wide = cone_of(
-        *state, (struct cone_case){.width = 0.1f, .spread = 0.3f, .operation = SCATTERED, .curvature = 0.16f});
-    assert_near(wide.width, 0.1f, 0.0);
-    assert_near(wide.spread, 0.5f, 1e-6);
-    /* a cone that closes in to a point 1 m away stays open by the angle there */
-    struct cone closing = cone_of(
-        *state, (struct cone_case){.width = 1.0f, .spread = -1.0f, .operation = SCATTERED, .curvature = 0.01f});
-    assert_near(width_after(closing, 1.0), 0.1, 1e-6);
-}
-
-typedef double point3[3];
-
-static double dot3(const point3 a, const point3 b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/* The ray from `from` along the unit vector `ray`, sent on by a ball about the origin; after `distance` it is at
- * `end`. eta 0: mirrored. */
-static void send_on(const point3 from, const point3 ray, double radius, double eta, double distance, point3 end)
-{
-    double along = dot3(from, ray), rest = along * along - dot3(from, from) + radius * radius;
-    assert_true(rest > 0.0);
-    double reach = -along - sqrt(rest), cosine, behind;
-    point3 hit, normal;
-    for (int i = 0; i < 3; i++) {
-        hit[i] = from[i] + reach * ray[i];
-        normal[i] = hit[i] / radius;
-    }
-    cosine = -dot3(ray, normal);
-    behind = eta > 0.0 ? sqrt(1.0 - (1.0 - cosine * cosine) / (eta * eta)) : 0.0;
-    for (int i = 0; i < 3; i++) {
-        double sent =
-            eta > 0.0 ? ray[i] / eta + (cosine / eta - behind) * normal[i] : ray[i] + 2.0 * cosine * normal[i];
-        end[i] = hit[i] + distance * sent;
-    }
-}
-
-/* The area across its direction of a bundle of three rays from one point 4 m before the ball, over that which they
- * would have at 1 m: the square of a width, for a spread of 1. */
-static double bundle_area(double degrees, double eta, double distance, point3 axis_end)
-{
-    const double radius = 1.0, step = 1e-5, angle = degrees * PI / 180.0;
-    const point3 hit = {radius * sin(angle), 0.0, radius * cos(angle)}, from = {hit[0], 0.0, hit[2] + 4.0};
-    point3 ends[3], sides[2], beyond, direction, across;
-    for (int i = 0; i < 3; i++) {
-        point3 ray = {i == 1 ? step : 0.0, i == 2 ? step : 0.0, -1.0};
-        double length = sqrt(dot3(ray, ray));
-        for (int k = 0; k < 3; k++)
-            ray[k] /= length;
-        send_on(from, ray, radius, eta, distance, ends[i]);
-        if (i == 0)
-            send_on(from, ray, radius, eta, distance + 1.0, beyond);
-    }
-    for (int k = 0; k < 3; k++) {
-        sides[0][k] = (ends[1][k] - ends[0][k]) / step;
-        sides[1][k] = (ends[2][k] - ends[0][k]) / step;
-        direction[k] = beyond[k] - ends[0][k];
-        axis_end[k] = ends[0][k];
-    }
-    for (int k = 0; k < 3; k++)
-        across[k] = sides[0][(k + 1) % 3] * sides[1][(k + 2) % 3] - sides[0][(k + 2) % 3] * sides[1][(k + 1) % 3];
-    return fabs(dot3(across, direction));
-}
-
-/* A cone is round, so that between the surface and far away it is a little off; a level of a texture is a factor
- * of two. */
-#define BUNDLE_TOLERANCE 0.12
-
-TEST(a_cone_off_a_ball_is_as_wide_as_a_bundle_of_rays)
-{
-    double worst = 0.0;
-    for (double degrees = 0.0; degrees <= 60.0; degrees += 15.0) {
-        for (int refracts = 0; refracts < 2; refracts++) {
-            const double eta = refracts ? 1.5 : 0.0, cosine = cos(degrees * PI / 180.0);
-            struct cone_case c = {.width = 4.0f, .spread = 1.0f, .curvature = 1.0f, .eta = (float)eta};
-            c.width *= 0.01f; /* within what the spread is limited to */
-            c.spread *= 0.01f;
-            c.operation = refracts ? REFRACTED : MIRRORED;
-            c.cosine_before = (float)cosine;
-            c.cosine_behind = refracts ? (float)sqrt(1.0 - (1.0 - cosine * cosine) / (eta * eta)) : 1.0f;
-            struct cone cone = cone_of(*state, c);
-            for (double distance = 0.0; distance < 100.0; distance = 2.0 * distance + 0.25) {
-                point3 end;
-                double expected = sqrt(bundle_area(degrees, eta, distance, end));
-                /* Behind the surface the bundle has two foci, near which it is a line. */
-                if (refracts && distance > 0.0 && distance < 60.0)
-                    continue;
-                double off = fabs(fabs(width_after(cone, distance)) * 100.0 / expected - 1.0);
-                worst = off > worst ? off : worst;
-                if (!(off < BUNDLE_TOLERANCE))
-                    fail_msg("%g degrees, eta %g, %g m: width %g, a bundle %g", degrees, eta, distance,
-                             width_after(cone, distance) * 100.0, expected);
-            }
-        }
-    }
-    print_message("    widths are at most %.1f %% from those of bundles\n", worst * 100.0);
 }
 
 /* ---- what a hit tells of its surface ---- */
@@ -421,43 +335,42 @@ static double quality(struct fixture *fixture, uint32_t many)
             fail_msg("%s: %.1f dB, at least %.1f are expected", what, found_, (double)(minimum));                 \
     } while (0)
 
-TEST(a_mirror_ball_shows_with_one_sample_what_many_show)
-{
-    struct fixture *fixture = *state;
-    checkered_floor(fixture, 1.0f, 0.0f, 0.0f);
-    EXPECT_QUALITY("mirror", quality(fixture, 64), 19.0); /* 15.7 as if the ball were flat */
-}
+/* Quality in dB of one sample, and without cones (as if balls were flat or smooth, in full detail). */
+static const struct {
+    const char *name;
+    float metallic, roughness, transmission;
+    unsigned integrator;
+    double minimum;
+} balls[] = {
+    {"mirror", 1.0f, 0.0f, 0.0f, INTEGRATOR_WHITTED, 19.0},                  /* 15.7 */
+    {"glass", 0.0f, 0.0f, 1.0f, INTEGRATOR_WHITTED, 19.0},                   /* 17.6 */
+    {"rough, distributed", 1.0f, 0.25f, 0.0f, INTEGRATOR_DISTRIBUTED, 15.0}, /* 12.8 */
+    {"rough, path", 1.0f, 0.25f, 0.0f, INTEGRATOR_PATH, 15.0},               /* 12.2 */
+    {"scattered, path", 0.0f, 1.0f, 0.0f, INTEGRATOR_PATH, 14.5},            /* 12.3 */
+};
 
-TEST(a_glass_ball_shows_with_one_sample_what_many_show)
+static void expect_balls(struct fixture *fixture, size_t first, size_t end)
 {
-    struct fixture *fixture = *state;
-    checkered_floor(fixture, 0.0f, 0.0f, 1.0f);
-    EXPECT_QUALITY("glass", quality(fixture, 64), 19.0); /* 17.6 as if the ball were flat */
-}
-
-TEST(what_a_rough_ball_mirrors_has_less_noise)
-{
-    struct fixture *fixture = *state;
-    static const unsigned integrators[] = {INTEGRATOR_DISTRIBUTED, INTEGRATOR_PATH};
-    for (int i = 0; i < 2; i++) {
+    for (size_t i = first; i < end; i++) {
         fixture_clear((void **)&fixture);
-        checkered_floor(fixture, 1.0f, 0.25f, 0.0f);
-        fixture->request.integrator = integrators[i];
-        /* 12.8 and 12.2 as if it were smooth */
-        EXPECT_QUALITY(i == 0 ? "distributed" : "path", quality(fixture, 64), 15.0);
+        checkered_floor(fixture, balls[i].metallic, balls[i].roughness, balls[i].transmission);
+        fixture->request.integrator = balls[i].integrator;
+        EXPECT_QUALITY(balls[i].name, quality(fixture, 64), balls[i].minimum);
     }
 }
 
-TEST(light_that_a_textured_floor_scatters_has_less_noise)
+TEST(mirror_and_glass_balls_show_with_one_sample_what_many_show)
 {
-    struct fixture *fixture = *state;
-    checkered_floor(fixture, 0.0f, 1.0f, 0.0f);
-    fixture->request.integrator = INTEGRATOR_PATH;
-    EXPECT_QUALITY("path", quality(fixture, 64), 14.5); /* 12.3 in full detail */
+    expect_balls(*state, 0, 2);
+}
+
+TEST_LONG(what_rough_balls_mirror_and_floors_scatter_has_less_noise)
+{
+    expect_balls(*state, 2, sizeof(balls) / sizeof(balls[0]));
 }
 
 /* Successive frames of a camera that moves by a tenth of a pixel each, beside the same with many samples. */
-TEST(a_mirror_ball_does_not_flicker_as_the_camera_moves)
+TEST_LONG(a_mirror_ball_does_not_flicker_as_the_camera_moves)
 {
     struct fixture *fixture = *state;
     double sums[2] = {0.0, 0.0};
@@ -492,7 +405,7 @@ static void grazing_floor(struct fixture *fixture, bool glass)
 }
 
 /* What is seen at a grazing angle has a footprint that is much longer than wide. */
-TEST(a_grazing_floor_in_a_mirror_and_behind_glass_shows_with_one_sample_what_many_show)
+TEST_LONG(a_grazing_floor_in_a_mirror_and_behind_glass_shows_with_one_sample_what_many_show)
 {
     struct fixture *fixture = *state;
     for (int glass = 0; glass < 2; glass++) {

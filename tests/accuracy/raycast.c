@@ -10,7 +10,13 @@
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
 enum { EDGE = 8 };
-static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_REFERENCE, TRACER_LDC};
+static const unsigned tracers[] = {TRACER_BVH, TRACER_NAIVE, TRACER_REFERENCE, TRACER_LDC};
+
+/* bvh, or all. */
+static size_t tracer_count(void)
+{
+    return getenv("FARLIGHT_TEST_LONG") ? COUNT(tracers) : 1;
+}
 
 static void begin(struct fixture *fixture, unsigned tracer)
 {
@@ -64,7 +70,7 @@ TEST(layers_are_blended_front_to_back)
     struct fixture *fixture = *state;
     static const float opacities[] = {0.0f, 0.2f, 0.9f, 1.0f};
     enum { LAYERS = 5 };
-    for (size_t t = 0; t < COUNT(tracers); t++)
+    for (size_t t = 0; t < tracer_count(); t++)
         for (int has_environment = 0; has_environment < 2; has_environment++) {
             begin(fixture, tracers[t]);
             for (uint32_t i = 0; i < LAYERS; i++)
@@ -94,7 +100,7 @@ TEST(faint_layers_go_on_until_nothing_is_left)
     struct fixture *fixture = *state;
     enum { LAYERS = 40 };
     double left = 1.0, radiance = 0.0;
-    begin(fixture, TRACER_REFERENCE);
+    begin(fixture, TRACER_BVH);
     for (uint32_t i = 0; i < LAYERS; i++, left *= 0.95) {
         a_layer(fixture, i, grey_of(i))->unlit = true;
         radiance += left * 0.05 * (double)grey_of(i);
@@ -107,7 +113,7 @@ TEST(faint_layers_go_on_until_nothing_is_left)
 TEST(translucent_surfaces_transmit_their_transmittance)
 {
     struct fixture *fixture = *state;
-    begin(fixture, TRACER_REFERENCE);
+    begin(fixture, TRACER_BVH);
     struct scene_material *pane = a_layer(fixture, 0, 0.4f), *glass = a_layer(fixture, 1, 0.8f),
                           *wall = a_layer(fixture, 2, 0.9f);
     pane->unlit = glass->unlit = wall->unlit = true;
@@ -128,7 +134,7 @@ TEST(translucent_surfaces_transmit_their_transmittance)
 TEST(every_layer_is_lit_without_the_others)
 {
     struct fixture *fixture = *state;
-    for (size_t t = 0; t < COUNT(tracers); t++) {
+    for (size_t t = 0; t < tracer_count(); t++) {
         double radiance = 0.0, left = 1.0;
         begin(fixture, tracers[t]);
         for (uint32_t i = 0; i < 4; i++, left *= 0.5) {
@@ -144,7 +150,7 @@ TEST(every_layer_is_lit_without_the_others)
 TEST(no_shadow_ray_is_traced_and_every_layer_is_one_more)
 {
     struct fixture *fixture = *state;
-    begin(fixture, TRACER_REFERENCE);
+    begin(fixture, TRACER_BVH);
     for (uint32_t i = 0; i < 3; i++)
         a_layer(fixture, i, 0.5f);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 2.0f);
@@ -156,44 +162,4 @@ TEST(no_shadow_ray_is_traced_and_every_layer_is_one_more)
     result = fixture_render(fixture);
     assert_int_equal(result.secondary_rays, 0);
     frame_result_finish(&result);
-}
-
-TEST(frames_of_few_samples_add_up_to_one_of_many)
-{
-    struct fixture *fixture = *state;
-    struct frame_result parts = {0};
-    begin(fixture, TRACER_NAIVE);
-    fixture->request.width = fixture->request.height = 24;
-    for (uint32_t i = 0; i < 3; i++)
-        a_layer(fixture, i, grey_of(i));
-    fixture_sphere(fixture, 0.3f, 0.1f, 0.4f, 0.5f, 0);
-    fixture_light(fixture, LIGHT_RECTANGLE, 0.0f, 0.5f, 3.0f, 2.0f);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 6;
-    struct frame_result whole = fixture_render(fixture);
-    fixture->request.layer_opacity = 0.25f; /* another picture: begins from new */
-    parts = fixture_render(fixture);
-    assert_int_equal(parts.samples, 6);
-    fixture->request.layer_opacity = 0.0f;
-    fixture->request.samples = 2;
-    for (int i = 0; i < 3; i++) {
-        frame_result_finish(&parts);
-        parts = fixture_render(fixture);
-    }
-    assert_int_equal(parts.samples, 6);
-    assert_memory_equal(whole.pixels, parts.pixels, whole.size_bytes);
-    fixture->request.samples = 6;
-    fixture->request.starts_anew = true;
-    for (int i = 0; i < 2; i++) {
-        frame_result_finish(&parts);
-        parts = fixture_render(fixture);
-        assert_int_equal(parts.samples, 6);
-        assert_memory_equal(whole.pixels, parts.pixels, whole.size_bytes);
-    }
-    fixture->request.starts_anew = false;
-    frame_result_finish(&parts);
-    parts = fixture_render(fixture);
-    assert_int_equal(parts.samples, 12);
-    frame_result_finish(&whole);
-    frame_result_finish(&parts);
 }

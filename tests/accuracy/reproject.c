@@ -56,7 +56,7 @@ static void add_frame(struct quality *sum, const struct frame_result *picture, c
 /* Five samples in place of one leave 0.45 of the noise, and the denoiser a part of it that is smooth: so three
  * quarters of the error of the denoised frame, and of what changes in it, are not reached where nothing is found
  * again. */
-TEST(moving_frames_have_less_noise_and_flicker_for_those_before_them)
+TEST_LONG(moving_frames_have_less_noise_and_flicker_for_those_before_them)
 {
     struct fixture *fixture = *state;
     struct quality alone = {0}, following = {0};
@@ -131,7 +131,7 @@ static double distance_of(const struct frame_result *picture, const struct frame
 }
 
 /* As a view does that keeps a rate. */
-TEST(a_frame_follows_frames_of_another_size)
+TEST_LONG(a_frame_follows_frames_of_another_size)
 {
     struct fixture *fixture = *state;
     a_corner(fixture);
@@ -222,7 +222,7 @@ static double error_beside_alone(struct fixture *fixture, float half, uint32_t m
 
 /* What stays has less noise, where the square was nothing is left of the frames before; its shadow lags behind by
  * less than its noise was. */
-TEST(what_moves_by_itself_leaves_nothing_behind)
+TEST_LONG(what_moves_by_itself_leaves_nothing_behind)
 {
     struct fixture *fixture = *state;
     a_corner(fixture);
@@ -233,7 +233,7 @@ TEST(what_moves_by_itself_leaves_nothing_behind)
 
 /* A wall that fills the picture and moves in its plane. Three samples of frames before and one are half of the
  * noise, 0.41 is left with the denoiser; where the wall begins anew and the ball alone is followed, 0.69. */
-TEST(what_moves_is_followed)
+TEST_LONG(what_moves_is_followed)
 {
     struct fixture *fixture = *state;
     path_begin(fixture, TRACER_BVH, 2);

@@ -181,6 +181,8 @@ static void a_mixture(struct fixture *fixture)
     fixture_light(fixture, LIGHT_SPHERE, 1.0f, 2.0f, 3.0f, 5.0f);
     fixture_light(fixture, LIGHT_RECTANGLE, -2.0f, 1.0f, 3.0f, 4.0f);
     fixture_environment(fixture, 0.2f, 0.3f, 0.4f);
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.tracer_options.bvh.rays = 1; /* else it follows the slices, and rounding at edges */
     fixture->request.width = WIDTH;
     fixture->request.height = HEIGHT;
     fixture->request.samples = 21; /* together: 16, 4, 1 */
@@ -198,32 +200,94 @@ static void assert_same_floats(const struct frame_result *a, const struct frame_
                          (double)fixture_pixel(b, i % WIDTH, i / WIDTH)[c]);
 }
 
+/* Every integrator, each primary way and a lens, in slices of several sizes. Whitted may have more children than
+ * parents, which splits a slice; others never have. */
+static const struct form {
+    const char *name;
+    enum integrator_kind integrator;
+    enum primary_kind primary;
+    float aperture;
+} forms[] = {{"whitted", INTEGRATOR_WHITTED, PRIMARY_TRACE, 0.0f},
+             {"path", INTEGRATOR_PATH, PRIMARY_TRACE, 0.1f},
+             {"distributed", INTEGRATOR_DISTRIBUTED, PRIMARY_RASTER, 0.0f},
+             {"ao", INTEGRATOR_AO, PRIMARY_TRACE, 0.0f},
+             {"raycast", INTEGRATOR_RAYCAST, PRIMARY_RASTER, 0.0f}};
+enum { FORMS = sizeof(forms) / sizeof(forms[0]), FORMS_SHORT = 2 };
+
+static void take_form(struct fixture *fixture, const struct form *form)
+{
+    print_message("%s\n", form->name);
+    fixture->request.integrator = form->integrator;
+    fixture->request.primary = form->primary;
+    fixture->request.aperture = form->aperture;
+}
+
+static void expect_same_in_slices(struct fixture *fixture, const struct form *form)
+{
+    static const uint32_t slices[] = {1000, 100};
+    take_form(fixture, form);
+    frame_renderer_set_capacity(fixture->renderer, 0, 0);
+    struct frame_result whole = fixture_render(fixture);
+    assert_int_equal(whole.samples, 21);
+    assert_int_equal(whole.primary_rays, 21 * WIDTH * HEIGHT);
+    assert_int_equal(whole.splits, 0);
+    for (size_t k = 0; k < sizeof(slices) / sizeof(slices[0]); k++) {
+        frame_renderer_set_capacity(fixture->renderer, slices[k], slices[k]);
+        struct frame_result cut = fixture_render(fixture);
+        assert_same_floats(&whole, &cut);
+        assert_int_equal(whole.shadow_rays, cut.shadow_rays);
+        assert_int_equal(whole.secondary_rays, cut.secondary_rays);
+        assert_true(form->integrator == INTEGRATOR_WHITTED || cut.splits == 0);
+        frame_result_finish(&cut);
+    }
+    frame_renderer_set_capacity(fixture->renderer, 0, 0);
+    frame_result_finish(&whole);
+}
+
+static void expect_same_in_frames(struct fixture *fixture, const struct form *form)
+{
+    take_form(fixture, form);
+    fixture->request.samples = 21;
+    struct frame_result whole = fixture_render(fixture);
+    assert_int_equal(whole.samples, 21);
+    fixture->request.seed++; /* something else in between */
+    fixture->request.samples = 1;
+    struct frame_result other = fixture_render(fixture);
+    assert_int_equal(other.samples, 1);
+    frame_result_finish(&other);
+    fixture->request.seed--;
+    uint32_t sum = 0;
+    for (uint32_t samples = 1; samples <= 6; samples++) {
+        fixture->request.samples = samples;
+        struct frame_result part = fixture_render(fixture);
+        sum += samples;
+        assert_int_equal(part.samples, sum);
+        assert_int_equal(part.primary_rays, samples * WIDTH * HEIGHT);
+        if (sum == 21)
+            assert_same_floats(&whole, &part);
+        frame_result_finish(&part);
+    }
+    frame_result_finish(&whole);
+}
+
+static void expect_same_sums(struct fixture *fixture, const struct form *begin, const struct form *end)
+{
+    a_mixture(fixture);
+    for (const struct form *form = begin; form < end; form++)
+        expect_same_in_slices(fixture, form);
+    fixture->request.accumulate = true;
+    for (const struct form *form = begin; form < end; form++)
+        expect_same_in_frames(fixture, form);
+}
+
 TEST(a_picture_is_the_same_to_the_bit_however_its_samples_are_grouped)
 {
-    struct fixture *fixture = *state;
-    a_mixture(fixture);
-    for (int i = 0; i < 3; i++) {
-        fixture->request.integrator = i == 0 ? INTEGRATOR_WHITTED : INTEGRATOR_DISTRIBUTED;
-        fixture->request.primary = i == 1 ? PRIMARY_RASTER : PRIMARY_TRACE;
-        fixture->request.aperture = i == 2 ? 0.1f : 0.0f;
-        frame_renderer_set_capacity(fixture->renderer, 0, 0);
-        struct frame_result whole = fixture_render(fixture);
-        assert_int_equal(whole.samples, 21);
-        assert_int_equal(whole.primary_rays, 21 * WIDTH * HEIGHT);
-        assert_int_equal(whole.splits, 0);
-        static const uint32_t slices[] = {1u << 14, 1000, 100};
-        for (size_t k = 0; k < sizeof(slices) / sizeof(slices[0]); k++) {
-            frame_renderer_set_capacity(fixture->renderer, slices[k], slices[k]);
-            struct frame_result cut = fixture_render(fixture);
-            assert_same_floats(&whole, &cut);
-            assert_int_equal(whole.shadow_rays, cut.shadow_rays);
-            assert_int_equal(whole.secondary_rays, cut.secondary_rays);
-            /* whitted may have more children than parents, distributed never has */
-            assert_true(i == 0 || cut.splits == 0);
-            frame_result_finish(&cut);
-        }
-        frame_result_finish(&whole);
-    }
+    expect_same_sums(*state, forms, forms + FORMS_SHORT);
+}
+
+TEST_LONG(so_it_is_of_the_other_integrators)
+{
+    expect_same_sums(*state, forms + FORMS_SHORT, forms + FORMS);
 }
 
 /* Where the host waits for the counts of each wave, and on software GL once for each layer that is drawn. */
@@ -255,7 +319,8 @@ TEST(a_slice_of_less_than_a_pixels_samples_is_the_same_picture_too)
     fixture->request.aperture = 0.1f;
     fixture->request.width = fixture->request.height = 8;
     for (int i = 0; i < 2; i++) {
-        fixture->request.integrator = i ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED;
+        fixture->request.integrator = i ? INTEGRATOR_PATH : INTEGRATOR_WHITTED;
+        fixture->request.primary = PRIMARY_TRACE;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);
         struct frame_result whole = fixture_render(fixture);
         frame_renderer_set_capacity(fixture->renderer, 3, 3); /* two samples of one pixel, one of three */
@@ -263,39 +328,6 @@ TEST(a_slice_of_less_than_a_pixels_samples_is_the_same_picture_too)
         assert_memory_equal(whole.pixels, cut.pixels, whole.size_bytes);
         frame_result_finish(&whole);
         frame_result_finish(&cut);
-    }
-}
-
-TEST(frames_of_few_samples_add_up_to_one_of_many)
-{
-    struct fixture *fixture = *state;
-    a_mixture(fixture);
-    fixture->request.accumulate = true;
-    for (int i = 0; i < 3; i++) {
-        fixture->request.integrator = i == 0 ? INTEGRATOR_WHITTED : INTEGRATOR_DISTRIBUTED;
-        fixture->request.primary = i == 1 ? PRIMARY_TRACE : PRIMARY_RASTER;
-        fixture->request.aperture = i == 2 ? 0.1f : 0.0f;
-        fixture->request.samples = 21;
-        struct frame_result whole = fixture_render(fixture);
-        assert_int_equal(whole.samples, 21);
-        fixture->request.seed++; /* something else in between */
-        fixture->request.samples = 1;
-        struct frame_result other = fixture_render(fixture);
-        assert_int_equal(other.samples, 1);
-        frame_result_finish(&other);
-        fixture->request.seed--;
-        uint32_t sum = 0;
-        for (uint32_t samples = 1; samples <= 6; samples++) {
-            fixture->request.samples = samples;
-            struct frame_result part = fixture_render(fixture);
-            sum += samples;
-            assert_int_equal(part.samples, sum);
-            assert_int_equal(part.primary_rays, samples * WIDTH * HEIGHT);
-            if (sum == 21)
-                assert_same_floats(&whole, &part);
-            frame_result_finish(&part);
-        }
-        frame_result_finish(&whole);
     }
 }
 

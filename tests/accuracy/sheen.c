@@ -67,11 +67,9 @@ static void ask(void)
 }
 
 /* The fit's own bounds, and 0.002 for the quadrature; of the mean, what those of its cosines add up to. */
-TEST(fibres_send_out_what_their_fit_says)
+TEST_LONG(fibres_send_out_what_their_fit_says)
 {
     double low = 0.0, high = 0.0, mean_off = 0.0;
-    if (!device)
-        skip();
     ask();
     for (int r = 0; r < ROUGHNESSES; r++) {
         double mean = 0.0;
@@ -157,15 +155,13 @@ static void ask_pairs(const float material[4], float there[VIEWS][VIEWS])
     shader_probe_finish(&program);
 }
 
-TEST(cloth_that_light_shines_through_is_reciprocal)
+TEST_LONG(cloth_that_light_shines_through_is_reciprocal)
 {
     static const float materials[][4] = {
         {0.8f, 0.0f, 1.5f, 0.3f}, {0.4f, 0.5f, 1.5f, 0.9f}, {1.0f, 0.0f, 1.0f, 0.1f}};
     static float there[VIEWS][VIEWS];
     double off = 0.0;
     int through = 0;
-    if (!device)
-        skip();
     for (size_t m = 0; m < sizeof(materials) / sizeof(materials[0]); m++) {
         ask_pairs(materials[m], there);
         for (int i = 0; i < VIEWS; i++)

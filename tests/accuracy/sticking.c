@@ -41,6 +41,7 @@ static void set_up(struct fixture *fixture, float power)
     fixture_environment(fixture, 0.2f, 0.2f, 0.2f);
     if (power > 0)
         fixture_light(fixture, LIGHT_POINT, light_place[0], light_place[1], light_place[2], power);
+    fixture->request.tracer = TRACER_BVH;
     fixture->request.width = WIDTH;
     fixture->request.height = HEIGHT;
     fixture->request.attachments = 1u << ATTACHMENT_STICKING;
@@ -110,9 +111,10 @@ static void expect_by_material(enum body body, const double normal[3], uint8_t s
 TEST(mirror_and_glass_stick_and_a_rough_body_does_not)
 {
     static const enum integrator_kind kinds[] = {INTEGRATOR_WHITTED, INTEGRATOR_DISTRIBUTED, INTEGRATOR_PATH};
+    const size_t count = getenv("FARLIGHT_TEST_LONG") ? sizeof(kinds) / sizeof(kinds[0]) : 1;
     struct fixture *fixture = *state;
     set_up(fixture, 20.0f);
-    for (size_t i = 0; i < sizeof(kinds) / sizeof(kinds[0]); i++) {
+    for (size_t i = 0; i < count; i++) {
         fixture->request.integrator = kinds[i];
         fixture->request.samples = 1 + 3 * (i == 2); /* a mean of samples, too */
         struct frame_result result = fixture_render(fixture);
@@ -216,7 +218,7 @@ TEST(a_highlight_sticks)
     frame_result_finish(&result);
 }
 
-TEST(nothing_sticks_where_no_ray_leaves_the_straight_way)
+TEST_LONG(nothing_sticks_where_no_ray_leaves_the_straight_way)
 {
     static const enum integrator_kind kinds[] = {INTEGRATOR_RAYCAST, INTEGRATOR_AO};
     struct fixture *fixture = *state;

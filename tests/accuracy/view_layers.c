@@ -177,6 +177,8 @@ TEST(an_eye_aside_is_like_the_rendered_one_where_the_key_view_knows)
     fixture->request.height = 240;
     step_aside(fixture, 0.065f);
     expect_like_from_aside(fixture, 40, 0.005);
+    if (!getenv("FARLIGHT_TEST_LONG"))
+        return;
     fixture->request.samples = 16;
     expect_like_from_aside(fixture, 40, 0.005);
     fixture->request.aperture = 0.05f;
@@ -184,7 +186,7 @@ TEST(an_eye_aside_is_like_the_rendered_one_where_the_key_view_knows)
 }
 
 /* Each view is the picture that an eye aside sees alone, from the same key view. */
-TEST(views_side_by_side_are_those_of_eyes_side_by_side)
+TEST_LONG(views_side_by_side_are_those_of_eyes_side_by_side)
 {
     struct fixture *fixture = *state;
     mix(fixture, true);
@@ -340,7 +342,7 @@ static void panels(struct fixture *fixture)
     fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
 }
 
-TEST(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
+TEST_LONG(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
 {
     struct fixture *fixture = *state;
     panels(fixture);
@@ -388,7 +390,7 @@ static void squares_on_the_wall(struct fixture *fixture)
 }
 
 /* Beside each ray of the lens others look at the plane that it has met. */
-TEST(a_lens_over_layers_has_less_noise_than_as_many_traced_samples)
+TEST_LONG(a_lens_over_layers_has_less_noise_than_as_many_traced_samples)
 {
     struct fixture *fixture = *state;
     panels(fixture);
