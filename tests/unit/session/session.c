@@ -119,7 +119,7 @@ SESSION_TEST(the_65th_request_in_flight_is_refused_and_can_be_retried)
     begin_edit(66, 1);
     expect_error(66, PROTOCOL_ERROR_LIMIT);
     assert_int_equal(client.message.error.retryable, 1);
-    send_node(66, 1);
+    send_node(66, 1, 0);
     commit(66);
     commit(2);
     expect(MESSAGE_OK, 2);
