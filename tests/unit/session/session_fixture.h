@@ -148,11 +148,11 @@ static inline void start(const struct connection_limits *connection_limits)
 }
 
 static const struct connection_limits patient = {
-    .handshake_ms = 10000,
-    .progress_grace_ms = 10000,
+    .handshake_ms = 600000,
+    .progress_grace_ms = 600000,
     .progress_bytes_per_s = 1,
-    .idle_ms = 60000,
-    .queued_soft_ms = 10000,
+    .idle_ms = 600000,
+    .queued_soft_ms = 600000,
     .queued_soft_bytes = 16 << 20,
     .queued_hard_bytes = 64 << 20,
 };
