@@ -16,7 +16,7 @@ import time
 import unittest
 import unittest.mock
 
-from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png, tracers
+from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, long_test, read_png
 
 SIZE = (160, 90)  # of tests whose claim has another need say so: pixels are what they cost
 # Structures whose accuracy is not what is tested.
@@ -97,27 +97,35 @@ class Viewer(Case):
 
 
 class WithoutAWindow(Viewer):
-    def test_it_begins_where_a_camera_without_coordinates_stands(self):
-        state = self.replay([rest(1), {"state": "first"}], "--view", "top")["first"]
-        for axis in (0, 2):
-            self.assertAlmostEqual(state["eye"][axis], state["look_at"][axis], 5)
-        self.assertGreater(state["eye"][1], state["look_at"][1])
-
-    def test_an_orbit_changes_the_picture_and_rest_refines_it(self):
-        states = self.replay([rest(1), {"state": "first"}, rest(4), {"state": "refined"}, *HIDE,
-                              {"screenshot": "before.png"}, *drag(80, 45, 30, 10), {"state": "dragged"}, rest(),
-                              {"state": "orbited"}, rest(8), {"state": "rested"}, {"screenshot": "after.png"}])
-        self.assertGreaterEqual(states["refined"]["samples"], 4)
-        self.assertGreater(states["refined"]["frames"], states["first"]["frames"])
-        self.assertLess(states["orbited"]["samples"], 8)  # another place begins from new
-        self.assertEqual(states["rested"]["samples"], 8)
+    def test_mouse_keys_and_window_change_what_is_shown(self):
+        """One viewer; what each of them means to the camera and the settings is tested in unit/viewer."""
+        click = [{"mouse": how, "button": "left", "x": 125, "y": 50, "clicks": clicks} for clicks in (1, 2) for how in ("down", "up")]
+        states = self.replay([rest(1), {"state": "first"}, rest(4), {"state": "refined"}, *HIDE, {"screenshot": "before.png"},
+                              *drag(80, 45, 30, 10), rest(), {"state": "orbited"}, rest(8), {"state": "rested"}, {"screenshot": "after.png"},
+                              *click, rest(), {"state": "focused"}, {"wheel": 3}, {"key": "]"}, {"key": "m"}, {"key": "i"}, rest(),
+                              {"state": "nearer"}, {"resize": [200, 150]}, {"key": "-"}, rest(), {"state": "coarse"},
+                              {"screenshot": "coarse.png"}, {"key": "home"}, rest(), {"state": "home"}])
+        first, refined, orbited, rested, focused, nearer, coarse, home = states.values()
+        self.assertGreaterEqual(refined["samples"], 4)
+        self.assertGreater(refined["frames"], first["frames"])
+        self.assertLess(orbited["samples"], 8)  # another place begins from new
+        self.assertEqual(rested["samples"], 8)
+        self.assertGreater(rested["latency_s"], 0)
         for at in range(3):
-            self.assertEqual(states["first"]["look_at"][at], states["rested"]["look_at"][at])
-        self.assertAlmostEqual(distance(states["first"]["eye"], states["first"]["look_at"]),
-                               distance(states["rested"]["eye"], states["rested"]["look_at"]), 5)
-        self.assertGreater(distance(states["first"]["eye"], states["rested"]["eye"]), 1)
-        self.assertGreater(states["rested"]["latency_s"], 0)
+            self.assertEqual(first["look_at"][at], rested["look_at"][at])
+        self.assertAlmostEqual(distance(first["eye"], first["look_at"]), distance(rested["eye"], rested["look_at"]), 5)
+        self.assertGreater(distance(first["eye"], rested["eye"]), 1)
         self.assertGreater(difference(self.folder / "before.png", self.folder / "after.png"), 5)
+        self.assertEqual(focused["eye"], rested["eye"])
+        self.assertIn("focus", focused["notice"])
+        self.assertGreater(distance(focused["look_at"], rested["look_at"]), 0.3)
+        self.assertLess(distance(nearer["eye"], nearer["look_at"]), 0.8 * distance(focused["eye"], focused["look_at"]))
+        self.assertEqual([(state["integrator"], state["tone_map"]) for state in (first, nearer)], [("whitted", "neutral"), ("distributed", "aces")])
+        self.assertGreater(nearer["exposure_stops"], first["exposure_stops"])
+        self.assertEqual((coarse["width"], coarse["height"]), (100, 74))
+        self.assertEqual(read_png(self.folder / "coarse.png")[:2], (200, 150))
+        self.assertEqual(home["eye"], first["eye"])
+
 
     def test_what_rests_is_the_picture_that_render_makes(self):
         """Same camera, same samples, same random numbers: the view and a batch are one picture."""
@@ -128,6 +136,7 @@ class WithoutAWindow(Viewer):
         # Rounding in the order of the passes: a step of 8 bits here and there.
         self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
 
+    @long_test
     def test_what_rests_is_refined_until_its_error_is_as_small_as_wanted(self):
         """Not until it has all samples, and nothing is rendered any longer."""
         states = self.replay([rest(4096), {"state": "rested"}, {"state": "later", "after": 0.5}], "--integrator", "path",
@@ -135,6 +144,7 @@ class WithoutAWindow(Viewer):
         self.assertIn(states["rested"]["samples"], range(16, 1024))
         self.assertEqual(states["later"]["frames"], states["rested"]["frames"])
 
+    @long_test
     def test_a_key_shows_both_eyes_and_one(self):
         """Each is the picture that render makes, beside or above the other; the reference renders both."""
         eyes = ["--stereo", "0.25", "--integrator", "whitted", "--samples", "4"]
@@ -155,12 +165,7 @@ class WithoutAWindow(Viewer):
                                      "--stereo-layout", layout, "--views", "rays", *eyes), 0)
                 self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
 
-    def test_with_both_eyes_errors_are_those_against_rendered_views(self):
-        states = self.replay([{"key": "b"}, {"key": "x"}, rest(4), {"state": "from layers"}, {"key": "b", "shift": True},
-                              rest(4), {"state": "rendered"}])
-        self.assertLess(states["rendered"]["errors"]["mean"], 1e-4)
-        self.assertGreater(states["from layers"]["errors"]["mean"], 10 * states["rendered"]["errors"]["mean"])
-
+    @long_test
     def test_the_view_of_either_eye_can_be_pointed_at(self):
         """The middle of each view is what the camera looks at."""
         clicks = [{"mouse": "down", "button": "left", "y": 45, "clicks": 2}, {"mouse": "up", "button": "left", "y": 45}]
@@ -175,6 +180,7 @@ class WithoutAWindow(Viewer):
             self.assertGreater(along, 1 - 1e-6)
             self.assertIn("focus: ", states[x]["notice"])
 
+    @long_test
     def test_both_eyes_are_not_shown_where_they_cannot_be_made(self):
         states = self.replay([rest(1), {"key": "b"}, {"after": 0.5}, rest(1), {"state": "refused"}, {"key": "b"},
                               {"key": "b", "shift": True}, rest(1), {"state": "rendered"}],
@@ -187,23 +193,7 @@ class WithoutAWindow(Viewer):
             self.replay([rest(1)], *options, status=2)
             self.assertIn(words, self.errors)
 
-    def test_motion_may_travel_as_video_and_rest_without_loss(self):
-        """It moves for a second or so, a little at a time: what is shown then has been a stream, afterwards not."""
-        moves = [{"mouse": "move", "x": 110 + step / 20, "y": 55, "after": 0.03} for step in range(40)]
-        let_go = {"mouse": "up", "button": "left", "x": 112, "y": 55}
-        states = {}
-        for motion, still in (("h264", "predicted"), ("raw", "raw")):
-            states[motion] = self.replay([rest(8), *HIDE, drag(80, 45, 0, 0)[0], *moves, {"state": "moving"},
-                                          {"screenshot": f"moving-{motion}.png"}, let_go, rest(8), {"state": "rested"},
-                                          {"screenshot": f"rested-{motion}.png"}],
-                                         "--encoding", motion, "--still-encoding", still, "--no-adapt")
-        self.assertEqual([states["h264"][when]["encoding"] for when in ("moving", "rested")], ["h264", "predicted"])
-        self.assertEqual(states["h264"]["rested"]["eye"], states["raw"]["rested"]["eye"])
-        moving, rested, exact = (self.folder / name for name in ("moving-h264.png", "rested-h264.png", "rested-raw.png"))
-        self.assertEqual(difference(rested, exact), 0)
-        # Some of the last steps behind, and what is lost in motion.
-        self.assertTrue(0 < difference(moving, rested) < 5)
-
+    @long_test
     def test_what_moves_gives_way_to_the_rate_and_rest_is_the_full_picture(self):
         """No software renders a thousand frames a second: all that may be given up is, whatever else the machine does. What frames
         while it moves have of those before them is gone at rest."""
@@ -221,35 +211,7 @@ class WithoutAWindow(Viewer):
         self.assertEqual(states[1000]["rested"]["eye"], states[0]["rested"]["eye"])
         self.assertEqual(difference(*(self.folder / f"rested-{rate}.png" for rate in (1000, 0))), 0)
 
-    def test_a_double_click_focuses_on_the_surface_there(self):
-        click = [{"mouse": "down", "button": "left", "x": 125, "y": 50, "clicks": clicks} for clicks in (1, 2)]
-        states = self.replay([rest(), {"state": "before"}, click[0], {**click[0], "mouse": "up"}, click[1],
-                              {**click[1], "mouse": "up"}, rest(), {"state": "after"},
-                              {"mouse": "move", "x": 80, "y": 45}, {"key": "f"}, rest(), {"state": "again"}])
-        before, after, again = states["before"], states["after"], states["again"]
-        self.assertEqual(before["eye"], after["eye"])
-        self.assertGreater(distance(before["look_at"], after["look_at"]), 0.3)
-        self.assertGreater(after["look_at"][0], before["look_at"][0])  # to the right of the middle
-        self.assertIn("focus", after["notice"])
-        # It is in the middle now: focusing there changes nothing but rounding of single precision.
-        self.assertLess(distance(after["look_at"], again["look_at"]), 1e-4)
-
-    def test_keys_switch_tracer_integrator_exposure_and_tone_map(self):
-        states = self.replay([rest(), *HIDE, {"screenshot": "first.png"}, {"state": "first"}, {"key": "]"}, {"key": "]"},
-                              {"key": "]"}, rest(), {"state": "brighter"}, {"screenshot": "brighter.png"},
-                              {"key": "["}, {"key": "["}, {"key": "["}, {"key": "t", "shift": True}, rest(),
-                              {"state": "other"}, {"key": "t"}, {"key": "i", "shift": True}, rest(), {"state": "path"},
-                              {"key": "i"}, {"key": "m"}, rest(), {"state": "back"}])
-        self.assertEqual([states[name]["tracer"] for name in ("first", "brighter", "other", "path", "back")],
-                         ["bvh", "bvh", tracers()[-1]["name"], "bvh", "bvh"])
-        self.assertEqual([states[name]["integrator"] for name in ("first", "other", "path", "back")],
-                         ["whitted", "whitted", "path", "whitted"])
-        self.assertAlmostEqual(states["brighter"]["exposure_stops"], 1, 5)
-        self.assertEqual(states["back"]["exposure_stops"], 0)
-        self.assertEqual([states["path"]["tone_map"], states["back"]["tone_map"]], ["neutral", "aces"])
-        means = [sum(map(sum, read_png(self.folder / name)[2])) for name in ("first.png", "brighter.png")]
-        self.assertGreater(means[1], means[0] * 1.1)
-
+    @long_test
     def test_the_panel_changes_the_settings_of_the_tracer(self):
         states = self.replay([{"key": "p"}, rest(), {"state": "before"}, {"screenshot": "panel.png"}, {"key": "right"}, rest(),
                               {"state": "finer"}, {"key": "down"}, {"key": "down"}, {"key": "right"}, rest(),
@@ -266,6 +228,7 @@ class WithoutAWindow(Viewer):
         self.assertIn("ldc-tolerance", states["refused"]["notice"])
         self.assertIn("abuffer_resolution", said["abuffer"])
 
+    @long_test
     @unittest.mock.patch.dict(os.environ, COARSE)
     def test_the_error_map_is_black_where_the_tracer_is_exact(self):
         states = self.replay([{"key": "x"}, rest(4), {"state": "bvh"}, *HIDE, {"screenshot": "bvh.png"}, {"key": "x"},
@@ -280,22 +243,7 @@ class WithoutAWindow(Viewer):
         middle = rows[len(rows) // 2]
         self.assertLess(max(middle[0::channels]), 64)
 
-    def test_keys_cycle_through_cameras_and_clips(self):
-        states = self.replay([rest(), {"state": "first"}, {"key": "v"}, {"state": "chosen"}, {"after": 0.5},
-                              {"key": "space"}, rest(), {"state": "paused"}, {"screenshot": "paused.png"},
-                              {"key": "right"}, rest(), {"state": "stepped"}, *drag(80, 45, 25, 0), {"key": "c"},
-                              rest(), {"state": "camera"}, {"key": "home"}, rest(), {"state": "home"}],
-                             scene="carousel.glb")
-        self.assertEqual(states["first"]["clip"], "")
-        self.assertEqual(states["chosen"]["clip"], "ride")
-        self.assertTrue(states["chosen"]["playing"])
-        self.assertFalse(states["paused"]["playing"])
-        self.assertGreater(states["paused"]["time_s"], 0)
-        self.assertAlmostEqual(states["stepped"]["time_s"], states["paused"]["time_s"] + 1 / 24, 4)
-        self.assertNotEqual(states["camera"]["camera"], "")
-        self.assertEqual(states["first"]["eye"], states["home"]["eye"])
-        self.assertEqual(states["home"]["camera"], "")
-
+    @long_test
     def test_a_camera_that_a_clip_moves_is_followed_until_a_hand_leads(self):
         scene = self.folder / "riding.glb"
         riding_camera(bundled_scenes() / "carousel.glb", scene)
@@ -317,24 +265,7 @@ class WithoutAWindow(Viewer):
         # As where nothing moves: rounding in the order of the passes.
         self.assertLess(difference(self.folder / "ridden.png", self.folder / "render.png"), 0.05)
 
-    def test_held_keys_fly_and_the_wheel_moves_nearer(self):
-        states = self.replay([rest(), {"state": "first"}, {"key": "d", "hold": 0.3}, rest(), {"state": "right"},
-                              {"wheel": 3}, rest(), {"state": "near"}])
-        first, right, near = states["first"], states["right"], states["near"]
-        self.assertGreater(distance(first["eye"], right["eye"]), 0.1)
-        for at in range(3):
-            self.assertAlmostEqual(right["eye"][at] - first["eye"][at], right["look_at"][at] - first["look_at"][at], 5)
-        self.assertLess(distance(near["eye"], near["look_at"]), 0.8 * distance(right["eye"], right["look_at"]))
-
-    def test_the_window_may_change_its_size_and_pixels_their_number(self):
-        states = self.replay([rest(), {"resize": [200, 150]}, rest(), {"state": "small"}, {"screenshot": "small.png"},
-                              {"key": "-"}, rest(), {"state": "coarse"}, {"screenshot": "coarse.png"}, {"key": "="},
-                              rest(), {"state": "fine"}])
-        self.assertEqual([(states[name]["width"], states[name]["height"]) for name in ("small", "coarse", "fine")],
-                         [(200, 150), (100, 74), (200, 150)])
-        for name in ("small.png", "coarse.png"):
-            self.assertEqual(read_png(self.folder / name)[:2], (200, 150))
-
+    @long_test
     def test_a_dropped_file_replaces_the_model_or_says_why_not(self):
         """As if it had been named on the command line; what is shown stays until it is there."""
         other, broken = bundled_scenes() / "cornell.glb", self.folder / "broken.glb"
@@ -351,6 +282,7 @@ class WithoutAWindow(Viewer):
         self.replay([rest(8), *HIDE, {"screenshot": "named.png"}], scene="cornell.glb")
         self.assertEqual(difference(self.folder / "dropped.png", self.folder / "named.png"), 0)
 
+    @long_test
     @unittest.mock.patch.dict(os.environ, COARSE)
     def test_what_keys_have_chosen_is_remembered_and_options_count_for_more(self):
         state = self.folder / "a" / "state.json"  # with the folder
@@ -379,6 +311,8 @@ class WithoutAWindow(Viewer):
         self.assertIn("[0]", self.errors)
 
     def test_wrong_usage_is_reported(self):
+        self.replay([rest()], "--server", f"unix:{self.folder}/nothing", status=75)
+        self.assertIn("nothing", self.errors)
         scene = bundled_scenes() / "teapot.glb"
         for arguments, part in (([], "MODEL"), ([scene, "--headless"], "--replay"), ([scene, "--scene", "a"], "--scene"),
                                 (["--scene", "a"], "--server"), ([scene, "--scale", "3"], "--scale"),
@@ -439,6 +373,7 @@ class MadeHere(Viewer):
         rows = read_png(self.folder / "true.png")[2]
         return crop(rows, len(rows) // 2 - 60, len(rows) // 2 + 60)
 
+    @long_test
     def test_both_eyes_are_made_from_one_picture(self):
         """Of the middle, from before the daemon was gone: at rest it sends both eyes, which views are not made from."""
         size = (320, 360)
@@ -451,21 +386,6 @@ class MadeHere(Viewer):
                 true = self.rendered(state, eye, *eyes, "--views", "rays")
                 self.assertLess(error_of(made, true), error_of(before, true) / 3)
 
-    def test_both_eyes_at_rest_are_those_of_the_daemon(self):
-        moves = [{"mouse": "move", "x": 80 + step, "y": 45, "after": 0.02} for step in range(1, 51)]
-        events = [rest(8), drag(80, 45, 0, 0)[0], *moves, {"state": "moving"}, {"mouse": "up", "button": "left", "x": 130, "y": 45},
-                  rest(8), {"state": "rested"}, *HIDE, {"screenshot": "rested.png"}]
-        states = {}
-        for mode in ("on", "off"):
-            states[mode] = self.replay(events, "--views", mode, "--stereo", "0.1")
-            (self.folder / "rested.png").rename(self.folder / f"{mode}.png")
-        local = states["on"]["moving"]["local"]
-        self.assertTrue(local["shown"] and local["made"] > 0 and local["depth_bytes"] > 0)
-        self.assertEqual(states["off"]["moving"]["local"]["made"], 0)
-        self.assertFalse(states["on"]["rested"]["local"]["shown"])
-        self.assertEqual(states["on"]["rested"]["eye"], states["off"]["rested"]["eye"])
-        self.assertEqual(difference(self.folder / "on.png", self.folder / "off.png"), 0)
-
     def test_a_view_is_near_to_what_is_rendered_from_there(self):
         size = (240, 270)
         state, before, made = self.moved_while_lost("made", size=size)
@@ -474,10 +394,10 @@ class MadeHere(Viewer):
         true = self.rendered(state, size)
         # Less than a third of the error: what 10 dB are; the prototype has that in a room, a hand's breadth aside.
         self.assertLess(error_of(made, true), error_of(before, true) / 3)
-        # The same once more: it depends on the last picture and the camera alone; what nobody has seen may be marked.
-        self.assertEqual(self.moved_while_lost("again", size=size)[2], made)
+        # What nobody has seen may be marked.
         self.assertNotEqual(self.moved_while_lost("marked", "--holes", "pattern", size=size)[2], made)
 
+    @long_test
     def test_views_come_faster_than_pictures_of_a_slow_daemon_and_end_in_its_own(self):
         """Path tracing with many samples a frame takes many frames of a display, on any machine of today."""
         slow = ["--integrator", "path", "--samples", "16", "--pass-samples", "16"]
@@ -498,26 +418,6 @@ class MadeHere(Viewer):
                           without["moving"]["local"]["depth_bytes"]), (False, 0, 0))
         self.assertEqual(states["rested"]["eye"], without["rested"]["eye"])
         self.assertEqual(difference(self.folder / "with.png", self.folder / "rested.png"), 0)
-
-    def test_auto_makes_views_once_pictures_are_known_to_be_slow(self):
-        """Over a link that takes some frames of a display."""
-        moves = [event for step in range(4) for event in (*drag(60, 45, 20 + step, 0), rest(1))]
-        states = self.replay([rest(), {"state": "first"}, *moves, {"state": "known"}, {"key": "l"}, {"state": "on"}, {"key": "l"},
-                              {"state": "off"}], "--link", "1gbit,60ms")
-        self.assertEqual([states[name]["local"]["views"] for name in ("first", "known", "on", "off")],
-                         ["auto", "auto", "on", "off"])
-        self.assertEqual([states[name]["local"]["on"] for name in ("first", "known", "on", "off")], [False, True, True, False])
-
-    def test_views_are_made_from_pictures_that_travelled_as_video(self):
-        moves = [{"mouse": "move", "x": 80 + step / 2, "y": 45, "after": 0.02} for step in range(1, 101)]
-        states = self.replay([rest(8), drag(80, 45, 0, 0)[0], *moves, {"state": "moving"}, {"mouse": "up", "button": "left", "x": 130, "y": 45},
-                              {"wait": "camera"}, rest(8), {"state": "rested"}],
-                             "--views", "on", "--encoding", "h264", "--still-encoding", "predicted", "--no-adapt")
-        self.assertGreater(states["moving"]["local"]["depth_bytes"], 0)
-        self.assertGreater(states["moving"]["local"]["made"], 0)
-        self.assertEqual((states["moving"]["width"], states["moving"]["height"]), SIZE)  # without the margin
-        self.assertFalse(states["rested"]["local"]["shown"])
-
 
 class Relay:
     """A socket before a daemon's that can be cut; counts what clients send."""
@@ -573,6 +473,7 @@ class Relay:
 
 
 class Watching(Viewer):
+    @long_test
     def test_a_view_follows_the_file_of_its_model(self):
         square, red = self.folder / "square.obj", "v -1 -1 0 1 0 0\nv 1 -1 0 1 0 0\nv 1 1 0 1 0 0\nf 1 2 3\n"
         (self.folder / "paint.mtl").write_text("newmtl paint\n")
@@ -605,12 +506,12 @@ class Watching(Viewer):
 
 class OnADaemon(Viewer):
     def test_a_daemon_that_comes_back_shows_the_scene_again(self):
-        size = (320, 180)  # of which a word in the middle leaves the top as it is
-        events = [rest(), *drag(160, 90, 40, 10), rest(), {"state": "before"}, *HIDE, {"screenshot": "before.png"},
-                  {"wait": "lost"}, {"state": "lost"}, {"screenshot": "lost.png"}, {"wait": "live"}, rest(8),
+        size = (240, 136)  # of which a word in the middle leaves the top as it is
+        events = [rest(), *drag(120, 68, 40, 10), rest(), {"state": "before"}, *HIDE, {"screenshot": "before.png"},
+                  {"wait": "lost"}, {"state": "lost"}, {"screenshot": "lost.png"}, {"wait": "live"}, rest(2),
                   {"state": "after"}, {"screenshot": "after.png"}]
         with Daemon() as first:
-            process = self.start(events, "--headless", "--server", first.address, size=size)
+            process = self.start(events, "--headless", "--server", first.address, "--samples", "2", size=size)
             lines = []
             for line in process.stdout:
                 lines.append(json.loads(line))
@@ -630,10 +531,11 @@ class OnADaemon(Viewer):
         self.assertEqual((before["eye"], before["look_at"]), (after["eye"], after["look_at"]))
         # The picture stays while the connection is lost, with a word about it in its middle, and is made again.
         rows = {name: read_png(self.folder / f"{name}.png")[2] for name in ("before", "lost")}
-        self.assertEqual(rows["before"][:30], rows["lost"][:30])
+        self.assertEqual(rows["before"][:20], rows["lost"][:20])
         self.assertNotEqual(rows["before"][size[1] // 2], rows["lost"][size[1] // 2])
         self.assertLess(difference(self.folder / "before.png", self.folder / "after.png"), 2)
 
+    @long_test
     def test_over_tcp_pictures_travel_encoded_and_rest_without_loss(self):
         # On a busy machine the first frame in motion may take longer than the key is held at first.
         moves = [event for seconds in (0.5, 1, 2) for event in ({"key": "d", "hold": seconds}, {"state": f"moving {seconds}"})]
@@ -646,6 +548,7 @@ class OnADaemon(Viewer):
         self.replay([rest(8), *HIDE, {"screenshot": "private.png"}])
         self.assertEqual(difference(self.folder / "tcp.png", self.folder / "private.png"), 0)
 
+    @long_test
     def test_a_cut_connection_comes_back_to_the_scene_that_the_daemon_kept(self):
         events = [rest(), {"state": "before"}, {"wait": "lost"}, {"wait": "live"}, rest(8), {"state": "after"},
                   {"after": 1}]
@@ -663,6 +566,7 @@ class OnADaemon(Viewer):
         self.assertGreater(uploaded, 100_000)
         self.assertLess(again, 20_000)
 
+    @long_test
     def test_an_uploaded_scene_is_attached_by_its_name(self):
         command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen",
                    f"unix:{self.folder}/up"]
@@ -675,11 +579,6 @@ class OnADaemon(Viewer):
             server.send_signal(signal.SIGTERM)
         self.assertEqual(states["up"]["samples"], 8)
         self.assertIn("pan", self.errors)
-
-    def test_a_daemon_that_is_not_there_ends_the_viewer(self):
-        self.replay([rest()], "--server", f"unix:{self.folder}/nothing", status=75)
-        self.assertIn("nothing", self.errors)
-
 
 @unittest.skipUnless(shutil.which("Xvfb"), "no Xvfb")
 class InAWindow(Viewer):

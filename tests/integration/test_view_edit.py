@@ -6,7 +6,7 @@ import shutil
 import signal
 import subprocess
 
-from farlight_test import BIN, Daemon, bundled_scenes, read_png
+from farlight_test import BIN, Daemon, bundled_scenes, long_test, read_png
 from test_view import HIDE, Relay, Viewer, change_model, difference, drag, error_of, rest
 
 POT = (160, 80)  # in the middle of the teapot
@@ -77,6 +77,7 @@ class Editing(Viewer):
         self.assertEqual(before, undone)
         self.assertEqual(red, redone)
 
+    @long_test
     def test_what_is_changed_has_an_outline_at_rest_while_the_panel_is_open(self):
         size, left = (640, 360), 640 - 12 - 376  # of the panel
         states = self.replay([rest(2), *HIDE, {"screenshot": "without.png"}, *pick(128, 180), rest(2), {"screenshot": "picked.png"},
@@ -107,6 +108,7 @@ class Editing(Viewer):
             self.assertGreater(min(beyond), -2 - 1)
             self.assertLess(max(beyond), 2 * math.sqrt(2) - 2 + 1)
 
+    @long_test
     def test_a_drag_is_one_change_and_nodes_and_lights_are_edited_too(self):
         edit = self.picked()
         # A panel of 376 pixels at the right of the window; its first row begins 68 below its top.
@@ -126,6 +128,7 @@ class Editing(Viewer):
         self.assertNotEqual(states["its node"]["edit"]["fields"], states["moved"]["edit"]["fields"])
         self.assertEqual(states["dragged"]["eye"], states["moved"]["eye"])  # the camera is left alone
 
+    @long_test
     def test_the_command_line_changes_the_model_before_it_is_shown(self):
         """Each time that it is loaded, but not one that is dropped in its place."""
         model = self.folder / "pot.glb"
@@ -141,6 +144,7 @@ class Editing(Viewer):
         self.replay([rest(1)], "--edit", "material.nothing.roughness=1", status=2)
         self.assertIn("no material 'nothing'", self.errors)
 
+    @long_test
     def test_what_changes_in_the_file_is_sent_alone_and_the_view_goes_on(self):
         """Camera, clip, selection and undo are kept, and so are edits of what the file does not change; the command line's
         are made again."""
@@ -192,16 +196,7 @@ class Editing(Viewer):
             self.assertEqual([round(value, 5) for value in state["edit"]["fields"]["base_colour"][:2]], [0.9, 0.8])
         self.assertEqual(difference(self.folder / "first.png", self.folder / "second.png"), 0)
 
-    def test_the_environment_is_edited_before_the_eyes_of_all(self):
-        begin, end = [rest(2), *HIDE, {"key": "n"}, {"key": "tab"}], [{"key": "n"}, rest(2)]
-        first = [*begin, {"state": "open"}, {"wait": "change"}, {"after": 0.5}, {"state": "changed"}, *end, {"screenshot": "first.png"}]
-        second = [*begin, {"key": "down"}, *typed("0.5"), {"state": "mine"}, *end, {"screenshot": "second.png"}]
-        states, other = self.two_viewers(first, second)
-        for state in (other["mine"], states["changed"]):
-            self.assertEqual(state["edit"]["kind"], "environment")
-            self.assertEqual(state["edit"]["fields"]["colour"], [0.5] * 3)
-        self.assertEqual(difference(self.folder / "first.png", self.folder / "second.png"), 0)
-
+    @long_test
     def test_undoing_returns_the_environment_as_it_was(self):
         """The scene has a black one, which an intensity makes white."""
         states = self.replay([rest(2), *HIDE, {"screenshot": "before.png"}, {"key": "n"}, {"key": "tab"}, {"state": "before"}, {"key": "down"},

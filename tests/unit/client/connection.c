@@ -6,14 +6,14 @@
 #include <sys/eventfd.h>
 #include <xxhash.h>
 
+EACH_TEST(NULL, end_played)
+
 /* ---- connecting ---- */
 
 static void play_pong(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     greet(daemon);
-    while (take(daemon, &header, &message) && message.type == MESSAGE_PING) {
+    while (take(daemon) && asked.type == MESSAGE_PING) {
         /* Things that concern the connection may come between. */
         struct message between = {.type = MESSAGE_CREDIT};
         between.credit.channel = 1;
@@ -23,20 +23,16 @@ static void play_pong(struct daemon *daemon)
         tell(daemon, 0, &between);
         between = (struct message){.type = MESSAGE_PING};
         tell(daemon, 77, &between);
-        struct message pong = {.type = MESSAGE_PONG};
-        tell(daemon, header.request, &pong);
-        if (!take(daemon, &header, &message) || message.type != MESSAGE_PONG || header.request != 77)
+        tell_type(daemon, header.request, MESSAGE_PONG);
+        if (!take(daemon) || asked.type != MESSAGE_PONG || header.request != 77)
             return;
     }
 }
 
 TEST(a_ping_comes_back_and_a_ping_is_answered)
 {
-    struct daemon *daemon = start(play_pong);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_pong);
     uint64_t ns = 0;
-    if (!connection)
-        fail_msg("%s", error.text);
     assert_true(fl_connection_is_local(connection));
     assert_true(fl_ping(connection, &ns, &error));
     assert_true(fl_ping(connection, &ns, &error));
@@ -44,8 +40,6 @@ TEST(a_ping_comes_back_and_a_ping_is_answered)
     fl_connection_end(connection);
     assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_CONNECTION, "has been ended");
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 static void play_rubbish(struct daemon *daemon)
@@ -109,9 +103,9 @@ TEST(wrong_addresses_are_reported)
         "http://x", "ssh:",       "ssh:-oX",        "ssh:host:",   "ssh:host:/a;rm"};
     for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         error = (struct fl_error){0};
-        struct fl_connection *connection =
+        struct fl_connection *made =
             fl_connect(&(struct fl_connect_options){.server = wrong[i], .timeout_ms = 100}, &error);
-        if (connection || error.code != FL_ERROR_ARGUMENT)
+        if (made || error.code != FL_ERROR_ARGUMENT)
             fail_msg("'%s': error %d '%s'", wrong[i], (int)error.code, error.text);
     }
     assert_null(fl_connect(&(struct fl_connect_options){.server = "unix:/nonexistent/socket"}, &error));
@@ -124,62 +118,51 @@ TEST(wrong_addresses_are_reported)
 
 static void play_half_message(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message, pong = {.type = MESSAGE_PONG};
+    struct message pong = {.type = MESSAGE_PONG};
     uint8_t bytes[128];
     greet(daemon);
-    if (take(daemon, &header, &message))
+    if (take(daemon))
         put(daemon, bytes, pack(bytes, sizeof(bytes), header.request, &pong) - 9);
 }
 
 TEST(half_an_answer_is_a_lost_connection_and_stays_one)
 {
-    struct daemon *daemon = start(play_half_message);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_half_message);
     uint64_t ns = 0;
-    assert_non_null(connection);
     assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_CONNECTION, "in the middle of a message");
     error = (struct fl_error){0};
     assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_CONNECTION, "in the middle of a message");
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 static void play_goodbye(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message, goodbye = {.type = MESSAGE_GOODBYE};
+    struct message goodbye = {.type = MESSAGE_GOODBYE};
     goodbye.goodbye.code = PROTOCOL_ERROR_SHUTTING_DOWN;
     goodbye.goodbye.text = "maintenance";
     greet(daemon);
-    take(daemon, &header, &message);
+    take(daemon);
     tell(daemon, 0, &goodbye);
 }
 
 TEST(a_goodbye_is_reported_and_may_be_retried)
 {
-    struct daemon *daemon = start(play_goodbye);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_goodbye);
     uint64_t ns = 0;
-    assert_non_null(connection);
     assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_CONNECTION, "maintenance");
     assert_true(error.retryable);
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 static void play_busy(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message, refusal = {.type = MESSAGE_ERROR};
+    struct message refusal = {.type = MESSAGE_ERROR};
     refusal.error.code = PROTOCOL_ERROR_BUSY;
     refusal.error.field = refusal.error.remedy = "";
     refusal.error.text = "no place";
     greet(daemon);
-    take(daemon, &header, &message);
+    take(daemon);
     tell(daemon, 0, &refusal);
 }
 
@@ -199,16 +182,13 @@ static void play_hanging_up(struct daemon *daemon)
 
 TEST(a_daemon_without_a_place_or_a_word_may_be_tried_again)
 {
-    struct daemon *daemon = start(play_busy);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_busy);
     uint64_t ns = 0;
-    assert_non_null(connection);
     assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_REFUSED, "no place");
     assert_true(error.retryable);
-    fl_connection_destroy(connection);
-    stop(daemon);
-    daemon = start(play_turning_away);
+    leave_played();
+    struct daemon *daemon = start(play_turning_away);
     assert_null(connect_to(daemon));
     check_error(FL_ERROR_REFUSED, "all places are taken");
     assert_true(error.retryable);
@@ -223,11 +203,9 @@ TEST(a_daemon_without_a_place_or_a_word_may_be_tried_again)
 static void play_oversize(struct daemon *daemon)
 {
     const struct framing_header wrong = {.payload_bytes = 0x7fffffff, .type = MESSAGE_PONG};
-    struct framing_header header;
-    struct message message;
     uint8_t bytes[FRAMING_HEADER_BYTES];
     greet(daemon);
-    take(daemon, &header, &message);
+    take(daemon);
     framing_header_encode(bytes, &wrong);
     put(daemon, bytes, sizeof(bytes));
     more(daemon);
@@ -235,20 +213,15 @@ static void play_oversize(struct daemon *daemon)
 
 TEST(a_broken_protocol_is_reported)
 {
-    struct daemon *daemon = start(play_oversize);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_oversize);
     uint64_t ns = 0;
-    assert_non_null(connection);
     assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_PROTOCOL, "does not allow");
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 static void play_refusal(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message, refusal = {.type = MESSAGE_ERROR};
+    struct message refusal = {.type = MESSAGE_ERROR};
     refusal.error.code = PROTOCOL_ERROR_BUSY;
     refusal.error.retryable = 1;
     refusal.error.retry_after_ms = 250;
@@ -256,16 +229,14 @@ static void play_refusal(struct daemon *daemon)
     refusal.error.text = "too many at once";
     refusal.error.remedy = "wait";
     greet(daemon);
-    while (take(daemon, &header, &message) && message.type == MESSAGE_STATS)
+    while (take(daemon) && asked.type == MESSAGE_STATS)
         tell(daemon, header.request, &refusal);
 }
 
 TEST(a_refusal_keeps_its_code_field_remedy_and_the_connection)
 {
-    struct daemon *daemon = start(play_refusal);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_refusal);
     const struct message_stats_reply *reply = NULL;
-    assert_non_null(connection);
     for (int i = 0; i < 2; i++) {
         error = (struct fl_error){0};
         assert_false(fl_stats(connection, &reply, &error));
@@ -276,8 +247,6 @@ TEST(a_refusal_keeps_its_code_field_remedy_and_the_connection)
         assert_string_equal(error.field, "stats");
         assert_string_equal(error.remedy, "wait");
     }
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 /* ---- jobs ---- */
@@ -308,21 +277,19 @@ static void tell_frame(struct daemon *daemon, uint32_t request, uint32_t number)
 /* Frames as far as credit goes, the answer after the last; a cancel is answered as the protocol says. */
 static void play_job(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     uint32_t request = 0, next = 0, last = 0, step = 1;
     uint64_t credit = 0, sent = 0;
     greet(daemon);
-    while (take(daemon, &header, &message)) {
-        if (message.type == MESSAGE_RENDER) {
+    while (take(daemon)) {
+        if (asked.type == MESSAGE_RENDER) {
             request = header.request;
-            next = message.render.first_frame;
-            last = message.render.last_frame;
-            step = message.render.frame_step;
-            credit = message.render.credit;
-        } else if (message.type == MESSAGE_CREDIT) {
-            credit = message.credit.total;
-        } else if (message.type == MESSAGE_CANCEL && message.cancel.target_request == request) {
+            next = asked.render.first_frame;
+            last = asked.render.last_frame;
+            step = asked.render.frame_step;
+            credit = asked.render.credit;
+        } else if (asked.type == MESSAGE_CREDIT) {
+            credit = asked.credit.total;
+        } else if (asked.type == MESSAGE_CANCEL && asked.cancel.target_request == request) {
             struct message refusal = {.type = MESSAGE_ERROR}, done = {.type = MESSAGE_OK};
             refusal.error.code = PROTOCOL_ERROR_CANCELLED;
             tell(daemon, request, &refusal);
@@ -332,8 +299,7 @@ static void play_job(struct daemon *daemon)
         for (; request != 0 && next <= last && sent < credit; next += step, sent++)
             tell_frame(daemon, request, next);
         if (request != 0 && next > last) {
-            struct message done = {.type = MESSAGE_OK};
-            tell(daemon, request, &done);
+            tell_type(daemon, request, MESSAGE_OK);
             request = 0;
         }
     }
@@ -352,8 +318,8 @@ static struct fl_job *start_job(struct fl_scene *scene, uint32_t first, uint32_t
 
 TEST(every_frame_of_a_job_comes_once_and_in_order)
 {
-    struct daemon *daemon = start(play_job);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    connect_to_played(play_job);
+    struct fl_scene scene = {.connection = connection, .scene = 1};
     struct fl_job *job = start_job(&scene, 10, 30, 4);
     assert_non_null(job);
     assert_null(start_job(&scene, 0, 1, 1)); /* one at a time */
@@ -367,14 +333,12 @@ TEST(every_frame_of_a_job_comes_once_and_in_order)
     assert_null(fl_render_next(job, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
     fl_render_destroy(job);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
 }
 
 TEST(after_a_cancel_the_connection_can_be_used_again)
 {
-    struct daemon *daemon = start(play_job);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    connect_to_played(play_job);
+    struct fl_scene scene = {.connection = connection, .scene = 1};
     struct fl_job *job = start_job(&scene, 0, 1000, 1);
     struct fl_frame *frame = fl_render_next(job, &error);
     assert_non_null(frame);
@@ -384,15 +348,13 @@ TEST(after_a_cancel_the_connection_can_be_used_again)
     assert_null(fl_render_next(job, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
     fl_render_destroy(job);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
 }
 
 /* Of a job of six frames. */
 static void expect_broken_after_a_frame(void (*play)(struct daemon *daemon), const char *part)
 {
-    struct daemon *daemon = start(play);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    connect_to_played(play);
+    struct fl_scene scene = {.connection = connection, .scene = 1};
     struct fl_job *job = start_job(&scene, 0, 5, 1);
     struct fl_frame *frame = fl_render_next(job, &error);
     assert_non_null(frame);
@@ -400,16 +362,12 @@ static void expect_broken_after_a_frame(void (*play)(struct daemon *daemon), con
     assert_null(fl_render_next(job, &error));
     check_error(FL_ERROR_PROTOCOL, part);
     fl_render_destroy(job);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
 }
 
 static void play_wrong_frame(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     greet(daemon);
-    if (!take(daemon, &header, &message))
+    if (!take(daemon))
         return;
     tell_frame(daemon, header.request, 0);
     tell_frame(daemon, header.request, 0); /* twice */
@@ -424,10 +382,9 @@ TEST(a_repeated_frame_is_a_broken_protocol)
 
 static void play_early_end(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message, done = {.type = MESSAGE_OK};
+    struct message done = {.type = MESSAGE_OK};
     greet(daemon);
-    if (!take(daemon, &header, &message))
+    if (!take(daemon))
         return;
     tell_frame(daemon, header.request, 0);
     tell(daemon, header.request, &done);

@@ -22,6 +22,8 @@ static struct fl_link parsed(const char *text)
     return link;
 }
 
+EACH_TEST(NULL, end_played)
+
 /* ---- what is typed ---- */
 
 TEST(the_parts_of_a_link_are_told_apart_by_their_units)
@@ -256,46 +258,37 @@ TEST(a_reset_ends_both_sides)
 
 static void play_pongs(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     greet(daemon);
-    while (take(daemon, &header, &message) && message.type == MESSAGE_PING) {
-        const struct message pong = {.type = MESSAGE_PONG};
-        tell(daemon, header.request, &pong);
-    }
+    while (take(daemon) && asked.type == MESSAGE_PING)
+        tell_type(daemon, header.request, MESSAGE_PONG);
 }
 
-static struct fl_connection *connect_over(struct daemon *daemon, const char *link)
+static void connect_over(const char *link)
 {
     error = (struct fl_error){0};
-    return fl_connect(&(struct fl_connect_options){.server = daemon->address, .link = link}, &error);
+    played = start(play_pongs);
+    connection = fl_connect(&(struct fl_connect_options){.server = played->address, .link = link}, &error);
 }
 
 TEST(a_connection_over_a_link_takes_its_round_trips_and_is_not_local)
 {
-    struct daemon *daemon = start(play_pongs);
     uint64_t ns = 0;
-    struct fl_connection *connection = connect_over(daemon, "10mbit,50ms");
+    connect_over("10mbit,50ms");
     if (!connection)
         fail_msg("%s", error.text);
     assert_false(fl_connection_is_local(connection));
     assert_true(fl_ping(connection, &ns, &error));
     assert_true(ns >= 50000000);
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 TEST(a_connection_that_the_link_resets_is_lost_and_may_be_made_again)
 {
-    struct daemon *daemon = start(play_pongs);
     uint64_t ns = 0;
-    struct fl_connection *connection = connect_over(daemon, "90%"); /* lasts for 0.4 s in the mean */
+    connect_over("90%"); /* lasts for 0.4 s in the mean */
     while (connection && fl_ping(connection, &ns, &error))
         continue;
     check_error(FL_ERROR_CONNECTION, "closed");
     assert_true(error.retryable);
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 TEST(a_wrong_link_connects_to_nothing)

@@ -34,6 +34,14 @@ struct daemon {
 
 static struct fl_error error;
 
+/* The client's last message, of the thread that plays. */
+static struct framing_header header;
+static struct message asked;
+
+/* Of a test that begins with connect_to_played(). */
+static struct daemon *played;
+static struct fl_connection *connection;
+
 static inline void put_plainly(struct daemon *daemon, const void *bytes, size_t count)
 {
     if (send(daemon->fd, bytes, count, MSG_NOSIGNAL) != (ssize_t)count)
@@ -113,15 +121,15 @@ static inline void greet(struct daemon *daemon)
 }
 
 /* The next message of the client; false at the end. */
-static inline bool take(struct daemon *daemon, struct framing_header *header, struct message *message)
+static inline bool take(struct daemon *daemon)
 {
     static struct frame frame;
     while (framing_parse(&frame, daemon->in, daemon->in_bytes, MESSAGE_FROM_CLIENT, NULL) != FRAMING_CONSUMED)
         if (!more(daemon))
             return false;
-    *header = frame.header;
+    header = frame.header;
     scratch_init(&daemon->scratch, daemon->scratch_data, sizeof(daemon->scratch_data));
-    const bool good = message_decode(message, frame.header.type, frame.payload, frame.header.payload_bytes,
+    const bool good = message_decode(&asked, frame.header.type, frame.payload, frame.header.payload_bytes,
                                      &daemon->scratch, NULL);
     used(daemon, frame.consumed_bytes);
     return good;
@@ -138,6 +146,12 @@ static inline void tell(struct daemon *daemon, uint32_t request, const struct me
 {
     static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
     put(daemon, bytes, pack(bytes, sizeof(bytes), request, message));
+}
+
+static inline void tell_type(struct daemon *daemon, uint32_t request, enum message_type type)
+{
+    const struct message message = {.type = type};
+    tell(daemon, request, &message);
 }
 
 static inline void *run(void *argument)
@@ -184,6 +198,31 @@ static inline struct fl_connection *connect_to(struct daemon *daemon)
 {
     error = (struct fl_error){0};
     return fl_connect(&(struct fl_connect_options){.server = daemon->address, .timeout_ms = 3000}, &error);
+}
+
+static inline void connect_to_played(void (*play)(struct daemon *daemon))
+{
+    played = start(play);
+    connection = connect_to(played);
+    if (!connection)
+        fail_msg("%s", error.text);
+}
+
+/* From then on what the daemon saw is known. */
+static inline void leave_played(void)
+{
+    fl_connection_destroy(connection);
+    connection = NULL;
+    if (played)
+        stop(played);
+    played = NULL;
+}
+
+static inline int end_played(void **state)
+{
+    (void)state;
+    leave_played();
+    return 0;
 }
 
 static inline void check_error(enum fl_error_code code, const char *part)

@@ -118,27 +118,26 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
 
 static void play_scenes(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     memset(&seen, 0, sizeof(seen));
     greet(daemon);
-    while (take(daemon, &header, &message))
-        answer(daemon, header.request, &message);
+    while (take(daemon))
+        answer(daemon, header.request, &asked);
 }
 
-static struct fl_scene *attach(struct fl_connection *connection)
+static struct fl_scene *attach(void)
 {
-    struct fl_scene *scene = connection ? fl_scene_attach(connection, "model", &error) : NULL;
+    struct fl_scene *scene = fl_scene_attach(connection, "model", &error);
     if (!scene)
         fail_msg("%s", error.text);
     return scene;
 }
 
+EACH_TEST(NULL, end_played)
+
 TEST(an_attached_scene_is_known_as_a_loaded_one)
 {
-    struct daemon *daemon = start(play_scenes);
-    struct fl_connection *connection = connect_to(daemon);
-    struct fl_scene *scene = attach(connection);
+    connect_to_played(play_scenes);
+    struct fl_scene *scene = attach();
     uint32_t found = 0;
     const struct fl_clip_info *info = NULL;
     assert_int_equal(fl_scene_camera_count(scene), 2);
@@ -164,28 +163,22 @@ TEST(an_attached_scene_is_known_as_a_loaded_one)
     assert_true(fl_ping(connection, &(uint64_t){0}, &error)); /* what was said before has arrived */
     assert_int_equal(seen.closed, seen.scene);
     assert_int_equal(seen.clip, 0);
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 TEST(a_missing_scene_is_reported)
 {
-    struct daemon *daemon = start(play_scenes);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_scenes);
     assert_null(fl_scene_attach(connection, "other", &error));
     check_error(FL_ERROR_REFUSED, "no such scene");
     assert_int_equal(error.server_code, PROTOCOL_ERROR_UNKNOWN_ID);
-    struct fl_scene *scene = attach(connection); /* the connection is as good as before */
+    struct fl_scene *scene = attach(); /* the connection is as good as before */
     fl_scene_destroy(scene);
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 TEST(a_revision_is_heard_of_whatever_is_waited_for)
 {
-    struct daemon *daemon = start(play_scenes);
-    struct fl_connection *connection = connect_to(daemon);
-    struct fl_scene *scene = attach(connection);
+    connect_to_played(play_scenes);
+    struct fl_scene *scene = attach();
     assert_int_equal(fl_scene_revision(scene), 5); /* told with what it holds, after the 4 of the answer */
     assert_true(fl_ping(connection, &(uint64_t){0}, &error));
     assert_int_equal(fl_scene_revision(scene), 8);
@@ -194,15 +187,12 @@ TEST(a_revision_is_heard_of_whatever_is_waited_for)
     assert_int_equal(fl_scene_revision(scene), 8); /* it never falls */
     fl_scene_destroy(scene);
     assert_true(fl_ping(connection, &(uint64_t){0}, &error)); /* of a scene that is gone here */
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 TEST(a_clip_added_to_a_shared_scene_is_removed_again)
 {
-    struct daemon *daemon = start(play_scenes);
-    struct fl_connection *connection = connect_to(daemon);
-    struct fl_scene *scene = attach(connection);
+    connect_to_played(play_scenes);
+    struct fl_scene *scene = attach();
     static const float times[2] = {0, 1}, values[6] = {0};
     const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_VIEW_EYE,
                                        .interpolation = PROTOCOL_INTERPOLATION_LINEAR,
@@ -219,20 +209,17 @@ TEST(a_clip_added_to_a_shared_scene_is_removed_again)
     assert_true(fl_ping(connection, &(uint64_t){0}, &error));
     assert_int_equal(seen.removed, clip);
     assert_true(seen.committed);
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 TEST(the_list_is_the_callers)
 {
-    struct daemon *daemon = start(play_scenes);
-    struct fl_connection *connection = connect_to(daemon);
+    connect_to_played(play_scenes);
     struct fl_scene_entry *list = NULL;
     size_t count = 0;
     if (!fl_scene_list(connection, &list, &count, &error))
         fail_msg("%s", error.text);
     assert_false(fl_connection_is_read_only(connection));
-    fl_connection_destroy(connection);
+    leave_played();
     assert_int_equal(count, 2);
     assert_string_equal(list[0].name, "model");
     assert_int_equal(list[0].revision, 5);
@@ -240,5 +227,4 @@ TEST(the_list_is_the_callers)
     assert_int_equal(list[0].clients, 1);
     assert_int_equal(list[1].sharing, PROTOCOL_SHARING_KEPT);
     free(list);
-    stop(daemon);
 }

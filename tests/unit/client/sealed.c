@@ -29,11 +29,15 @@ static int remove_key(void **state)
     return 0;
 }
 
-static struct fl_connection *connect_sealed(struct daemon *daemon)
+/* False: why is in `error`. */
+static bool connect_sealed(void (*play)(struct daemon *daemon))
 {
+    leave_played();
     error = (struct fl_error){0};
-    return fl_connect(
-        &(struct fl_connect_options){.server = daemon->address, .key_file = key_file, .timeout_ms = 3000}, &error);
+    played = start(play);
+    connection = fl_connect(
+        &(struct fl_connect_options){.server = played->address, .key_file = key_file, .timeout_ms = 3000}, &error);
+    return connection;
 }
 
 static void seal_with(struct daemon *daemon, const struct sealed_key *with)
@@ -47,12 +51,10 @@ static void seal_with(struct daemon *daemon, const struct sealed_key *with)
 
 static void play_pieces(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     static uint8_t data[262144];
     seal_with(daemon, &key);
     greet(daemon);
-    while (take(daemon, &header, &message) && message.type == MESSAGE_PING) {
+    while (take(daemon) && asked.type == MESSAGE_PING) {
         /* Far more than the library's buffers hold, before the answer. */
         for (uint32_t i = 0; i < PIECES; i++) {
             struct message piece = {.type = MESSAGE_FRAME_DATA};
@@ -61,18 +63,16 @@ static void play_pieces(struct daemon *daemon)
             piece.frame_data.data_bytes = (uint32_t)sizeof(data) - 1000 * i;
             tell(daemon, 1000 + i, &piece);
         }
-        struct message pong = {.type = MESSAGE_PONG};
-        tell(daemon, header.request, &pong);
+        tell_type(daemon, header.request, MESSAGE_PONG);
     }
 }
 
 ALL_TESTS(make_key, remove_key)
+EACH_TEST(NULL, end_played)
 
 TEST(more_comes_than_the_buffers_hold_and_nothing_is_lost)
 {
-    struct daemon *daemon = start(play_pieces);
-    struct fl_connection *connection = connect_sealed(daemon);
-    if (!connection)
+    if (!connect_sealed(play_pieces))
         fail_msg("%s", error.text);
     struct message ping = {.type = MESSAGE_PING};
     assert_true(fl_connection_send(connection, 7, 0, &ping, &error));
@@ -86,32 +86,25 @@ TEST(more_comes_than_the_buffers_hold_and_nothing_is_lost)
     }
     assert_true(fl_connection_receive(connection, &received, UINT64_MAX, &error));
     assert_int_equal(received.message.type, MESSAGE_PONG);
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 static bool heard_the_last;
 
 static void play_until_the_end(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message = {.type = MESSAGE_PING};
     seal_with(daemon, &key);
     greet(daemon);
-    while (take(daemon, &header, &message))
+    while (take(daemon))
         continue;
-    heard_the_last = message.type == MESSAGE_GOODBYE && sealed_has_opened_last(daemon->link->sealed);
+    heard_the_last = asked.type == MESSAGE_GOODBYE && sealed_has_opened_last(daemon->link->sealed);
 }
 
 TEST(the_library_seals_its_end_behind_its_goodbye)
 {
     heard_the_last = false;
-    struct daemon *daemon = start(play_until_the_end);
-    struct fl_connection *connection = connect_sealed(daemon);
-    if (!connection)
+    if (!connect_sealed(play_until_the_end))
         fail_msg("%s", error.text);
-    fl_connection_destroy(connection);
-    stop(daemon);
+    leave_played();
     assert_true(heard_the_last);
 }
 
@@ -126,14 +119,12 @@ static void play_other_key(struct daemon *daemon)
 
 TEST(a_wrong_key_is_reported_with_a_remedy)
 {
-    struct daemon *daemon = start(play_other_key);
-    assert_null(connect_sealed(daemon));
+    assert_false(connect_sealed(play_other_key));
     check_error(FL_ERROR_REFUSED, "another key");
     assert_int_equal(error.server_code, PROTOCOL_ERROR_DENIED);
     assert_false(error.retryable);
-    assert_string_equal(error.field, daemon->address);
+    assert_string_equal(error.field, played->address);
     assert_non_null(strstr(error.remedy, "--key"));
-    stop(daemon);
 }
 
 static enum sealed_status refusal;
@@ -150,18 +141,14 @@ static void play_refusal(struct daemon *daemon)
 TEST(other_refusals_are_reported_too)
 {
     refusal = SEALED_TOO_MANY;
-    struct daemon *daemon = start(play_refusal);
-    assert_null(connect_sealed(daemon));
+    assert_false(connect_sealed(play_refusal));
     check_error(FL_ERROR_REFUSED, "too many");
     assert_true(error.retryable);
     assert_int_equal(error.retry_after_ms, 60000);
-    stop(daemon);
     refusal = SEALED_NO_KEY;
-    daemon = start(play_refusal);
-    assert_null(connect_sealed(daemon));
+    assert_false(connect_sealed(play_refusal));
     check_error(FL_ERROR_REFUSED, "no key");
     assert_non_null(strstr(error.remedy, "leave --key"));
-    stop(daemon);
 }
 
 static void play_key_needed(struct daemon *daemon)
@@ -193,11 +180,9 @@ static void play_no_place(struct daemon *daemon)
 
 TEST(a_daemon_without_a_place_is_heard_before_the_seal)
 {
-    struct daemon *daemon = start(play_no_place);
-    assert_null(connect_sealed(daemon));
+    assert_false(connect_sealed(play_no_place));
     check_error(FL_ERROR_REFUSED, "all places are taken");
     assert_true(error.retryable);
-    stop(daemon);
 }
 
 /* A client with a key never speaks openly, whatever answers. */
@@ -217,10 +202,9 @@ static void play_open(struct daemon *daemon)
 TEST(an_unsealed_answer_is_refused)
 {
     heard_only_the_seal = false;
-    struct daemon *daemon = start(play_open);
-    assert_null(connect_sealed(daemon));
+    assert_false(connect_sealed(play_open));
     check_error(FL_ERROR_PROTOCOL, "no sealed connection");
-    stop(daemon);
+    leave_played();
     assert_true(heard_only_the_seal);
 }
 
@@ -269,32 +253,23 @@ TEST(an_end_that_is_not_sealed_is_a_cut)
     uint64_t ns;
     cut_at = 50; /* within the record of the reply */
     is_changed = false;
-    struct daemon *daemon = start(play_cut);
-    assert_null(connect_sealed(daemon));
+    assert_false(connect_sealed(play_cut));
     check_error(FL_ERROR_CONNECTION, "its sealed end is missing");
-    stop(daemon);
     cut_at = SIZE_MAX;
-    daemon = start(play_cut);
-    struct fl_connection *connection = connect_sealed(daemon);
-    assert_non_null(connection);
+    assert_true(connect_sealed(play_cut));
     assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_CONNECTION, "enough");
-    fl_connection_destroy(connection);
-    stop(daemon);
 }
 
 TEST(a_changed_byte_breaks_the_connection)
 {
     is_changed = true;
     cut_at = SIZE_MAX;
-    struct daemon *daemon = start(play_cut);
-    struct fl_connection *connection = connect_sealed(daemon);
+    connect_sealed(play_cut);
     /* The last record is wrong: whether it is looked at before the reply is taken depends on what came at once. */
     if (connection) {
         uint64_t ns;
         assert_false(fl_ping(connection, &ns, &error));
     }
     check_error(FL_ERROR_PROTOCOL, "changed on the way");
-    fl_connection_destroy(connection);
-    stop(daemon);
 }

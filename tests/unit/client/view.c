@@ -88,30 +88,30 @@ static void tell_frame(struct daemon *daemon, uint32_t request, const struct mes
 }
 
 /* Notes what it sees of the client's next message; false at the end. */
-static bool look(struct daemon *daemon, struct framing_header *header, struct message *message)
+static bool look(struct daemon *daemon)
 {
-    if (!take(daemon, header, message))
+    if (!take(daemon))
         return false;
-    switch (message->type) {
+    switch (asked.type) {
     case MESSAGE_RENDER:
-        seen.last = message->render;
+        seen.last = asked.render;
         if (seen.renders++ == 0)
-            seen.first = message->render;
+            seen.first = asked.render;
         break;
     case MESSAGE_VIEW_CAMERA:
         seen.cameras++;
-        seen.last_command = message->view_camera.command;
-        seen.was_moving = message->view_camera.moving != 0;
-        seen.node = message->view_camera.node;
+        seen.last_command = asked.view_camera.command;
+        seen.was_moving = asked.view_camera.moving != 0;
+        seen.node = asked.view_camera.node;
         break;
     case MESSAGE_FRAME_ACK:
-        seen.acks += message->frame_ack.want_key_frame == 0 && message->frame_ack.whole;
-        seen.begun_acks += !message->frame_ack.whole;
-        seen.key_frames += message->frame_ack.want_key_frame;
-        seen.last_acked = message->frame_ack.frame;
+        seen.acks += asked.frame_ack.want_key_frame == 0 && asked.frame_ack.whole;
+        seen.begun_acks += !asked.frame_ack.whole;
+        seen.key_frames += asked.frame_ack.want_key_frame;
+        seen.last_acked = asked.frame_ack.frame;
         break;
     case MESSAGE_CREDIT:
-        seen.credit = message->credit.total;
+        seen.credit = asked.credit.total;
         break;
     case MESSAGE_CANCEL:
         seen.cancels++;
@@ -122,36 +122,27 @@ static bool look(struct daemon *daemon, struct framing_header *header, struct me
     return true;
 }
 
-static void tell_ok(struct daemon *daemon, uint32_t request)
-{
-    const struct message done = {.type = MESSAGE_OK};
-    tell(daemon, request, &done);
-}
-
 /* A frame for each camera, as a daemon does it that is never behind; another render takes the view's place. */
 static void play_view(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     uint32_t request = 0, number = 0;
     greet(daemon);
-    while (look(daemon, &header, &message)) {
-        if (message.type == MESSAGE_RENDER && message.render.kind == PROTOCOL_JOB_VIEW) {
+    while (look(daemon)) {
+        if (asked.type == MESSAGE_RENDER && asked.render.kind == PROTOCOL_JOB_VIEW) {
             const struct message_frame_begin frame = some_frame(number++, seen.last_command);
             if (request != 0)
-                tell_ok(daemon, request);
+                tell_type(daemon, request, MESSAGE_OK);
             request = header.request;
             tell_frame(daemon, request, &frame);
-        } else if (message.type == MESSAGE_RENDER) {
-            const struct message_frame_begin frame = some_frame(message.render.first_frame, 0);
+        } else if (asked.type == MESSAGE_RENDER) {
+            const struct message_frame_begin frame = some_frame(asked.render.first_frame, 0);
             tell_frame(daemon, header.request, &frame);
-            tell_ok(daemon, header.request);
-        } else if (message.type == MESSAGE_VIEW_CAMERA) {
-            const struct message_frame_begin frame = some_frame(number++, message.view_camera.command);
+            tell_type(daemon, header.request, MESSAGE_OK);
+        } else if (asked.type == MESSAGE_VIEW_CAMERA) {
+            const struct message_frame_begin frame = some_frame(number++, asked.view_camera.command);
             tell_frame(daemon, request, &frame);
-        } else if (message.type == MESSAGE_PING) {
-            const struct message pong = {.type = MESSAGE_PONG};
-            tell(daemon, header.request, &pong);
+        } else if (asked.type == MESSAGE_PING) {
+            tell_type(daemon, header.request, MESSAGE_PONG);
         }
     }
 }
@@ -159,35 +150,35 @@ static void play_view(struct daemon *daemon)
 static const struct fl_view_camera some_camera = {
     .eye_world = {0, 0, 5}, .up_world = {0, 1, 0}, .fov_y = 0.7f, .time_s = 1.5f, .moving = true, .node = 9};
 
-static struct fl_view *start_view(struct fl_scene *scene)
+static struct fl_view *start_view(struct fl_scene *of)
 {
     error = (struct fl_error){0};
     const struct message_render options = some_options();
-    struct fl_view *view = fl_view_start(scene, &options, &error);
+    struct fl_view *view = fl_view_start(of, &options, &error);
     if (!view)
         fail_msg("%s", error.text);
     return view;
 }
 
-/* What a view is seen over: a played daemon, and a connection to it. */
-struct viewing {
-    struct daemon *daemon;
-    struct fl_scene scene;
-};
+static struct fl_scene scene;
 
-static struct fl_view *begin_view(struct viewing *viewing, void (*play)(struct daemon *daemon))
+static void connect_scene(void (*play)(struct daemon *daemon))
 {
-    viewing->daemon = start(play);
-    viewing->scene = (struct fl_scene){.connection = connect_to(viewing->daemon), .scene = 1};
-    return start_view(&viewing->scene);
+    connect_to_played(play);
+    scene = (struct fl_scene){.connection = connection, .scene = 1};
+}
+
+static struct fl_view *begin_view(void (*play)(struct daemon *daemon))
+{
+    connect_scene(play);
+    return start_view(&scene);
 }
 
 /* From then on `seen` is all that the daemon saw. */
-static void end_view(struct viewing *viewing, struct fl_view *view)
+static void end_view(struct fl_view *view)
 {
     fl_view_destroy(view);
-    fl_connection_destroy(viewing->scene.connection);
-    stop(viewing->daemon);
+    leave_played();
 }
 
 static struct fl_frame *next_frame(struct fl_view *view)
@@ -198,13 +189,12 @@ static struct fl_frame *next_frame(struct fl_view *view)
     return frame;
 }
 
-EACH_TEST(begin, NULL)
+EACH_TEST(begin, end_played)
 
 TEST(cameras_are_sent_and_frames_name_them_with_their_times)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_view);
-    assert_null(fl_view_start(&viewing.scene, &usual_options, &error)); /* one at a time */
+    struct fl_view *view = begin_view(play_view);
+    assert_null(fl_view_start(&scene, &usual_options, &error)); /* one at a time */
     fl_frame_destroy(next_frame(view));
     for (uint64_t i = 1; i <= 5; i++) {
         uint64_t command = 0;
@@ -223,7 +213,7 @@ TEST(cameras_are_sent_and_frames_name_them_with_their_times)
         assert_memory_equal(frame->pixels, pixels, FRAME_BYTES);
         fl_frame_destroy(frame);
     }
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.first.kind, PROTOCOL_JOB_VIEW);
     assert_int_equal(seen.first.samples, 64);
     assert_int_equal(seen.first.frames_per_second, 60);
@@ -241,20 +231,19 @@ TEST(cameras_are_sent_and_frames_name_them_with_their_times)
 /* Every frame is acknowledged once it is whole, and makes room for another once it is taken. */
 TEST(frames_are_acknowledged_and_credit_follows_the_frames_consumed)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_view);
+    struct fl_view *view = begin_view(play_view);
     assert_true(fl_view_want_key_frame(view, &error)); /* the first one stands alone anyway */
     fl_frame_destroy(next_frame(view));
     for (unsigned i = 0; i < 2; i++)
         assert_true(fl_view_look(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
     uint64_t ns = 0;
-    assert_true(fl_ping(viewing.scene.connection, &ns, &error)); /* the third frame comes meanwhile and is kept */
+    assert_true(fl_ping(connection, &ns, &error)); /* the third frame comes meanwhile and is kept */
     assert_true(fl_view_want_key_frame(view, &error));
     fl_frame_destroy(next_frame(view));
     assert_null(fl_view_next(view, 0, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.begun_acks, 3);
     assert_int_equal(seen.acks, 3);
     assert_int_equal(seen.last_acked, 2);
@@ -265,20 +254,18 @@ TEST(frames_are_acknowledged_and_credit_follows_the_frames_consumed)
 /* One more frame of the old size comes before a new render takes its place, if the new one is wide. */
 static void play_changes(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     uint32_t request = 0, number = 0;
     greet(daemon);
-    while (look(daemon, &header, &message)) {
+    while (look(daemon)) {
         const struct message_frame_begin frame = some_frame(number, seen.last_command);
-        if (message.type == MESSAGE_RENDER) {
-            if (request != 0 && message.render.width > EDGE)
+        if (asked.type == MESSAGE_RENDER) {
+            if (request != 0 && asked.render.width > EDGE)
                 tell_frame(daemon, request, &frame);
-            number += request != 0 && message.render.width > EDGE;
+            number += request != 0 && asked.render.width > EDGE;
             if (request != 0)
-                tell_ok(daemon, request);
+                tell_type(daemon, request, MESSAGE_OK);
             request = header.request;
-        } else if (message.type == MESSAGE_VIEW_CAMERA) {
+        } else if (asked.type == MESSAGE_VIEW_CAMERA) {
             tell_frame(daemon, request, &frame); /* smaller than what was asked for, as one that adapts */
             number++;
         }
@@ -287,8 +274,7 @@ static void play_changes(struct daemon *daemon)
 
 TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_changes);
+    struct fl_view *view = begin_view(play_changes);
     struct message_render options = some_options();
     uint32_t number = 0;
     options.tracer = PROTOCOL_TRACER_LDC;
@@ -310,7 +296,7 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
     }
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.renders, 61);
     assert_int_equal(seen.last.channel, seen.first.channel);
     assert_int_equal(seen.last.tracer, PROTOCOL_TRACER_LDC);
@@ -320,10 +306,8 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
 /* Until it has seen a render. */
 static void play_with(struct daemon *daemon, uint64_t capabilities)
 {
-    struct framing_header header;
-    struct message message;
     greet_with(daemon, capabilities);
-    while (look(daemon, &header, &message) && message.type != MESSAGE_RENDER)
+    while (look(daemon) && asked.type != MESSAGE_RENDER)
         continue;
 }
 
@@ -350,8 +334,7 @@ TEST(how_first_hits_are_found_is_left_to_a_daemon_that_can_choose)
     };
     for (size_t i = 0; i < 2 * sizeof(rows) / sizeof(rows[0]); i++) {
         const bool is_batch = i % 2;
-        struct daemon *daemon = start(rows[i / 2].play);
-        struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+        connect_scene(rows[i / 2].play);
         struct message_render options = is_batch ? fl_render_defaults() : fl_view_defaults();
         options.tracer = rows[i / 2].tracer;
         options.primary = rows[i / 2].asked;
@@ -362,8 +345,7 @@ TEST(how_first_hits_are_found_is_left_to_a_daemon_that_can_choose)
             fail_msg("%s", error.text);
         fl_render_destroy(job);
         fl_view_destroy(view);
-        fl_connection_destroy(scene.connection);
-        stop(daemon);
+        leave_played();
         assert_int_equal(seen.renders, 1);
         assert_int_equal(seen.first.primary, rows[i / 2].sent);
         assert_int_equal(seen.first.denoise, is_batch ? PROTOCOL_DENOISE_OFF : PROTOCOL_DENOISE_AUTO);
@@ -378,30 +360,27 @@ static void play_marking(struct daemon *daemon)
 TEST(a_daemon_that_cannot_mark_what_sticks_is_not_asked_to)
 {
     for (int can = 0; can <= 1; can++) {
-        struct daemon *daemon = start(can ? play_marking : play_older);
-        struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+        connect_scene(can ? play_marking : play_older);
         struct message_render options = fl_view_defaults();
         options.attachments = FL_ATTACH_DEPTH | FL_ATTACH_STICKING;
         memset(&seen, 0, sizeof(seen));
         struct fl_view *view = fl_view_start(&scene, &options, &error);
         assert_non_null(view);
         fl_view_destroy(view);
-        fl_connection_destroy(scene.connection);
-        stop(daemon);
+        leave_played();
         assert_int_equal(seen.first.attachments, can ? FL_ATTACH_DEPTH | FL_ATTACH_STICKING : FL_ATTACH_DEPTH);
     }
 }
 
 TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_view);
+    struct fl_view *view = begin_view(play_view);
     struct message_render options = fl_render_defaults();
     options.width = options.height = EDGE;
     options.first_frame = options.last_frame = 77;
     for (unsigned i = 0; i < 3; i++) {
         bool done = false;
-        struct fl_job *job = fl_render_start(&viewing.scene, &options, &error);
+        struct fl_job *job = fl_render_start(&scene, &options, &error);
         assert_non_null(job);
         struct fl_frame *frame = NULL;
         for (unsigned tries = 0; !frame && tries < 1000; tries++) {
@@ -421,7 +400,7 @@ TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
     struct fl_frame *frame = next_frame(view);
     assert_int_equal(frame->frame, 0);
     fl_frame_destroy(frame);
-    end_view(&viewing, view);
+    end_view(view);
 }
 
 /* ---- what a daemon may say ---- */
@@ -438,17 +417,15 @@ static void tell_refusal(struct daemon *daemon, uint32_t request)
 /* The first render is good, each after it refused. */
 static void play_refused_change(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     uint32_t request = 0, number = 0;
     greet(daemon);
-    while (look(daemon, &header, &message)) {
+    while (look(daemon)) {
         const struct message_frame_begin frame = some_frame(number, seen.last_command);
-        if (message.type == MESSAGE_RENDER && request != 0)
+        if (asked.type == MESSAGE_RENDER && request != 0)
             tell_refusal(daemon, header.request);
-        if (message.type == MESSAGE_RENDER && request == 0)
+        if (asked.type == MESSAGE_RENDER && request == 0)
             request = header.request;
-        if (message.type == MESSAGE_VIEW_CAMERA) {
+        if (asked.type == MESSAGE_VIEW_CAMERA) {
             tell_frame(daemon, request, &frame);
             number++;
         }
@@ -457,41 +434,37 @@ static void play_refused_change(struct daemon *daemon)
 
 TEST(a_refused_change_is_reported_once_and_the_view_continues_unchanged)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_refused_change);
+    struct fl_view *view = begin_view(play_refused_change);
     assert_true(fl_view_change(view, &usual_options, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_REFUSED, "not in this build");
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.cancels, 1);
 }
 
 static void play_refused_view(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     greet(daemon);
-    while (look(daemon, &header, &message))
-        if (message.type == MESSAGE_RENDER)
+    while (look(daemon))
+        if (asked.type == MESSAGE_RENDER)
             tell_refusal(daemon, header.request);
 }
 
 TEST(a_refused_view_stays_refused_and_the_connection_can_be_used)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_refused_view);
+    struct fl_view *view = begin_view(play_refused_view);
     for (unsigned i = 0; i < 2; i++) {
         assert_null(fl_view_next(view, 10000, &error));
         check_error(FL_ERROR_REFUSED, "not in this build");
     }
     assert_false(fl_view_look(view, &some_camera, NULL, &error));
     fl_view_destroy(view);
-    view = start_view(&viewing.scene);
+    view = start_view(&scene);
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_REFUSED, "not in this build");
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.cancels, 0);
 }
 
@@ -501,12 +474,10 @@ static unsigned wrong_count;
 
 static void play_wrong(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     const struct message_frame_begin good = some_frame(4, 0);
     greet(daemon);
-    while (look(daemon, &header, &message)) {
-        if (message.type != MESSAGE_RENDER)
+    while (look(daemon)) {
+        if (asked.type != MESSAGE_RENDER)
             continue;
         tell_frame(daemon, header.request, &good);
         for (unsigned i = 0; i < wrong_count; i++)
@@ -518,15 +489,14 @@ static void expect_broken(const struct message_frame_begin *frame, unsigned coun
 {
     wrong_frame = *frame;
     wrong_count = count;
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_wrong);
+    struct fl_view *view = begin_view(play_wrong);
     struct fl_frame *whole = NULL;
     while ((whole = fl_view_next(view, 10000, &error)))
         fl_frame_destroy(whole);
     check_error(FL_ERROR_PROTOCOL, part);
     assert_false(fl_view_look(view, &some_camera, NULL, &error));
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
-    end_view(&viewing, view);
+    end_view(view);
 }
 
 TEST(frames_that_nothing_allows_break_the_connection)
@@ -551,48 +521,42 @@ TEST(frames_that_nothing_allows_break_the_connection)
 /* Many more frames than the client gave credit for, while it takes none. */
 static void play_flood(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     greet(daemon);
-    while (look(daemon, &header, &message)) {
-        if (message.type == MESSAGE_RENDER)
+    while (look(daemon)) {
+        if (asked.type == MESSAGE_RENDER)
             for (uint32_t i = 0; i <= IN_FLIGHT; i++) {
                 const struct message_frame_begin frame = some_frame(i, 0);
                 tell_frame(daemon, header.request, &frame);
             }
-        if (message.type == MESSAGE_PING)
-            tell(daemon, header.request, &(struct message){.type = MESSAGE_PONG});
+        if (asked.type == MESSAGE_PING)
+            tell_type(daemon, header.request, MESSAGE_PONG);
     }
 }
 
 TEST(more_frames_than_credit_break_the_connection)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_flood);
+    struct fl_view *view = begin_view(play_flood);
     uint64_t ns = 0;
-    assert_false(fl_ping(viewing.scene.connection, &ns, &error));
+    assert_false(fl_ping(connection, &ns, &error));
     check_error(FL_ERROR_PROTOCOL, "more frames arrived than were requested");
-    end_view(&viewing, view);
+    end_view(view);
 }
 
 /* An access unit goes to the caller as it came. */
 static void play_h264(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     struct message_frame_begin frame = some_frame(0, 0);
     frame.encoding = PROTOCOL_ENCODING_H264;
     frame.size_bytes = 100;
     greet(daemon);
-    while (look(daemon, &header, &message))
-        if (message.type == MESSAGE_RENDER)
+    while (look(daemon))
+        if (asked.type == MESSAGE_RENDER)
             tell_frame(daemon, header.request, &frame);
 }
 
 TEST(a_frame_in_h264_is_left_to_the_caller)
 {
-    struct daemon *daemon = start(play_h264);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    connect_scene(play_h264);
     struct message_render options = some_options();
     options.encoding = PROTOCOL_ENCODING_H264;
     assert_false(fl_connection_can_h264(scene.connection)); /* the played daemon has not said so */
@@ -603,20 +567,17 @@ TEST(a_frame_in_h264_is_left_to_the_caller)
     assert_memory_equal(frame->encoded, pixels, 100);
     fl_frame_destroy(frame);
     fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    leave_played();
     assert_int_equal(seen.first.quality, 0); /* where nothing is said it is left to the daemon */
 }
 
 /* The first frame ends unfinished; the next one is whole. */
 static void play_abandoned(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     const struct message_frame_begin next = some_frame(5, 0);
     greet(daemon);
-    while (look(daemon, &header, &message)) {
-        if (message.type != MESSAGE_RENDER)
+    while (look(daemon)) {
+        if (asked.type != MESSAGE_RENDER)
             continue;
         tell_begin(daemon, header.request, &wrong_frame);
         struct message part = {.type = MESSAGE_FRAME_DATA};
@@ -634,13 +595,12 @@ static void play_abandoned(struct daemon *daemon)
 TEST(a_frame_that_is_abandoned_is_not_seen_and_not_acknowledged)
 {
     wrong_frame = some_frame(4, 0);
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_abandoned);
+    struct fl_view *view = begin_view(play_abandoned);
     struct fl_frame *frame = fl_view_next(view, 10000, &error);
     assert_non_null(frame);
     assert_int_equal(frame->frame, 5);
     fl_frame_destroy(frame);
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.acks, 1);
     assert_int_equal(seen.begun_acks, 2);
     assert_int_equal(seen.credit, seen.first.credit + 1); /* for the one that was seen */
@@ -649,8 +609,6 @@ TEST(a_frame_that_is_abandoned_is_not_seen_and_not_acknowledged)
 /* A frame of motion in two parts; it ends without the second one when a camera comes. */
 static void play_parts(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     struct record_frame_part parts[] = {{PROTOCOL_FRAME_PART_COLOURS, FRAME_BYTES},
                                         {PROTOCOL_FRAME_PART_NORMALS, 100}};
     struct message_frame_begin frame = some_frame(0, 0);
@@ -659,9 +617,9 @@ static void play_parts(struct daemon *daemon)
     frame.attachments = FL_ATTACH_NORMALS;
     frame.normal_bytes = 100;
     greet(daemon);
-    while (look(daemon, &header, &message)) {
+    while (look(daemon)) {
         struct message next = {.type = MESSAGE_FRAME_PARTS};
-        if (message.type == MESSAGE_RENDER && message.render.parts) {
+        if (asked.type == MESSAGE_RENDER && asked.render.parts) {
             request = header.request;
             next.frame_parts.parts = parts;
             next.frame_parts.parts_count = 2;
@@ -671,7 +629,7 @@ static void play_parts(struct daemon *daemon)
             next.frame_data.data = pixels;
             next.frame_data.data_bytes = FRAME_BYTES;
             tell(daemon, request, &next);
-        } else if (message.type == MESSAGE_VIEW_CAMERA) {
+        } else if (asked.type == MESSAGE_VIEW_CAMERA) {
             next = (struct message){.type = MESSAGE_FRAME_END};
             next.frame_end.abandoned = 1;
             tell(daemon, request, &next);
@@ -681,8 +639,7 @@ static void play_parts(struct daemon *daemon)
 
 TEST(first_parts_are_delivered_at_once_and_again_at_the_end_for_one_credit)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_parts);
+    struct fl_view *view = begin_view(play_parts);
     usual_options.attachments = FL_ATTACH_NORMALS;
     usual_options.parts = 1;
     fl_view_deliver_parts(view, true);
@@ -697,7 +654,7 @@ TEST(first_parts_are_delivered_at_once_and_again_at_the_end_for_one_credit)
         fl_frame_destroy(frame);
         assert_true(i > 0 || fl_view_look(view, &some_camera, NULL, &error));
     }
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.begun_acks, 1);
     assert_int_equal(seen.acks, 1);
     assert_int_equal(seen.credit, seen.first.credit + 1);
@@ -707,39 +664,35 @@ TEST(a_frame_of_motion_that_is_abandoned_breaks_the_connection)
 {
     wrong_frame = some_frame(4, 0);
     wrong_frame.moving = 1;
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_abandoned);
+    struct fl_view *view = begin_view(play_abandoned);
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_PROTOCOL, "which is allowed only at rest");
-    end_view(&viewing, view);
+    end_view(view);
 }
 
 /* Half a frame, then nothing. */
 static void play_half(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     const struct message_frame_begin frame = some_frame(0, 0);
     greet(daemon);
-    while (look(daemon, &header, &message)) {
-        if (message.type == MESSAGE_RENDER)
+    while (look(daemon)) {
+        if (asked.type == MESSAGE_RENDER)
             tell_begin(daemon, header.request, &frame);
-        if (message.type == MESSAGE_VIEW_CAMERA)
+        if (asked.type == MESSAGE_VIEW_CAMERA)
             return;
     }
 }
 
 TEST(a_connection_lost_within_a_frame_is_reported_and_nothing_waits_forever)
 {
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_half);
+    struct fl_view *view = begin_view(play_half);
     assert_null(fl_view_next(view, 20, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_CONNECTION, "closed");
     assert_false(fl_view_change(view, &usual_options, &error));
-    end_view(&viewing, view);
+    end_view(view);
     assert_int_equal(seen.acks, 0);
 }
 
@@ -749,17 +702,15 @@ static sem_t may_read;
 
 static void play_busy(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     uint32_t number = 0;
     struct message_frame_begin frame = some_frame(number++, 0);
     greet(daemon);
-    if (!look(daemon, &header, &message))
+    if (!look(daemon))
         return;
     const uint32_t request = header.request;
     tell_frame(daemon, request, &frame);
     sem_wait(&may_read);
-    while (look(daemon, &header, &message)) {
+    while (look(daemon)) {
         if (number > 1 || seen.acks == 0 || seen.credit <= IN_FLIGHT)
             continue;
         frame = some_frame(number++, 0);
@@ -770,8 +721,7 @@ static void play_busy(struct daemon *daemon)
 TEST(what_had_no_room_beside_much_else_is_acknowledged_later)
 {
     sem_init(&may_read, 0, 0);
-    struct viewing viewing;
-    struct fl_view *view = begin_view(&viewing, play_busy);
+    struct fl_view *view = begin_view(play_busy);
     /* Sending ends where there is no room for a message of any size. */
     while (fl_view_look(view, &some_camera, NULL, &error))
         continue;
@@ -779,7 +729,7 @@ TEST(what_had_no_room_beside_much_else_is_acknowledged_later)
     fl_frame_destroy(next_frame(view));
     sem_post(&may_read);
     fl_frame_destroy(next_frame(view));
-    end_view(&viewing, view);
+    end_view(view);
     sem_destroy(&may_read);
     assert_int_equal(seen.acks, 2);
     assert_int_equal(seen.credit, IN_FLIGHT + 2);
@@ -788,34 +738,30 @@ TEST(what_had_no_room_beside_much_else_is_acknowledged_later)
 /* Reads nothing until it is told to; then it answers what it has no frames for. */
 static void play_busy_until_the_end(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     greet(daemon);
     sem_wait(&may_read);
-    while (look(daemon, &header, &message)) {
-        seen.closed_after_cancel |= message.type == MESSAGE_SCENE_CLOSE && seen.cancels == 1;
-        if (message.type == MESSAGE_CANCEL || message.type == MESSAGE_SCENE_CLOSE)
-            tell_ok(daemon, header.request);
-        if (message.type != MESSAGE_PING)
+    while (look(daemon)) {
+        seen.closed_after_cancel |= asked.type == MESSAGE_SCENE_CLOSE && seen.cancels == 1;
+        if (asked.type == MESSAGE_CANCEL || asked.type == MESSAGE_SCENE_CLOSE)
+            tell_type(daemon, header.request, MESSAGE_OK);
+        if (asked.type != MESSAGE_PING)
             continue;
-        const struct message pong = {.type = MESSAGE_PONG};
-        tell(daemon, header.request, &pong);
+        tell_type(daemon, header.request, MESSAGE_PONG);
     }
 }
 
 TEST(what_ends_beside_much_else_is_given_back_later)
 {
     sem_init(&may_read, 0, 0);
-    struct daemon *daemon = start(play_busy_until_the_end);
-    struct fl_connection *connection = connect_to(daemon);
-    struct fl_scene *scene = fl_scene_create(connection, &error);
-    assert_non_null(scene);
-    struct fl_view *view = start_view(scene);
+    connect_to_played(play_busy_until_the_end);
+    struct fl_scene *own = fl_scene_create(connection, &error);
+    assert_non_null(own);
+    struct fl_view *view = start_view(own);
     while (fl_view_look(view, &some_camera, NULL, &error))
         continue;
     check_error(FL_ERROR_TIMEOUT, "no more messages");
     fl_view_destroy(view);
-    fl_scene_destroy(scene);
+    fl_scene_destroy(own);
     uint64_t ping_ns;
     assert_false(fl_ping(connection, &ping_ns, &error)); /* still nothing has room */
     check_error(FL_ERROR_TIMEOUT, "no more messages");
@@ -823,8 +769,7 @@ TEST(what_ends_beside_much_else_is_given_back_later)
     /* What asks next goes behind. */
     while (!fl_ping(connection, &ping_ns, &error))
         check_error(FL_ERROR_TIMEOUT, "no more messages");
-    fl_connection_destroy(connection);
-    stop(daemon);
+    leave_played();
     sem_destroy(&may_read);
     assert_int_equal(seen.cancels, 1);
     assert_true(seen.closed_after_cancel);

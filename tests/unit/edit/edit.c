@@ -20,7 +20,7 @@ static struct {
     struct message_set_material set;
 } world;
 
-static void tell_ok(struct daemon *daemon, uint32_t request)
+static void tell_done(struct daemon *daemon, uint32_t request)
 {
     struct message message = {.type = MESSAGE_OK};
     message.ok.revision = world.revision;
@@ -36,8 +36,8 @@ static void tell_list(struct daemon *daemon, uint32_t request, const struct mess
     message.scene_objects_reply.total = 1;
     message.scene_objects_reply.next = world.stuck ? 3 : 0;
     message.scene_objects_reply.objects = &entry;
-    const bool asked = question->name[0] == '\0' || strcmp(question->name, "steel") == 0;
-    message.scene_objects_reply.objects_count = asked && question->kind == PROTOCOL_OBJECT_MATERIAL;
+    const bool is_asked = question->name[0] == '\0' || strcmp(question->name, "steel") == 0;
+    message.scene_objects_reply.objects_count = is_asked && question->kind == PROTOCOL_OBJECT_MATERIAL;
     tell(daemon, request, &message);
 }
 
@@ -50,7 +50,7 @@ static void tell_material(struct daemon *daemon, uint32_t request, uint32_t obje
     message.set_material.metallic = world.metallic;
     message.set_material.name = "steel";
     tell(daemon, request, &message);
-    tell_ok(daemon, request);
+    tell_done(daemon, request);
 }
 
 /* Another client adds to the other field each time before this one is told of the conflict. */
@@ -59,7 +59,7 @@ static void answer_commit(struct daemon *daemon, uint32_t request)
     world.commits++;
     if (world.commits > world.conflicts) {
         world.revision++;
-        tell_ok(daemon, request);
+        tell_done(daemon, request);
         return;
     }
     world.metallic += world.metallic < 1 ? 0.25f : 0;
@@ -79,7 +79,7 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
     switch (message->type) {
     case MESSAGE_SCENE_ATTACH:
     case MESSAGE_SCENE_CLOSE:
-        tell_ok(daemon, request);
+        tell_done(daemon, request);
         return;
     case MESSAGE_SCENE_DESCRIBE:
         message_init(&reply, MESSAGE_SCENE_DESCRIPTION);
@@ -107,47 +107,49 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
 
 static void play(struct daemon *daemon)
 {
-    struct framing_header header;
-    struct message message;
     greet_with(daemon, world.old ? 0 : HANDSHAKE_CAN_READ_OBJECTS);
-    while (take(daemon, &header, &message))
-        answer(daemon, header.request, &message);
+    while (take(daemon))
+        answer(daemon, header.request, &asked);
 }
 
-static struct {
-    struct daemon *daemon;
-    struct fl_connection *connection;
-    struct fl_scene *scene;
-} here;
+static struct fl_scene *scene;
 
 static void come(void)
 {
     world.revision = 10;
-    here.daemon = start(play);
-    here.connection = connect_to(here.daemon);
-    here.scene = here.connection ? fl_scene_attach(here.connection, "model", &error) : NULL;
-    if (!here.scene)
+    connect_to_played(play);
+    scene = fl_scene_attach(connection, "model", &error);
+    if (!scene)
         fail_msg("%s", error.text);
 }
 
 static void leave(void)
 {
-    fl_scene_destroy(here.scene);
-    fl_connection_destroy(here.connection);
-    stop(here.daemon);
+    fl_scene_destroy(scene);
+    scene = NULL;
+    leave_played();
+    memset(&world, 0, sizeof(world));
 }
+
+static int end(void **state)
+{
+    (void)state;
+    leave();
+    return 0;
+}
+
+EACH_TEST(NULL, end)
 
 static bool edit(const char *text, struct fl_edited *edited)
 {
     struct fl_assignment assignment;
     error = (struct fl_error){0};
     assert_true(fl_assignment_parse(text, &assignment, &error));
-    return fl_scene_edit(here.scene, &assignment, 1, edited, &error);
+    return fl_scene_edit(scene, &assignment, 1, edited, &error);
 }
 
 TEST(an_edit_that_comes_too_late_is_made_anew_of_what_is_there)
 {
-    memset(&world, 0, sizeof(world));
     world.conflicts = 2;
     world.roughness = 0.5f;
     come();
@@ -164,12 +166,10 @@ TEST(an_edit_that_comes_too_late_is_made_anew_of_what_is_there)
     assert_int_equal(edited.undo[0].id, STEEL);
     assert_true(edited.undo[0].values[0] == 0.5);
     free(edited.undo);
-    leave();
 }
 
 TEST(an_edit_that_always_comes_too_late_ends_with_the_conflict)
 {
-    memset(&world, 0, sizeof(world));
     world.conflicts = UINT32_MAX;
     come();
     assert_false(edit("material.steel.roughness=1", NULL));
@@ -177,18 +177,16 @@ TEST(an_edit_that_always_comes_too_late_ends_with_the_conflict)
     assert_int_equal(error.server_code, PROTOCOL_ERROR_CONFLICT);
     assert_string_equal(error.field, "material.steel.roughness=1");
     assert_true(error.retryable);
-    leave();
 }
 
 TEST(an_object_is_known_by_name_number_identifier_and_pattern)
 {
     static const char *const which[] = {"steel", "0", "#5", "st*l", "*"};
-    memset(&world, 0, sizeof(world));
     come();
     for (size_t i = 0; i < sizeof(which) / sizeof(which[0]); i++) {
         uint32_t *ids = NULL;
         size_t count = 0;
-        if (!fl_scene_find_objects(here.scene, PROTOCOL_OBJECT_MATERIAL, which[i], &ids, &count, &error))
+        if (!fl_scene_find_objects(scene, PROTOCOL_OBJECT_MATERIAL, which[i], &ids, &count, &error))
             fail_msg("%s: %s", which[i], error.text);
         assert_int_equal(count, 1);
         assert_int_equal(ids[0], STEEL);
@@ -196,42 +194,36 @@ TEST(an_object_is_known_by_name_number_identifier_and_pattern)
     }
     uint32_t *ids = NULL;
     size_t count = 0;
-    assert_false(fl_scene_find_objects(here.scene, PROTOCOL_OBJECT_MATERIAL, "stele", &ids, &count, &error));
+    assert_false(fl_scene_find_objects(scene, PROTOCOL_OBJECT_MATERIAL, "stele", &ids, &count, &error));
     assert_string_equal(error.remedy, "did you mean 'steel'?");
-    assert_false(fl_scene_find_objects(here.scene, PROTOCOL_OBJECT_MATERIAL, "b*", &ids, &count, &error));
+    assert_false(fl_scene_find_objects(scene, PROTOCOL_OBJECT_MATERIAL, "b*", &ids, &count, &error));
     assert_string_equal(error.remedy, "it has 1 material: 'steel'");
-    assert_false(fl_scene_find_objects(here.scene, PROTOCOL_OBJECT_MATERIAL, "1", &ids, &count, &error));
+    assert_false(fl_scene_find_objects(scene, PROTOCOL_OBJECT_MATERIAL, "1", &ids, &count, &error));
     struct fl_object_state read;
-    assert_true(fl_scene_read(here.scene, PROTOCOL_OBJECT_MATERIAL, STEEL, &read, &error));
+    assert_true(fl_scene_read(scene, PROTOCOL_OBJECT_MATERIAL, STEEL, &read, &error));
     assert_string_equal(read.name, "steel");
     assert_int_equal(read.revision, 10);
-    assert_false(fl_scene_read(here.scene, PROTOCOL_OBJECT_MESH, 1, &read, &error));
+    assert_false(fl_scene_read(scene, PROTOCOL_OBJECT_MESH, 1, &read, &error));
     check_error(FL_ERROR_ARGUMENT, "no fields");
-    leave();
 }
 
 TEST(an_older_daemon_is_reported_before_it_is_asked)
 {
-    memset(&world, 0, sizeof(world));
     world.old = true;
     come();
     assert_false(edit("material.steel.roughness=1", NULL));
     check_error(FL_ERROR_REFUSED, "cannot say what a scene has");
-    leave();
 }
 
 TEST(a_daemon_that_says_what_makes_no_sense_is_reported)
 {
-    memset(&world, 0, sizeof(world));
     world.wrong_object = 1;
     come();
     assert_false(edit("material.steel.roughness=1", NULL));
     check_error(FL_ERROR_PROTOCOL, "not object 5");
     leave();
-    memset(&world, 0, sizeof(world));
     world.stuck = true;
     come();
     assert_false(edit("material.steel.roughness=1", NULL));
     check_error(FL_ERROR_PROTOCOL, "does not come after");
-    leave();
 }

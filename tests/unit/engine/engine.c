@@ -8,20 +8,22 @@
 #include <xxhash.h>
 #include <zstd.h>
 
+EACH_TEST(start_engine, stop_engine)
+
 /* ---- frames ------------------------------------------------------------------------------------- */
 
 TEST(frames_come_in_order_with_what_they_cost)
 {
-    struct engine *engine = start((struct engine_options){.encode_threads = 4});
-    open_scene(engine, 1, 1);
-    submit_commit(engine, 1, 2, 1);
-    assert_int_equal(expect_done(engine, 1, 2), 1);
+    restart((struct engine_options){.encode_threads = 4});
+    open_scene(1, 1);
+    submit_commit(1, 2, 1);
+    assert_int_equal(expect_done(1, 2), 1);
     struct engine_command *made = render(1, 3, 10, 100);
     made->job.frame_step = 3;
     made->job.time_origin_frame = 10;
-    submit(engine, made);
+    submit(made);
     for (uint32_t frame = 10; frame <= 100; frame += 3) {
-        struct engine_event *event = expect_frame(engine, 1, 3, frame);
+        struct engine_event *event = expect_frame(1, 3, frame);
         const struct engine_frame *got = event->frame;
         assert_int_equal(got->size_bytes, 4 * 3 * 4);
         assert_int_equal(got->bytes[0], (frame - 10) / 3);
@@ -36,48 +38,46 @@ TEST(frames_come_in_order_with_what_they_cost)
         assert_int_equal(stage_times_sum_ns(&got->result.times, STAGE_APPLY, CLOCK_CPU) > 0, frame == 10);
         engine_event_destroy(event);
     }
-    expect_done(engine, 1, 3);
-    expect_silence(engine);
-    stop(engine);
+    expect_done(1, 3);
+    expect_silence();
 }
 
-static void expect_samples(struct engine *engine, uint32_t request, bool starts_anew, const uint32_t samples[3])
+static void expect_samples(uint32_t request, bool starts_anew, const uint32_t samples[3])
 {
     struct engine_command *made = render(1, request, 5, 7);
     made->job.frame.samples = 4;
     made->job.frame.accumulate = true;
     made->job.frame.starts_anew = starts_anew;
-    submit(engine, made);
+    submit(made);
     for (uint32_t i = 0; i < 3; i++) {
-        struct engine_event *event = expect_frame(engine, 1, request, 5 + i);
+        struct engine_event *event = expect_frame(1, request, 5 + i);
         assert_int_equal(event->frame->result.samples, samples[i]);
         engine_event_destroy(event);
     }
-    expect_done(engine, 1, request);
+    expect_done(1, request);
 }
 
 TEST(a_job_adds_to_the_samples_of_the_one_before_it_unless_it_starts_anew)
 {
-    struct engine *engine = start((struct engine_options){.encode_threads = 1});
-    open_scene(engine, 1, 1);
-    expect_samples(engine, 2, false, (const uint32_t[]){4, 8, 12});
-    expect_samples(engine, 3, false, (const uint32_t[]){16, 20, 24});
-    expect_samples(engine, 4, true, (const uint32_t[]){4, 8, 12});
-    stop(engine);
+    restart((struct engine_options){.encode_threads = 1});
+    open_scene(1, 1);
+    expect_samples(2, false, (const uint32_t[]){4, 8, 12});
+    expect_samples(3, false, (const uint32_t[]){16, 20, 24});
+    expect_samples(4, true, (const uint32_t[]){4, 8, 12});
 }
 
 TEST(layers_are_encoded_as_one_picture)
 {
-    struct engine *engine = start((struct engine_options){.encode_threads = 1});
+    restart((struct engine_options){.encode_threads = 1});
     const uint32_t layers = 1u << LAYER_BEAUTY | 1u << LAYER_NORMAL | 1u << LAYER_ID;
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     for (uint32_t encoding = ENCODING_RAW; encoding <= ENCODING_ZSTD; encoding++) {
         struct engine_command *made = render(1, 2 + encoding, 0, 0);
         made->job.encoding = (enum encoding)encoding;
         made->job.frame.format = PIXEL_FORMAT_RGBA32F;
         made->job.frame.layers = layers;
-        submit(engine, made);
-        struct engine_event *event = expect_frame(engine, 1, 2 + encoding, 0);
+        submit(made);
+        struct engine_event *event = expect_frame(1, 2 + encoding, 0);
         const struct engine_frame *got = event->frame;
         uint8_t pixels[4 * 3 * 16 * 3];
         memset(pixels, (int)encoding, sizeof(pixels)); /* the fake's frames count up */
@@ -92,35 +92,33 @@ TEST(layers_are_encoded_as_one_picture)
             assert_memory_equal(back, pixels, sizeof(pixels));
         }
         engine_event_destroy(event);
-        expect_done(engine, 1, 2 + encoding);
+        expect_done(1, 2 + encoding);
     }
-    stop(engine);
 }
 
 TEST(no_frame_goes_out_beyond_its_credit)
 {
-    struct engine *engine = start((struct engine_options){.frames_in_flight = 3});
-    open_scene(engine, 1, 1);
+    restart((struct engine_options){.frames_in_flight = 3});
+    open_scene(1, 1);
     struct engine_command *made = render(1, 2, 0, 9);
     made->job.credit = 2;
-    submit(engine, made);
-    take_frame(engine, 1, 2, 0);
-    take_frame(engine, 1, 2, 1);
-    expect_silence(engine);
+    submit(made);
+    take_frame(1, 2, 0);
+    take_frame(1, 2, 1);
+    expect_silence();
     /* Ahead of the credit, as many as may be in flight are rendered, and not one more. */
     assert_int_equal(atomic_load(&fake.frames_begun), 5);
-    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 4);
-    take_frame(engine, 1, 2, 2);
-    take_frame(engine, 1, 2, 3);
-    expect_silence(engine);
+    submit_target(ENGINE_JOB_CREDIT, 1, 0, 2, 4);
+    take_frame(1, 2, 2);
+    take_frame(1, 2, 3);
+    expect_silence();
     assert_int_equal(atomic_load(&fake.frames_begun), 7);
-    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 3); /* absolute: less than before changes nothing */
-    expect_silence(engine);
-    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 100);
+    submit_target(ENGINE_JOB_CREDIT, 1, 0, 2, 3); /* absolute: less than before changes nothing */
+    expect_silence();
+    submit_target(ENGINE_JOB_CREDIT, 1, 0, 2, 100);
     for (uint32_t frame = 4; frame <= 9; frame++)
-        take_frame(engine, 1, 2, frame);
-    expect_done(engine, 1, 2);
-    stop(engine);
+        take_frame(1, 2, frame);
+    expect_done(1, 2);
 }
 
 TEST(large_frames_are_fewer_in_flight_but_always_one)
@@ -128,69 +126,38 @@ TEST(large_frames_are_fewer_in_flight_but_always_one)
     for (int frames = 1; frames <= 4; frames++) {
         /* A frame of the test has 48 bytes. */
         uint64_t bytes = frames == 1 ? 10 : (uint64_t)frames * 48 + 10;
-        struct engine *engine = start((struct engine_options){.frames_in_flight = 3, .frame_window_bytes = bytes});
-        open_scene(engine, 1, 1);
+        restart((struct engine_options){.frames_in_flight = 3, .frame_window_bytes = bytes});
+        open_scene(1, 1);
         struct engine_command *made = render(1, 2, 0, 9);
         made->job.credit = 1;
-        submit(engine, made);
-        take_frame(engine, 1, 2, 0);
-        expect_silence(engine);
+        submit(made);
+        take_frame(1, 2, 0);
+        expect_silence();
         assert_int_equal(atomic_load(&fake.frames_begun), 1 + (frames < 3 ? frames : 3));
-        submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 100);
+        submit_target(ENGINE_JOB_CREDIT, 1, 0, 2, 100);
         for (uint32_t frame = 1; frame <= 9; frame++)
-            take_frame(engine, 1, 2, frame);
-        expect_done(engine, 1, 2);
-        stop(engine);
+            take_frame(1, 2, frame);
+        expect_done(1, 2);
     }
-}
-
-TEST(nothing_is_begun_for_a_client_that_gives_no_credit)
-{
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    struct engine_command *made = render(1, 2, 0, 0);
-    made->job.credit = 0;
-    submit(engine, made);
-    expect_silence(engine);
-    assert_int_equal(atomic_load(&fake.frames_begun), 0);
-    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 1);
-    take_frame(engine, 1, 2, 0);
-    expect_done(engine, 1, 2);
-    stop(engine);
-}
-
-TEST(frames_without_credit_stop_the_rendering)
-{
-    struct engine *engine = start((struct engine_options){.frames_in_flight = 2});
-    open_scene(engine, 1, 1);
-    submit(engine, render(1, 2, 0, 9));
-    wait_until(&fake.frames_done, 2);
-    usleep(50000);
-    assert_int_equal(atomic_load(&fake.frames_begun), 2);
-    for (uint32_t frame = 0; frame <= 9; frame++)
-        take_frame(engine, 1, 2, frame);
-    expect_done(engine, 1, 2);
-    stop(engine);
 }
 
 /* Slices of one client take ten times as long as those of the other. */
 static void run_beside_each_other(uint32_t weight_of_first)
 {
-    struct engine *engine = start((struct engine_options){0});
+    clock_stop();
     for (uint64_t client = 1; client <= 2; client++)
-        open_scene(engine, client, 1);
+        open_scene(client, 1);
     for (uint64_t client = 1; client <= 2; client++) {
         struct engine_command *made = render(client, 5, 0, 0);
         made->job.frame.samples = client == 1 ? 40 : 400;
         made->job.frame.ao_rays = client == 1 ? 5000 : 500;
         made->job.frame.seed = client;
         made->job.weight = client == 1 ? weight_of_first : 0;
-        submit(engine, made);
+        submit(made);
     }
     for (int i = 0; i < 4; i++)
-        engine_event_destroy(event_within(engine, 60000));
+        engine_event_destroy(event_within(60000));
     expect_shares(1, weight_of_first, 2, 1);
-    stop(engine);
 }
 
 TEST(clients_have_the_same_share_of_time_however_long_their_slices_are)
@@ -205,9 +172,8 @@ TEST(the_weight_of_a_job_is_its_clients_share)
 
 TEST(a_job_that_would_wait_for_the_device_lets_others_go_first)
 {
-    struct engine *engine = start((struct engine_options){0});
     for (uint64_t client = 1; client <= 2; client++) {
-        open_scene(engine, client, 1);
+        open_scene(client, 1);
         struct engine_command *made = gated(render(client, 5, 0, 0));
         made->job.frame.samples = 30;
         made->job.frame.seed = client;
@@ -215,11 +181,11 @@ TEST(a_job_that_would_wait_for_the_device_lets_others_go_first)
         made->job.weight = client == 1 ? 16 : 1;
         if (client == 1)
             made->job.frame.depth = WAITING_DEPTH;
-        submit(engine, made);
+        submit(made);
     }
     atomic_store(&fake.gate_open, true);
     for (int i = 0; i < 4; i++)
-        engine_event_destroy(event_within(engine, 60000));
+        engine_event_destroy(event_within(60000));
     /* Alone it goes on all the same; together it would have sixteen of seventeen steps. */
     int last = 0, begun = 0;
     for (int i = 0; i < atomic_load(&fake.step_count); i++)
@@ -228,29 +194,27 @@ TEST(a_job_that_would_wait_for_the_device_lets_others_go_first)
         begun++;
     for (int i = begun + 1; i < last; i++)
         assert_false(fake.step_seeds[i] == 1 && fake.step_seeds[i - 1] == 1);
-    stop(engine);
 }
 
 /* ---- edits -------------------------------------------------------------------------------------- */
 
 TEST(edits_wait_for_the_frame_in_hand_and_others_do_not)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    open_scene(engine, 1, 2);
-    submit_commit(engine, 1, 3, 1);
-    expect_done(engine, 1, 3);
-    submit(engine, gated(render(1, 4, 0, 1)));
+    open_scene(1, 1);
+    open_scene(1, 2);
+    submit_commit(1, 3, 1);
+    expect_done(1, 3);
+    submit(gated(render(1, 4, 0, 1)));
     wait_until(&fake.frames_begun, 1);
-    submit_commit(engine, 1, 5, 1);
-    submit_commit(engine, 1, 6, 2);
-    assert_int_equal(expect_done(engine, 1, 6), 1); /* another scene */
-    expect_silence(engine);
+    submit_commit(1, 5, 1);
+    submit_commit(1, 6, 2);
+    assert_int_equal(expect_done(1, 6), 1); /* another scene */
+    expect_silence();
     atomic_store(&fake.gate_open, true);
     bool applied = false;
     uint32_t frames = 0;
     while (!applied || frames < 2) {
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         if (event->kind == ENGINE_FRAME) {
             /* The frame in hand shows what it began with, the next one the edit. */
@@ -265,26 +229,24 @@ TEST(edits_wait_for_the_frame_in_hand_and_others_do_not)
         }
         engine_event_destroy(event);
     }
-    expect_done(engine, 1, 4);
-    stop(engine);
+    expect_done(1, 4);
 }
 
 TEST(what_waits_for_a_frame_keeps_its_order_and_can_be_cancelled)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    submit(engine, gated(render(1, 4, 0, 0)));
+    open_scene(1, 1);
+    submit(gated(render(1, 4, 0, 0)));
     wait_until(&fake.frames_begun, 1);
-    submit_commit(engine, 1, 5, 1);
-    submit(engine, render(1, 6, 0, 0)); /* must show the commit */
-    submit(engine, render(1, 7, 0, 0));
-    submit_target(engine, ENGINE_JOB_CANCEL, 1, 8, 7, 0);
-    expect_failed(engine, 1, 7, ERROR_CANCELLED, "");
-    expect_done(engine, 1, 8);
+    submit_commit(1, 5, 1);
+    submit(render(1, 6, 0, 0)); /* must show the commit */
+    submit(render(1, 7, 0, 0));
+    submit_target(ENGINE_JOB_CANCEL, 1, 8, 7, 0);
+    expect_failed(1, 7, ERROR_CANCELLED, "");
+    expect_done(1, 8);
     atomic_store(&fake.gate_open, true);
     unsigned answered = 0;
     while (answered != 7) {
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         if (event->kind == ENGINE_FRAME)
             assert_int_equal(event->frame->result.revision, event->request == 6);
@@ -292,152 +254,109 @@ TEST(what_waits_for_a_frame_keeps_its_order_and_can_be_cancelled)
             answered |= 1u << (event->request - 4);
         engine_event_destroy(event);
     }
-    stop(engine);
-}
-
-TEST(a_refused_commit_names_its_field)
-{
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    struct engine_command *made = command(ENGINE_COMMIT, 1, 2);
-    made->edits = calloc(1, sizeof(*made->edits));
-    made->edit_count = 1;
-    made->edits[0].set.node.base.id = 3;
-    made->edits[0].set.node.parent = 9;
-    submit(engine, made);
-    expect_failed(engine, 1, 2, ERROR_UNKNOWN_ID, "edits[0] (node 3).parent");
-    submit_commit(engine, 1, 3, 77);
-    expect_failed(engine, 1, 3, ERROR_UNKNOWN_ID, "edit_begin.scene");
-    stop(engine);
 }
 
 /* ---- ends --------------------------------------------------------------------------------------- */
 
 TEST(a_cancel_is_answered_once_after_its_job)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    submit(engine, gated(render(1, 2, 0, 9)));
+    open_scene(1, 1);
+    submit(gated(render(1, 2, 0, 9)));
     wait_until(&fake.frames_begun, 1);
-    submit_target(engine, ENGINE_JOB_CANCEL, 1, 3, 2, 0);
-    submit_target(engine, ENGINE_JOB_CANCEL, 1, 4, 2, 0);
-    expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
-    expect_done(engine, 1, 3);
-    expect_done(engine, 1, 4); /* there is nothing left to cancel */
-    expect_silence(engine);
+    submit_target(ENGINE_JOB_CANCEL, 1, 3, 2, 0);
+    submit_target(ENGINE_JOB_CANCEL, 1, 4, 2, 0);
+    expect_failed(1, 2, ERROR_CANCELLED, "");
+    expect_done(1, 3);
+    expect_done(1, 4); /* there is nothing left to cancel */
+    expect_silence();
     assert_int_equal(atomic_load(&fake.frames_abandoned), 1);
     /* The scene is free for others. */
-    submit(engine, render(1, 5, 0, 0));
-    take_frame(engine, 1, 5, 0);
-    expect_done(engine, 1, 5);
-    submit_target(engine, ENGINE_JOB_CANCEL, 1, 6, 5, 0);
-    expect_done(engine, 1, 6);
-    stop(engine);
+    submit(render(1, 5, 0, 0));
+    take_frame(1, 5, 0);
+    expect_done(1, 5);
+    submit_target(ENGINE_JOB_CANCEL, 1, 6, 5, 0);
+    expect_done(1, 6);
 }
 
 TEST(a_cancelled_job_that_lacks_credit_ends_too)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     struct engine_command *made = render(1, 2, 0, 3);
     made->job.credit = 1;
-    submit(engine, made);
-    take_frame(engine, 1, 2, 0);
+    submit(made);
+    take_frame(1, 2, 0);
     wait_until(&fake.frames_done, 4);
-    expect_silence(engine);
-    submit_target(engine, ENGINE_JOB_CANCEL, 1, 3, 2, 0);
-    expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
-    expect_done(engine, 1, 3);
-    stop(engine);
+    expect_silence();
+    submit_target(ENGINE_JOB_CANCEL, 1, 3, 2, 0);
+    expect_failed(1, 2, ERROR_CANCELLED, "");
+    expect_done(1, 3);
 }
 
 TEST(a_client_that_goes_is_forgotten_and_others_go_on)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    open_scene(engine, 2, 1);
-    submit(engine, gated(render(1, 2, 0, 9)));
-    submit(engine, gated(render(2, 2, 0, 0)));
+    open_scene(1, 1);
+    open_scene(2, 1);
+    submit(gated(render(1, 2, 0, 9)));
+    submit(gated(render(2, 2, 0, 0)));
     wait_until(&fake.frames_begun, 2);
-    submit_commit(engine, 1, 3, 1); /* waits for the frame, and is never answered */
-    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
-    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0));
+    submit_commit(1, 3, 1); /* waits for the frame, and is never answered */
+    submit(command(ENGINE_CLIENT_GONE, 1, 0));
+    expect_forgotten(1);
     assert_int_equal(atomic_load(&fake.renderers), 1);
-    expect_silence(engine);
+    expect_silence();
     atomic_store(&fake.gate_open, true);
-    take_frame(engine, 2, 2, 0);
-    expect_done(engine, 2, 2);
-    submit(engine, command(ENGINE_CLIENT_GONE, 9, 0)); /* was never seen */
-    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 9, 0));
-    stop(engine);
-}
-
-TEST(closing_a_scene_ends_its_jobs_first)
-{
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    submit(engine, gated(render(1, 2, 0, 9)));
-    wait_until(&fake.frames_begun, 1);
-    submit_commit(engine, 1, 3, 1);
-    submit(engine, command(ENGINE_SCENE_CLOSE, 1, 4));
-    expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
-    assert_int_equal(expect_done(engine, 1, 3), 1);
-    expect_done(engine, 1, 4);
-    submit(engine, command(ENGINE_SCENE_CLOSE, 1, 5));
-    expect_failed(engine, 1, 5, ERROR_UNKNOWN_ID, "scene_close.scene");
-    open_scene(engine, 1, 1); /* the number is free again */
-    stop(engine);
+    take_frame(2, 2, 0);
+    expect_done(2, 2);
+    submit(command(ENGINE_CLIENT_GONE, 9, 0)); /* was never seen */
+    expect_forgotten(9);
 }
 
 TEST(a_frame_that_fails_comes_after_those_before_it)
 {
-    struct engine *engine = start((struct engine_options){.encode_threads = 3});
-    open_scene(engine, 1, 1);
+    restart((struct engine_options){.encode_threads = 3});
+    open_scene(1, 1);
     atomic_store(&fake.fail_kind, ERROR_INTERNAL);
     atomic_store(&fake.fail_from_frame, 4);
-    submit(engine, render(1, 2, 0, 9));
+    submit(render(1, 2, 0, 9));
     for (uint32_t frame = 0; frame < 3; frame++)
-        take_frame(engine, 1, 2, frame);
-    expect_failed(engine, 1, 2, ERROR_INTERNAL, "fake");
-    expect_silence(engine);
-    stop(engine);
+        take_frame(1, 2, frame);
+    expect_failed(1, 2, ERROR_INTERNAL, "fake");
+    expect_silence();
 }
 
 TEST(the_tables_of_all_scenes_together_have_a_limit)
 {
     /* Room for about 100 nodes. */
     uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
-    struct engine *engine = start((struct engine_options){.limits.scene = {.host_bytes = limit_bytes}});
+    restart((struct engine_options){.limits.scene = {.host_bytes = limit_bytes}});
     for (uint32_t scene = 1; scene <= 2; scene++)
-        open_scene(engine, 1, scene);
-    open_scene(engine, 2, 1);
-    submit(engine, commit_of_nodes(1, 1, 1, 60));
-    expect_done(engine, 1, 1);
-    submit(engine, commit_of_nodes(1, 2, 2, 60));
-    expect_failed(engine, 1, 2, ERROR_LIMIT, "edits");
-    submit(engine, commit_of_nodes(2, 3, 1, 60));
-    expect_failed(engine, 2, 3, ERROR_LIMIT, "edits");
-    submit(engine, commit_of_nodes(2, 4, 1, 40));
-    expect_done(engine, 2, 4);
-    submit(engine, commit_of_nodes(1, 5, 1, 60)); /* as many as it has */
-    expect_done(engine, 1, 5);
-    submit(engine, command(ENGINE_CLIENT_GONE, 2, 0));
-    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 2, 0));
+        open_scene(1, scene);
+    open_scene(2, 1);
+    submit(commit_of_nodes(1, 1, 1, 60));
+    expect_done(1, 1);
+    submit(commit_of_nodes(1, 2, 2, 60));
+    expect_failed(1, 2, ERROR_LIMIT, "edits");
+    submit(commit_of_nodes(2, 3, 1, 60));
+    expect_failed(2, 3, ERROR_LIMIT, "edits");
+    submit(commit_of_nodes(2, 4, 1, 40));
+    expect_done(2, 4);
+    submit(commit_of_nodes(1, 5, 1, 60)); /* as many as it has */
+    expect_done(1, 5);
+    submit(command(ENGINE_CLIENT_GONE, 2, 0));
+    expect_forgotten(2);
     struct engine_command *close = command(ENGINE_SCENE_CLOSE, 1, 6);
-    submit(engine, close);
-    expect_done(engine, 1, 6);
-    submit(engine, commit_of_nodes(1, 7, 2, 100));
-    expect_done(engine, 1, 7);
-    stop(engine);
+    submit(close);
+    expect_done(1, 6);
+    submit(commit_of_nodes(1, 7, 2, 100));
+    expect_done(1, 7);
 }
 
 TEST(an_engine_stops_with_work_in_hand)
 {
-    struct engine *engine = start((struct engine_options){.queue_capacity = 2});
-    open_scene(engine, 1, 1);
-    submit(engine, render(1, 2, 0, 1000));
-    submit(engine, command(ENGINE_STATS, 1, 3));
+    restart((struct engine_options){.queue_capacity = 2});
+    open_scene(1, 1);
+    submit(render(1, 2, 0, 1000));
+    submit(command(ENGINE_STATS, 1, 3));
     usleep(20000);
-    submit_commit(engine, 1, 4, 1);
-    stop(engine);
+    submit_commit(1, 4, 1);
 }

@@ -5,115 +5,108 @@
 #include "base/progress.h"
 #include "tests/harness/test.h"
 
+EACH_TEST(start_engine, stop_engine)
+
 /* ---- jobs that cannot be ------------------------------------------------------------------------ */
 
 TEST(jobs_that_cannot_be_are_refused_with_their_field)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     struct engine_command *made = render(1, 2, 0, 0);
     made->job.frame.tracer = 63;
-    submit(engine, made);
-    struct engine_event *event = expect_event(engine, ENGINE_FAILED, 1, 2);
+    submit(made);
+    struct engine_event *event = expect_event(ENGINE_FAILED, 1, 2);
     assert_int_equal(event->error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(event->error.field, "render.tracer");
     assert_non_null(strstr(event->error.remedy, "naive"));
     engine_event_destroy(event);
     made = render(1, 3, 5, 4);
-    submit(engine, made);
-    expect_failed(engine, 1, 3, ERROR_INVALID, "render.last_frame");
+    submit(made);
+    expect_failed(1, 3, ERROR_INVALID, "render.last_frame");
     made = render(1, 4, 0, 0);
     made->job.encoding = ENCODING_JPEG;
     made->job.frame.format = PIXEL_FORMAT_RGBA16F;
-    submit(engine, made);
-    expect_failed(engine, 1, 4, ERROR_UNSUPPORTED, "render.encoding");
+    submit(made);
+    expect_failed(1, 4, ERROR_UNSUPPORTED, "render.encoding");
     made = render(1, 5, 0, 0);
     made->job.path = CAMERA_NODE;
     made->job.camera_node = 8;
-    submit(engine, made);
-    expect_failed(engine, 1, 5, ERROR_UNKNOWN_ID, "render.camera_node");
+    submit(made);
+    expect_failed(1, 5, ERROR_UNKNOWN_ID, "render.camera_node");
     made = render(1, 6, 0, 0);
     made->job.path = CAMERA_KEYS;
-    submit(engine, made);
-    expect_failed(engine, 1, 6, ERROR_INVALID, "render.keys");
+    submit(made);
+    expect_failed(1, 6, ERROR_INVALID, "render.keys");
     made = render(1, 7, 0, 0);
     made->scene = 4;
-    submit(engine, made);
-    expect_failed(engine, 1, 7, ERROR_UNKNOWN_ID, "render.scene");
+    submit(made);
+    expect_failed(1, 7, ERROR_UNKNOWN_ID, "render.scene");
     made = render(1, 8, 0, 0);
     made->job.frame_step = 0;
-    submit(engine, made);
-    expect_failed(engine, 1, 8, ERROR_INVALID, "render.frame_step");
-    stop(engine);
+    submit(made);
+    expect_failed(1, 8, ERROR_INVALID, "render.frame_step");
 }
 
 /* ---- the device --------------------------------------------------------------------------------- */
 
 TEST(a_lost_device_is_made_anew_and_the_frame_rendered_again)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
     atomic_store(&fake.fail_steps, 2);
-    submit(engine, render(1, 2, 0, 2));
+    submit(render(1, 2, 0, 2));
     for (uint32_t frame = 0; frame <= 2; frame++)
-        take_frame(engine, 1, 2, frame);
-    expect_done(engine, 1, 2);
+        take_frame(1, 2, frame);
+    expect_done(1, 2);
     assert_int_equal(atomic_load(&fake.devices_made), 3);
     assert_int_equal(atomic_load(&fake.devices), 1);
-    stop(engine);
 }
 
 TEST(a_job_over_which_the_device_is_lost_each_time_is_put_aside_and_others_go_on)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
     atomic_store(&fake.fail_steps, 3);
-    submit(engine, render(1, 2, 0, 2));
-    struct engine_event *event = expect_event(engine, ENGINE_FAILED, 1, 2);
+    submit(render(1, 2, 0, 2));
+    struct engine_event *event = expect_event(ENGINE_FAILED, 1, 2);
     assert_int_equal(event->error.kind, ERROR_DEVICE_LOST);
     assert_false(event->error.retryable);
     engine_event_destroy(event);
-    submit(engine, render(1, 3, 0, 0));
-    take_frame(engine, 1, 3, 0);
-    expect_done(engine, 1, 3);
+    submit(render(1, 3, 0, 0));
+    take_frame(1, 3, 0);
+    expect_done(1, 3);
     assert_int_equal(atomic_load(&fake.devices_made), 4);
-    stop(engine);
 }
 
 TEST(a_permanently_lost_device_fails_all_jobs_and_is_reported)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    submit(engine, gated(render(1, 2, 0, 2)));
-    submit(engine, gated(render(1, 3, 0, 2)));
+    open_scene(1, 1);
+    submit(gated(render(1, 2, 0, 2)));
+    submit(gated(render(1, 3, 0, 2)));
     wait_until(&fake.frames_begun, 2);
     atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
     atomic_store(&fake.fail_steps, 1000);
     for (int i = 0; i < 2; i++) {
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         assert_int_equal(event->kind, ENGINE_FAILED);
         assert_int_equal(event->error.kind, ERROR_DEVICE_LOST);
         engine_event_destroy(event);
     }
-    engine_event_destroy(expect_event(engine, ENGINE_DEVICE_GONE, 0, 0));
+    engine_event_destroy(expect_event(ENGINE_DEVICE_GONE, 0, 0));
     assert_int_equal(atomic_load(&fake.devices_made), 4);
-    submit(engine, command(ENGINE_STATS, 1, 4)); /* the engine itself lives, for goodbyes */
-    engine_event_destroy(expect_event(engine, ENGINE_STATS_READY, 1, 4));
-    stop(engine);
+    submit(command(ENGINE_STATS, 1, 4)); /* the engine itself lives, for goodbyes */
+    engine_event_destroy(expect_event(ENGINE_STATS_READY, 1, 4));
 }
 
 TEST(a_watchdog_sees_whether_the_engine_makes_progress)
 {
-    struct engine *engine = start((struct engine_options){0});
     uint64_t turns = 0;
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     while (!engine_is_alive(engine, &turns) || !engine_is_alive(engine, &turns))
         usleep(1000); /* it has nothing to do, from some time on */
     atomic_store(&fake.holds_steps, true);
-    submit(engine, render(1, 2, 0, 0));
+    submit(render(1, 2, 0, 0));
     wait_until(&fake.steps_held, 1);
     engine_is_alive(engine, &turns);
     assert_false(engine_is_alive(engine, &turns)); /* within a step */
@@ -121,33 +114,31 @@ TEST(a_watchdog_sees_whether_the_engine_makes_progress)
     assert_true(engine_is_alive(engine, &turns)); /* the step is one of many parts */
     assert_false(engine_is_alive(engine, &turns));
     atomic_store(&fake.holds_steps, false);
-    take_frame(engine, 1, 2, 0);
-    expect_done(engine, 1, 2);
+    take_frame(1, 2, 0);
+    expect_done(1, 2);
     bool alive = false; /* once the thread is back from the step, of which the frame was out before its end */
     for (int i = 0; i < 10000 && !(alive = engine_is_alive(engine, &turns)); i++)
         usleep(1000);
     assert_true(alive);
-    stop(engine);
 }
 
 TEST(edits_that_waited_for_a_lost_frame_are_applied)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    open_scene(engine, 1, 2);
-    submit(engine, gated(render(1, 2, 0, 0)));
+    open_scene(1, 1);
+    open_scene(1, 2);
+    submit(gated(render(1, 2, 0, 0)));
     struct engine_command *other = gated(render(1, 3, 0, 0));
     other->scene = 2;
-    submit(engine, other);
+    submit(other);
     wait_until(&fake.frames_begun, 2);
-    submit_commit(engine, 1, 4, 1);
-    submit_commit(engine, 1, 5, 2);
-    expect_silence(engine);
+    submit_commit(1, 4, 1);
+    submit_commit(1, 5, 2);
+    expect_silence();
     atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
     atomic_store(&fake.fail_steps, 1);
     uint32_t first = 0;
     for (int i = 0; i < 2; i++) {
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         assert_int_equal(event->kind, ENGINE_DONE);
         assert_true(event->request == 4 || event->request == 5);
@@ -155,31 +146,28 @@ TEST(edits_that_waited_for_a_lost_frame_are_applied)
         first = event->request;
         engine_event_destroy(event);
     }
-    stop(engine);
 }
 
 TEST(idle_scenes_are_evicted_when_device_memory_runs_out)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    open_scene(engine, 2, 1);
-    submit(engine, render(1, 2, 0, 0));
-    take_frame(engine, 1, 2, 0);
-    expect_done(engine, 1, 2);
+    open_scene(1, 1);
+    open_scene(2, 1);
+    submit(render(1, 2, 0, 0));
+    take_frame(1, 2, 0);
+    expect_done(1, 2);
     atomic_store(&fake.fail_kind, ERROR_OUT_OF_MEMORY);
     atomic_store(&fake.fail_steps, 1);
-    submit(engine, render(2, 2, 0, 0));
-    take_frame(engine, 2, 2, 0);
-    expect_done(engine, 2, 2);
+    submit(render(2, 2, 0, 0));
+    take_frame(2, 2, 0);
+    expect_done(2, 2);
     assert_int_equal(atomic_load(&fake.scenes), 1);
     assert_int_equal(atomic_load(&fake.renderers), 1);
     /* Nobody else is there to give way. */
-    submit(engine, command(ENGINE_SCENE_CLOSE, 1, 9));
-    expect_done(engine, 1, 9);
+    submit(command(ENGINE_SCENE_CLOSE, 1, 9));
+    expect_done(1, 9);
     atomic_store(&fake.fail_steps, 1);
-    submit(engine, render(2, 3, 0, 0));
-    expect_failed(engine, 2, 3, ERROR_OUT_OF_MEMORY, "fake");
-    stop(engine);
+    submit(render(2, 3, 0, 0));
+    expect_failed(2, 3, ERROR_OUT_OF_MEMORY, "fake");
 }
 
 static struct engine_command *seeded(uint64_t client, uint32_t seed)
@@ -191,24 +179,23 @@ static struct engine_command *seeded(uint64_t client, uint32_t seed)
 
 TEST(a_frame_for_which_there_is_no_memory_waits_until_others_have_ended)
 {
-    struct engine *engine = start((struct engine_options){0});
     for (uint64_t client = 1; client <= 3; client++)
-        open_scene(engine, client, 1);
-    submit(engine, gated(seeded(1, 11)));
+        open_scene(client, 1);
+    submit(gated(seeded(1, 11)));
     wait_until(&fake.frames_begun, 1);
     atomic_store(&fake.fail_kind, ERROR_OUT_OF_MEMORY);
     atomic_store(&fake.fail_seed, 12);
     atomic_store(&fake.fail_steps, 1);
-    submit(engine, seeded(2, 12));
+    submit(seeded(2, 12));
     wait_until(&fake.frames_begun, 2);
-    expect_silence(engine); /* it is neither failed nor begun again */
-    submit(engine, seeded(3, 13));
-    expect_silence(engine); /* nobody overtakes it */
+    expect_silence(); /* it is neither failed nor begun again */
+    submit(seeded(3, 13));
+    expect_silence(); /* nobody overtakes it */
     assert_int_equal(atomic_load(&fake.frames_begun), 2);
     atomic_store(&fake.fail_steps, 1); /* once more alone: what the first one has is idle by then */
     atomic_store(&fake.gate_open, true);
     for (int i = 0; i < 6; i++) { /* a frame and an answer each */
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         assert_true(event->kind == ENGINE_FRAME || event->kind == ENGINE_DONE);
         engine_event_destroy(event);
@@ -217,13 +204,12 @@ TEST(a_frame_for_which_there_is_no_memory_waits_until_others_have_ended)
     assert_int_equal(atomic_load(&fake.scenes), 2);
     /* Alone on the device, and nothing is left to make room. */
     for (uint64_t client = 1; client <= 3; client += 2) {
-        submit(engine, command(ENGINE_SCENE_CLOSE, client, 20));
-        expect_done(engine, client, 20);
+        submit(command(ENGINE_SCENE_CLOSE, client, 20));
+        expect_done(client, 20);
     }
     atomic_store(&fake.fail_steps, 1);
-    submit(engine, seeded(2, 12));
-    expect_failed(engine, 2, 12, ERROR_OUT_OF_MEMORY, "fake");
-    stop(engine);
+    submit(seeded(2, 12));
+    expect_failed(2, 12, ERROR_OUT_OF_MEMORY, "fake");
 }
 
 TEST(without_a_device_there_is_no_engine)
@@ -240,7 +226,7 @@ TEST(without_a_device_there_is_no_engine)
 TEST(a_full_queue_is_reported_and_loses_nothing)
 {
     /* Both queues fill up: nobody takes events while commands come in. */
-    struct engine *engine = start((struct engine_options){.queue_capacity = 4});
+    restart((struct engine_options){.queue_capacity = 4});
     uint32_t accepted = 0;
     for (uint32_t i = 0; i < 1000; i++) {
         struct engine_command *made = command(ENGINE_STATS, 1, accepted + 1);
@@ -257,26 +243,24 @@ TEST(a_full_queue_is_reported_and_loses_nothing)
     }
     assert_true(accepted >= 8 && accepted < 20);
     for (uint32_t i = 1; i <= accepted; i++)
-        engine_event_destroy(expect_event(engine, ENGINE_STATS_READY, 1, i));
-    stop(engine);
+        engine_event_destroy(expect_event(ENGINE_STATS_READY, 1, i));
 }
 
 TEST(stats_add_up)
 {
-    struct engine *engine = start((struct engine_options){0});
     assert_string_equal(engine_device(engine)->name, "fake");
-    open_scene(engine, 1, 1);
-    open_scene(engine, 1, 2);
-    submit_commit(engine, 1, 2, 2);
-    expect_done(engine, 1, 2);
-    submit(engine, render(1, 3, 0, 3));
+    open_scene(1, 1);
+    open_scene(1, 2);
+    submit_commit(1, 2, 2);
+    expect_done(1, 2);
+    submit(render(1, 3, 0, 3));
     for (uint32_t frame = 0; frame <= 3; frame++)
-        take_frame(engine, 1, 3, frame);
-    expect_done(engine, 1, 3);
+        take_frame(1, 3, frame);
+    expect_done(1, 3);
     engine_report_sent(engine, 5, 7);
     engine_report_sent(engine, 50, 70);
-    submit(engine, command(ENGINE_STATS, 1, 4));
-    struct engine_event *event = expect_event(engine, ENGINE_STATS_READY, 1, 4);
+    submit(command(ENGINE_STATS, 1, 4));
+    struct engine_event *event = expect_event(ENGINE_STATS_READY, 1, 4);
     const struct engine_stats *stats = event->stats;
     assert_int_equal(stats->frames, 4);
     assert_int_equal(stats->rays, 4 * 16);
@@ -307,15 +291,14 @@ TEST(stats_add_up)
     memcpy(made->edits[0].set.spheres.centres_radii->data, sphere, sizeof(sphere));
     made->edits[1].set.node = (struct scene_node){
         .base.id = 2, .kind = NODE_SPHERES, .object = 7, .parent_from_node = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-    submit(engine, made);
-    expect_done(engine, 1, 5);
+    submit(made);
+    expect_done(1, 5);
     for (uint32_t request = 6; request <= 7; request++) {
-        submit(engine, command(ENGINE_STATS, 1, request));
-        event = expect_event(engine, ENGINE_STATS_READY, 1, request);
+        submit(command(ENGINE_STATS, 1, request));
+        event = expect_event(ENGINE_STATS_READY, 1, request);
         assert_int_equal(event->stats->scenes[1].nodes, 2);
         assert_int_equal(event->stats->scenes[1].instances, 1);
         assert_int_equal(event->stats->scenes[1].spheres, 1);
         engine_event_destroy(event);
     }
-    stop(engine);
 }

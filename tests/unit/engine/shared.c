@@ -3,6 +3,8 @@
 #include "tests/unit/engine/engine_fake.h"
 #include "tests/harness/test.h"
 
+EACH_TEST(start_engine, stop_engine)
+
 /* One frame, whose steps bear the number of the request. */
 static struct engine_command *still(uint32_t request, uint32_t steps, uint32_t depth)
 {
@@ -22,11 +24,11 @@ static int steps_of(uint32_t request)
 }
 
 /* Answers of jobs of one frame each, and of commits; in any order. */
-static void expect_answers(struct engine *engine, const uint32_t *requests, size_t count)
+static void expect_answers(const uint32_t *requests, size_t count)
 {
     bool seen[16] = {false};
     for (size_t left = count; left > 0;) {
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         size_t i = 0;
         while (i < count && requests[i] != event->request)
@@ -43,51 +45,49 @@ static void expect_answers(struct engine *engine, const uint32_t *requests, size
 
 TEST(frames_of_one_scene_take_turns_by_slices)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
+    clock_stop();
+    open_scene(1, 1);
     for (uint32_t request = 2; request <= 4; request++) {
         struct engine_command *made = still(request, 100, 0);
         made->job.frame.ao_rays = 1000;
-        submit(engine, made);
+        submit(made);
     }
     wait_until(&fake.frames_begun, 3);
     assert_int_equal(atomic_load(&fake.scenes), 1); /* they share it */
-    expect_answers(engine, (const uint32_t[]){2, 3, 4}, 3);
+    expect_answers((const uint32_t[]){2, 3, 4}, 3);
     expect_shares(2, 1, 3, 1);
     expect_shares(2, 1, 4, 1);
-    stop(engine);
 }
 
 TEST(an_edit_waits_for_all_frames_and_lets_none_begin)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    submit(engine, still(2, 1, GATED_DEPTH));
-    submit(engine, still(3, 1, GATED_DEPTH));
+    open_scene(1, 1);
+    submit(still(2, 1, GATED_DEPTH));
+    submit(still(3, 1, GATED_DEPTH));
     wait_until(&fake.frames_begun, 2);
     /* Beside a long frame others come and go. */
-    submit(engine, still(4, 3, 0));
-    take_frame(engine, 1, 4, 0);
-    expect_done(engine, 1, 4);
+    submit(still(4, 3, 0));
+    take_frame(1, 4, 0);
+    expect_done(1, 4);
     struct engine_command *many = render(1, 5, 0, 9);
     many->job.credit = 1;
-    submit(engine, many);
-    take_frame(engine, 1, 5, 0);
-    expect_silence(engine); /* as many as may be in flight are rendered */
+    submit(many);
+    take_frame(1, 5, 0);
+    expect_silence(); /* as many as may be in flight are rendered */
     int begun = atomic_load(&fake.frames_begun);
-    submit_commit(engine, 1, 6, 1);
-    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 5, 3);
-    take_frame(engine, 1, 5, 1);
-    take_frame(engine, 1, 5, 2);
+    submit_commit(1, 6, 1);
+    submit_target(ENGINE_JOB_CREDIT, 1, 0, 5, 3);
+    take_frame(1, 5, 1);
+    take_frame(1, 5, 2);
     atomic_store(&fake.gate_seed, 2);
-    take_frame(engine, 1, 2, 0);
-    expect_done(engine, 1, 2);
-    expect_silence(engine);
+    take_frame(1, 2, 0);
+    expect_done(1, 2);
+    expect_silence();
     assert_int_equal(atomic_load(&fake.frames_begun), begun);
     atomic_store(&fake.gate_open, true);
     bool applied = false, rendered = false;
     while (!applied || !rendered) {
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         if (event->request == 6)
             applied = true;
@@ -98,33 +98,31 @@ TEST(an_edit_waits_for_all_frames_and_lets_none_begin)
         rendered |= event->kind == ENGINE_DONE && event->request == 3;
         engine_event_destroy(event);
     }
-    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 5, 100);
+    submit_target(ENGINE_JOB_CREDIT, 1, 0, 5, 100);
     for (uint32_t frame = 3; frame <= 9; frame++) {
-        struct engine_event *event = expect_frame(engine, 1, 5, frame);
+        struct engine_event *event = expect_frame(1, 5, frame);
         /* Those that were rendered before it are on their way still. */
         assert_int_equal(event->frame->result.revision, frame > 3);
         engine_event_destroy(event);
     }
-    expect_done(engine, 1, 5);
-    stop(engine);
+    expect_done(1, 5);
 }
 
 TEST(a_frame_that_changes_what_is_shared_is_alone_and_not_overtaken)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    submit(engine, still(2, 20, GATED_DEPTH));
-    submit(engine, still(3, 20, GATED_DEPTH));
+    open_scene(1, 1);
+    submit(still(2, 20, GATED_DEPTH));
+    submit(still(3, 20, GATED_DEPTH));
     wait_until(&fake.frames_begun, 2);
-    submit(engine, still(4, 20, CHANGING_DEPTH));
-    expect_silence(engine); /* it is put off */
-    submit(engine, still(5, 20, 0));
-    submit(engine, still(6, 20, 0));
-    expect_silence(engine);
+    submit(still(4, 20, CHANGING_DEPTH));
+    expect_silence(); /* it is put off */
+    submit(still(5, 20, 0));
+    submit(still(6, 20, 0));
+    expect_silence();
     assert_int_equal(atomic_load(&fake.frames_begun), 2);
     atomic_store(&fake.step_count, 0);
     atomic_store(&fake.gate_open, true);
-    expect_answers(engine, (const uint32_t[]){2, 3, 4, 5, 6}, 5);
+    expect_answers((const uint32_t[]){2, 3, 4, 5, 6}, 5);
     /* 2 and 3 together, then 4 alone, then, as it has to be changed back, 5 or 6 as the first of the others. */
     for (int i = 0; i < 40; i++)
         assert_in_range(fake.step_seeds[i], 2, 3);
@@ -132,69 +130,62 @@ TEST(a_frame_that_changes_what_is_shared_is_alone_and_not_overtaken)
         assert_int_equal(fake.step_seeds[i], 4);
     assert_int_equal(atomic_load(&fake.step_count), 100);
     assert_int_equal(steps_of(5), 20);
-    stop(engine);
 }
 
 TEST(a_postponed_frame_that_is_cancelled_delays_no_client)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    submit(engine, still(2, 20, GATED_DEPTH));
+    open_scene(1, 1);
+    submit(still(2, 20, GATED_DEPTH));
     wait_until(&fake.frames_begun, 1);
-    submit(engine, still(4, 20, CHANGING_DEPTH));
-    expect_silence(engine);
-    submit(engine, still(5, 20, 0));
-    expect_silence(engine);
-    submit_target(engine, ENGINE_JOB_CANCEL, 1, 6, 4, 0);
-    expect_failed(engine, 1, 4, ERROR_CANCELLED, "");
-    expect_done(engine, 1, 6);
-    take_frame(engine, 1, 5, 0);
-    expect_done(engine, 1, 5);
+    submit(still(4, 20, CHANGING_DEPTH));
+    expect_silence();
+    submit(still(5, 20, 0));
+    expect_silence();
+    submit_target(ENGINE_JOB_CANCEL, 1, 6, 4, 0);
+    expect_failed(1, 4, ERROR_CANCELLED, "");
+    expect_done(1, 6);
+    take_frame(1, 5, 0);
+    expect_done(1, 5);
     atomic_store(&fake.gate_open, true);
-    take_frame(engine, 1, 2, 0);
-    expect_done(engine, 1, 2);
-    stop(engine);
+    take_frame(1, 2, 0);
+    expect_done(1, 2);
 }
 
 TEST(a_lost_device_loses_all_frames_of_a_scene_and_all_are_rendered_again)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     for (uint32_t request = 2; request <= 3; request++)
-        submit(engine, still(request, 20, GATED_DEPTH));
+        submit(still(request, 20, GATED_DEPTH));
     wait_until(&fake.frames_begun, 2);
-    submit(engine, still(4, 20, CHANGING_DEPTH));
-    expect_silence(engine);
+    submit(still(4, 20, CHANGING_DEPTH));
+    expect_silence();
     atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
     atomic_store(&fake.fail_steps, 1);
     wait_until(&fake.devices_made, 2);
     atomic_store(&fake.gate_open, true);
-    expect_answers(engine, (const uint32_t[]){2, 3, 4}, 3);
-    stop(engine);
+    expect_answers((const uint32_t[]){2, 3, 4}, 3);
 }
 
 TEST(the_renderer_of_a_clients_job_serves_its_next_job)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
+    open_scene(1, 1);
     for (uint32_t request = 2; request <= 4; request++) {
-        submit(engine, still(request, 1, 0));
-        take_frame(engine, 1, request, 0);
-        expect_done(engine, 1, request);
+        submit(still(request, 1, 0));
+        take_frame(1, request, 0);
+        expect_done(1, request);
         assert_int_equal(atomic_load(&fake.renderers), 1);
     }
     assert_int_equal(atomic_load(&fake.renderers_made), 1);
     /* Of jobs at the same time one renderer stays. */
     for (uint32_t request = 5; request <= 6; request++)
-        submit(engine, still(request, 10, GATED_DEPTH));
+        submit(still(request, 10, GATED_DEPTH));
     wait_until(&fake.frames_begun, 5);
     assert_int_equal(atomic_load(&fake.renderers), 2);
     atomic_store(&fake.gate_open, true);
-    expect_answers(engine, (const uint32_t[]){5, 6}, 2);
-    submit(engine, still(7, 1, 0));
-    take_frame(engine, 1, 7, 0);
-    expect_done(engine, 1, 7);
+    expect_answers((const uint32_t[]){5, 6}, 2);
+    submit(still(7, 1, 0));
+    take_frame(1, 7, 0);
+    expect_done(1, 7);
     assert_int_equal(atomic_load(&fake.renderers), 1);
     assert_int_equal(atomic_load(&fake.renderers_made), 2);
-    stop(engine);
 }

@@ -479,7 +479,7 @@ struct record {
 
 #define FRAMES 24
 
-static void commit_turning(struct engine *engine)
+static void commit_turning(void)
 {
     struct engine_command *made = command(ENGINE_COMMIT, 1, 2);
     struct draft_list list = {0};
@@ -488,11 +488,11 @@ static void commit_turning(struct engine *engine)
     assert_non_null(made->edits);
     memcpy(made->edits, list.edits, list.count * sizeof(*made->edits));
     made->edit_count = list.count;
-    submit(engine, made);
-    expect_done(engine, 1, 2);
+    submit(made);
+    expect_done(1, 2);
 }
 
-static void run_range(struct engine *engine, uint32_t request, uint32_t first, uint32_t last, uint32_t step,
+static void run_range(uint32_t request, uint32_t first, uint32_t last, uint32_t step,
                       struct record records[FRAMES])
 {
     struct engine_command *made = render(1, request, first, last);
@@ -504,15 +504,15 @@ static void run_range(struct engine *engine, uint32_t request, uint32_t first, u
     assert_non_null(made->job.clips);
     made->job.clips[0] = (struct clip_use){.clip = 1, .speed = 1.5f, .loop = true};
     made->job.clips[1] = (struct clip_use){.clip = 2, .speed = 1, .start_s = 0.25f};
-    submit(engine, made);
+    submit(made);
     for (uint32_t frame = first; frame <= last; frame += step) {
-        struct engine_event *event = expect_frame(engine, 1, request, frame);
+        struct engine_event *event = expect_frame(1, request, frame);
         const struct engine_frame *got = event->frame;
         records[frame] = (struct record){got->request, got->result.splits, (uint32_t)got->result.structure_bytes,
                                          got->time_s,  got->shutter_s,     true};
         engine_event_destroy(event);
     }
-    expect_done(engine, 1, request);
+    expect_done(1, request);
 }
 
 static void expect_same(const struct record *whole, const struct record *part, uint32_t frame)
@@ -527,17 +527,16 @@ static void expect_same(const struct record *whole, const struct record *part, u
     assert_true(whole->time_s == part->time_s && whole->shutter_s == part->shutter_s);
 }
 
-TEST(frames_show_the_same_however_their_range_was_divided)
+TEST_WITH(frames_show_the_same_however_their_range_was_divided, start_engine, stop_engine)
 {
-    struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    commit_turning(engine);
+    open_scene(1, 1);
+    commit_turning();
     struct record whole[FRAMES] = {0}, shards[FRAMES] = {0}, resumed[FRAMES] = {0};
-    run_range(engine, 10, 0, FRAMES - 1, 1, whole);
+    run_range(10, 0, FRAMES - 1, 1, whole);
     for (uint32_t shard = 0; shard < 3; shard++)
-        run_range(engine, 11, 2 - shard, FRAMES - 1, 3, shards);
-    run_range(engine, 12, 17, FRAMES - 1, 1, resumed);
-    run_range(engine, 12, 0, 16, 1, resumed);
+        run_range(11, 2 - shard, FRAMES - 1, 3, shards);
+    run_range(12, 17, FRAMES - 1, 1, resumed);
+    run_range(12, 0, 16, 1, resumed);
     for (uint32_t frame = 0; frame < FRAMES; frame++) {
         assert_true(whole[frame].poses >= 1 && whole[frame].motion != 0);
         assert_true(frame == 0 || whole[frame].motion != whole[frame - 1].motion);
@@ -545,32 +544,31 @@ TEST(frames_show_the_same_however_their_range_was_divided)
         expect_same(&whole[frame], &resumed[frame], frame);
     }
     assert_true(whole[1].shutter_s == 0.5f / 24 && whole[1].request.focus > 0);
-    stop(engine);
 }
 
-TEST(a_clip_that_goes_ends_the_job_and_says_which)
+TEST_WITH(a_clip_that_goes_ends_the_job_and_says_which, start_engine, stop_engine)
 {
-    struct engine *engine = start((struct engine_options){.frames_in_flight = 1});
-    open_scene(engine, 1, 1);
-    commit_turning(engine);
+    restart((struct engine_options){.frames_in_flight = 1});
+    open_scene(1, 1);
+    commit_turning();
     struct engine_command *made = gated(render(1, 10, 0, 9));
     made->job.clip_count = 1;
     made->job.clips = calloc(1, sizeof(*made->job.clips));
     assert_non_null(made->job.clips);
     made->job.clips[0] = (struct clip_use){.clip = 2, .speed = 1};
-    submit(engine, made);
+    submit(made);
     wait_until(&fake.frames_begun, 1);
     struct engine_command *removal = command(ENGINE_COMMIT, 1, 11);
     removal->edits = calloc(1, sizeof(*removal->edits));
     assert_non_null(removal->edits);
     removal->edits[0] = (struct scene_edit){.kind = EDIT_REMOVE, .object = OBJECT_CLIP, .id = 2};
     removal->edit_count = 1;
-    submit(engine, removal);
-    expect_silence(engine);
+    submit(removal);
+    expect_silence();
     atomic_store(&fake.gate_open, true);
     bool removed = false, ended = false;
     for (int events = 0; events < 3; events++) {
-        struct engine_event *event = event_within(engine, 60000);
+        struct engine_event *event = event_within(60000);
         assert_non_null(event);
         removed = removed || (event->kind == ENGINE_DONE && event->request == 11);
         if (event->kind == ENGINE_FAILED) {
@@ -580,5 +578,4 @@ TEST(a_clip_that_goes_ends_the_job_and_says_which)
         engine_event_destroy(event);
     }
     assert_true(removed && ended);
-    stop(engine);
 }

@@ -36,9 +36,8 @@ static inline uint64_t case_below(struct case_maker *maker, uint64_t bound)
 static inline void *case_alloc(struct case_maker *maker, size_t bytes)
 {
     size_t start = (maker->used_bytes + 15) & ~(size_t)15;
-    if (bytes > sizeof(maker->memory) - start) {
+    if (bytes > sizeof(maker->memory) - start)
         return NULL;
-    }
     maker->used_bytes = start + bytes;
     return memset(maker->memory + start, 0, bytes);
 }
@@ -64,12 +63,10 @@ static inline float case_real(struct case_maker *maker, const struct field_desc 
     double minimum = (double)field->real_min, maximum = (double)field->real_max;
     double share = (double)(case_random(maker) >> 11) / 9007199254740992.0;
     float value = (float)(minimum + share * (maximum - minimum));
-    if (maker->mode == CASE_MIN || value < field->real_min) {
+    if (maker->mode == CASE_MIN || value < field->real_min)
         return field->real_min;
-    }
-    if (maker->mode == CASE_MAX || value > field->real_max) {
+    if (maker->mode == CASE_MAX || value > field->real_max)
         return field->real_max;
-    }
     return value;
 }
 
@@ -137,19 +134,16 @@ static inline void case_counted(struct case_maker *maker, const struct field_des
     } else if (field->kind == FIELD_ARRAY) {
         const struct struct_desc *record = field->record();
         pointer = case_alloc(maker, count * record->size_bytes);
-        for (uint32_t i = 0; i < count; i++) {
+        for (uint32_t i = 0; i < count; i++)
             case_struct(maker, record, pointer + i * record->size_bytes);
-        }
     } else {
         pointer = case_alloc(maker, count);
-        for (uint32_t i = 0; i < count; i++) {
+        for (uint32_t i = 0; i < count; i++)
             pointer[i] = (char)case_random(maker);
-        }
     }
     memcpy(body + field->offset, &pointer, sizeof(pointer));
-    if (field->kind != FIELD_STRING) {
+    if (field->kind != FIELD_STRING)
         memcpy(body + field->count_offset, &count, sizeof(count));
-    }
 }
 
 static inline void case_struct(struct case_maker *maker, const struct struct_desc *desc, char *body)
@@ -184,9 +178,8 @@ struct plain_bytes {
 
 static inline void plain_put(struct plain_bytes *out, uint64_t value, size_t bytes)
 {
-    for (size_t i = 0; i < bytes && out->count < sizeof(out->data); i++) {
+    for (size_t i = 0; i < bytes && out->count < sizeof(out->data); i++)
         out->data[out->count++] = (uint8_t)(value >> (8 * i));
-    }
 }
 
 static inline void plain_copy(struct plain_bytes *out, const void *bytes, size_t count)
@@ -215,14 +208,12 @@ static inline void plain_struct(struct plain_bytes *out, const struct struct_des
         }
         plain_put(out, count, 4);
         if (field->kind == FIELD_ARRAY) {
-            for (uint32_t i = 0; pointer && i < count; i++) {
+            for (uint32_t i = 0; pointer && i < count; i++)
                 plain_struct(out, field->record(), pointer + i * field->record()->size_bytes);
-            }
             continue;
         }
-        while (field->kind == FIELD_BULK && out->count % 8 != 0) {
+        while (field->kind == FIELD_BULK && out->count % 8 != 0)
             plain_put(out, 0, 1);
-        }
         plain_copy(out, pointer, count);
     }
 }
@@ -253,28 +244,24 @@ static inline const char *case_difference(const struct struct_desc *desc, const 
         memcpy(&a, left + field->offset, sizeof(a));
         memcpy(&b, right + field->offset, sizeof(b));
         if (field->kind == FIELD_STRING) {
-            if (strcmp(a ? a : "", b ? b : "") != 0) {
+            if (strcmp(a ? a : "", b ? b : "") != 0)
                 return field->name;
-            }
             continue;
         }
         memcpy(&a_count, left + field->count_offset, sizeof(a_count));
         memcpy(&b_count, right + field->count_offset, sizeof(b_count));
-        if (a_count != b_count) {
+        if (a_count != b_count)
             return field->name;
-        }
         if (field->kind == FIELD_BULK) {
-            if (a_count > 0 && memcmp(a, b, a_count) != 0) {
+            if (a_count > 0 && memcmp(a, b, a_count) != 0)
                 return field->name;
-            }
             continue;
         }
         const struct struct_desc *record = field->record();
         for (uint32_t i = 0; i < a_count; i++) {
             const char *inner = case_difference(record, a + i * record->size_bytes, b + i * record->size_bytes);
-            if (inner) {
+            if (inner)
                 return inner;
-            }
         }
     }
     return NULL;
@@ -282,9 +269,8 @@ static inline const char *case_difference(const struct struct_desc *desc, const 
 
 static inline const char *message_difference(const struct message *left, const struct message *right)
 {
-    if (left->type != right->type) {
+    if (left->type != right->type)
         return "type";
-    }
     return case_difference(message_describe(left->type)->body(), (const char *)left + MESSAGE_BODY_OFFSET,
                            (const char *)right + MESSAGE_BODY_OFFSET);
 }

@@ -46,9 +46,8 @@ static inline size_t encode_both(const struct message *message)
 {
     struct writer writer;
     writer_init(&writer, encoded, sizeof(encoded));
-    if (!message_encode(&writer, message)) {
+    if (!message_encode(&writer, message))
         fail_msg("%s: %s: %s", message_type_text(message->type), writer.error.field, writer.error.text);
-    }
     plain_encode(&plain, message);
     assert_int_equal(writer.used_bytes, plain.count);
     assert_memory_equal(encoded, plain.data, plain.count);
@@ -61,13 +60,11 @@ static inline void check_round_trip(const struct message *message)
     struct message back;
     struct decode_error error;
     size_t count = encode_both(message);
-    if (!decode_copy(&back, (uint16_t)message->type, encoded, count, &error)) {
+    if (!decode_copy(&back, (uint16_t)message->type, encoded, count, &error))
         fail_msg("%s: %s: %s", message_type_text(message->type), error.field, error.text);
-    }
     const char *difference = message_difference(message, &back);
-    if (difference) {
+    if (difference)
         fail_msg("%s.%s came back otherwise", message_type_text(message->type), difference);
-    }
 }
 
 #endif

@@ -45,9 +45,8 @@ TEST(what_message_init_makes_can_be_sent_and_null_strings_are_empty)
 
 static void write_hex(FILE *file, const uint8_t *bytes, size_t count)
 {
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++)
         fprintf(file, "%02x", bytes[i]);
-    }
     fputc('\n', file);
 }
 
@@ -98,9 +97,8 @@ TEST(the_bytes_on_the_wire_are_the_stored_ones)
     char *line = NULL;
     size_t line_capacity = 0;
     FILE *file = fopen(GOLDEN_PATH, "r");
-    if (!file) {
+    if (!file)
         fail_msg("cannot read %s (run from the top of the tree)", GOLDEN_PATH);
-    }
     for (size_t i = 0; i < protocol_message_count; i++) {
         for (enum case_mode mode = CASE_MIN; mode < CASE_MODE_COUNT; mode++) {
             const char *name = protocol_messages[i].info.name;
@@ -137,9 +135,8 @@ TEST(every_prefix_of_every_message_is_refused)
             case_make(&maker, &message, &protocol_messages[i], mode, 3);
             size_t count = encode_both(&message);
             for (size_t length = 0; length < count; length++) {
-                if (decode_copy(&back, (uint16_t)message.type, encoded, length, &error)) {
+                if (decode_copy(&back, (uint16_t)message.type, encoded, length, &error))
                     fail_msg("%s: %zu of %zu bytes were taken", protocol_messages[i].info.name, length, count);
-                }
                 assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
             }
         }
@@ -184,9 +181,8 @@ static void encode_fixed_part(const struct message *message, size_t fixed_bytes,
     plain.count = 0;
     plain_put(&plain, fixed_bytes + extra, 2);
     plain_copy(&plain, fixed, fixed_bytes);
-    for (size_t i = 0; i < extra; i++) {
+    for (size_t i = 0; i < extra; i++)
         plain_put(&plain, 0xff, 1);
-    }
     plain_struct(&plain, &rest, body);
 }
 

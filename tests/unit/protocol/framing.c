@@ -20,9 +20,8 @@ static size_t make_stream(void)
     for (size_t i = 0; i < protocol_message_count; i++) {
         case_make(&maker, &message, &protocol_messages[i], CASE_RANDOM, 11);
         size_t start = writer.used_bytes;
-        if (!message_write(&writer, 1000 + (uint32_t)i, (uint32_t)i, &message)) {
+        if (!message_write(&writer, 1000 + (uint32_t)i, (uint32_t)i, &message))
             fail_msg("%s: %s", writer.error.field, writer.error.text);
-        }
         assert_int_equal(writer.used_bytes % 8, 0);
         assert_int_equal(writer.used_bytes - start, message_write_bytes(&message));
     }
@@ -37,9 +36,8 @@ static enum framing_result parse_copy(struct frame *frame, const uint8_t *bytes,
     assert_non_null(copy);
     memcpy(copy, bytes, count);
     enum framing_result result = framing_parse(frame, copy, count, accept, error);
-    if (result == FRAMING_CONSUMED) {
+    if (result == FRAMING_CONSUMED)
         frame->payload = bytes + (frame->payload - copy);
-    }
     free(copy);
     return result;
 }
@@ -218,9 +216,8 @@ TEST(numbers_and_names_of_the_table_are_unique)
             assert_string_not_equal(info->name, protocol_messages[k].info.name);
         }
         for (const struct field_desc *field = protocol_messages[i].body()->fields; field->name; field++) {
-            if (counted && !field_is_counted(field)) {
+            if (counted && !field_is_counted(field))
                 fail_msg("%s.%s: fixed fields come first", info->name, field->name);
-            }
             counted = counted || field_is_counted(field);
         }
     }

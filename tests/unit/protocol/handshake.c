@@ -11,9 +11,8 @@
 static struct handshake_hello some_hello(void)
 {
     struct handshake_hello hello = {.version_min = 1, .version_max = 3, .capabilities = 0x1122334455667788};
-    for (size_t i = 0; i < HANDSHAKE_NONCE_BYTES; i++) {
+    for (size_t i = 0; i < HANDSHAKE_NONCE_BYTES; i++)
         hello.nonce[i] = (uint8_t)(0xa0 + i);
-    }
     strcpy(hello.name, "viewer \xc3\xa9");
     return hello;
 }

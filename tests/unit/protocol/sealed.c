@@ -89,9 +89,8 @@ static size_t hear(struct end *end, const uint8_t *bytes, size_t count, struct t
     end->last = sealed_handshake(end->sealed, copy, count, &consumed, out, &out_bytes, &end->error);
     free(copy);
     assert_true((end->last == SEALED_CONSUMED) == (consumed > 0));
-    if (out_bytes > 0) {
+    if (out_bytes > 0)
         tell(answers, out, out_bytes);
-    }
     return consumed;
 }
 
@@ -115,16 +114,13 @@ static void shake_hands(unsigned message, size_t bit)
         struct traffic *told = i % 2 == 1 ? &up : &down;
         size_t *from = i % 2 == 1 ? &from_client : &from_server;
         uint8_t *bytes = told->bytes + *from;
-        if (told->count == *from) {
+        if (told->count == *from)
             return;
-        }
-        if (i == message) {
+        if (i == message)
             bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
-        }
         *from += hear(hearing, bytes, told->count - *from, i % 2 == 1 ? &down : &up);
-        if (hearing->last != SEALED_CONSUMED) {
+        if (hearing->last != SEALED_CONSUMED)
             return;
-        }
     }
 }
 
@@ -171,9 +167,8 @@ TEST(both_ends_open_and_understand_each_other)
 {
     static uint8_t much[SEALED_PLAIN_MAX_BYTES];
     open_both();
-    for (size_t i = 0; i < sizeof(much); i++) {
+    for (size_t i = 0; i < sizeof(much); i++)
         much[i] = (uint8_t)(i * 31 + i / 256);
-    }
     say(&client, &up, "a", 1);
     say(&client, &up, much, sizeof(much));
     say(&server, &down, "from the server", 15);
@@ -260,18 +255,16 @@ static struct {
 static void fill_given(void)
 {
     uint8_t *bytes = (uint8_t *)&given;
-    for (size_t i = 0; i < sizeof(given); i++) {
+    for (size_t i = 0; i < sizeof(given); i++)
         bytes[i] = (uint8_t)(i * 7 + 1);
-    }
 }
 
 /* .. and what comes out, a name and its bytes for each line of the file. */
 static void print_hex(FILE *file, const char *name, const void *bytes, size_t count)
 {
     fprintf(file, "%s ", name);
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++)
         fprintf(file, "%02x", ((const uint8_t *)bytes)[i]);
-    }
     fputc('\n', file);
 }
 
@@ -285,9 +278,8 @@ static void print_session(FILE *file)
     shake_hands(0, 0);
     assert_int_equal(chosen_left, 0);
     chosen = NULL;
-    for (size_t i = 0; i < sizeof(long_plain); i++) {
+    for (size_t i = 0; i < sizeof(long_plain); i++)
         long_plain[i] = (uint8_t)i;
-    }
     print_hex(file, "key", full_key.bytes, SEALED_KEY_BYTES);
     print_hex(file, "client_secret", given.client_secret, 32);
     print_hex(file, "client_nonce", given.client_nonce, 32);
@@ -325,9 +317,8 @@ TEST(the_bytes_are_the_stored_ones)
     char *made = NULL;
     size_t made_bytes;
     FILE *file = fopen(GOLDEN_PATH, "r");
-    if (!file) {
+    if (!file)
         fail_msg("cannot read %s (run from the top of the tree)", GOLDEN_PATH);
-    }
     stored[fread(stored, 1, sizeof(stored) - 1, file)] = '\0';
     fclose(file);
     FILE *stream = open_memstream(&made, &made_bytes);
@@ -435,9 +426,8 @@ TEST(no_bit_of_the_handshake_can_be_changed)
             begin(&full_key, &full_key, 1);
             shake_hands(message, bit);
             /* Only the server's own last word can be changed once it has let the client in. */
-            if (sealed_is_open(client.sealed) || (message < 4 && sealed_is_open(server.sealed))) {
+            if (sealed_is_open(client.sealed) || (message < 4 && sealed_is_open(server.sealed)))
                 fail_msg("bit %zu of message %u does not matter", bit, message);
-            }
             end_both();
         }
     }
@@ -457,9 +447,8 @@ TEST(no_bit_of_a_record_can_be_changed)
         tell(&changed, up.bytes, up.count + SEALED_RECORD_MAX_BYTES);
         changed.bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
         size_t offset = 0;
-        if (unseal(&server, changed.bytes, changed.count, &offset) != SEALED_FATAL) {
+        if (unseal(&server, changed.bytes, changed.count, &offset) != SEALED_FATAL)
             fail_msg("bit %zu does not matter", bit);
-        }
         /* Not even the record as it was is taken after that. */
         assert_int_equal(unseal(&server, up.bytes, up.count, &offset), SEALED_FATAL);
         end_both();
@@ -688,9 +677,8 @@ static size_t carry(struct sealed_link *from, struct sealed_link *to, size_t max
     uint8_t *room = sealed_link_space(to, &room_bytes);
     size_t bytes = waiting_bytes < room_bytes ? waiting_bytes : room_bytes;
     bytes = bytes < maximum ? bytes : maximum;
-    if (bytes == 0) {
+    if (bytes == 0)
         return 0;
-    }
     memcpy(room, waiting, bytes);
     sealed_link_came(to, bytes);
     return sealed_link_sent(from, bytes);

@@ -16,17 +16,15 @@ static void expect_both_refuse(const struct message *message, const char *path, 
     wrong_values_tried++;
     if (encoder_too) {
         writer_init(&writer, encoded, sizeof(encoded));
-        if (message_encode(&writer, message)) {
+        if (message_encode(&writer, message))
             fail_msg("%s: a wrong value was sent", path);
-        }
         assert_string_equal(writer.error.field, path);
         assert_int_equal(writer.error.code, PROTOCOL_ERROR_INVALID);
         assert_int_equal(writer.used_bytes, 0);
     }
     plain_encode(&plain, message);
-    if (decode_copy(&back, (uint16_t)message->type, plain.data, plain.count, &error)) {
+    if (decode_copy(&back, (uint16_t)message->type, plain.data, plain.count, &error))
         fail_msg("%s: a wrong value was taken", path);
-    }
     assert_string_equal(error.field, path);
     assert_int_equal(error.code, PROTOCOL_ERROR_INVALID);
 }
@@ -64,9 +62,8 @@ static uint32_t float_bits(float value)
 static uint32_t float_beyond(float value, uint32_t sign)
 {
     uint32_t bits = float_bits(value);
-    if ((bits & 0x7fffffffu) == 0) {
+    if ((bits & 0x7fffffffu) == 0)
         return (sign << 31) | 1u;
-    }
     return bits >> 31 == sign ? bits + 1 : bits - 1;
 }
 
@@ -131,9 +128,8 @@ static void try_wrong_string(const struct message *message, const struct field_d
     memcpy(text, "Q", 2); /* which no other field has */
     plain_encode(&plain, message);
     uint8_t *at = memmem(plain.data, plain.count, "\x01\0\0\0Q", 5);
-    while (at && memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0Q", 5)) {
+    while (at && memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0Q", 5))
         at = memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0Q", 5);
-    }
     assert_non_null(at);
     at[4] = 0;
     struct message back;

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Transactions with skins, morph targets and clips: what they refuse, what falls along, what they touch. */
-#include "tests/unit/scene/drafts.h"
-#include "tests/harness/test.h"
+#include "tests/unit/scene/scene_fixture.h"
 
 #include <float.h>
-#include <math.h>
 
 static const uint16_t two_joints[8] = {0, 1, 0, 1, 0, 1, 0, 1};
 static const float halves[8] = {1, 1, 1, 1, 1, 1, 1, 1};
@@ -14,10 +12,9 @@ static const float keys[8] = {0, 1, 1, 2, 3, 4, 5, 6};
 
 /* Nodes 1 and 2 are the joints of skin 1, which moves mesh 1 at node 3; clip 1 moves node 1 (channel 1), light 1
  * (channel 2), material 1 (channel 3) and the view (channel 4). */
-static struct scene *animated_scene(void)
+static int begin_animated(void **state)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
+    begin_scene(state);
     add_node(&list, 1, 0);
     add_node(&list, 2, 1);
     add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
@@ -31,15 +28,15 @@ static struct scene *animated_scene(void)
     add_channel(&list, 3, 1, CHANNEL_MATERIAL_EMISSION, 1, 3, 2);
     add_channel(&list, 4, 1, CHANNEL_VIEW_EYE, 0, 3, 2);
     expect_commit(scene, &list);
-    return scene;
+    return 0;
 }
+
+EACH_TEST(begin_animated, end_scene)
 
 /* ---- one object --------------------------------------------------------------------------------- */
 
-TEST(joints_and_targets_come_with_all_they_need)
+TEST_WITH(joints_and_targets_come_with_all_they_need, begin_scene, end_scene)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct scene_mesh *mesh = add_mesh(&list, 7);
     mesh->influence_count = 2;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[7] (joints)");
@@ -71,13 +68,10 @@ TEST(joints_and_targets_come_with_all_they_need)
         mesh->arrays[array] = make_blob(bad, 96);
         expect_refusal(scene, &list, ERROR_INVALID, field);
     }
-    scene_destroy(scene);
 }
 
-TEST(joints_fit_their_counts_and_weights_are_not_negative)
+TEST_WITH(joints_fit_their_counts_and_weights_are_not_negative, begin_scene, end_scene)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_joints(add_mesh(&list, 7), two_joints, halves)->influence_count = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[7] (joints)");
     add_joints(add_mesh(&list, 7), two_joints, halves)->influence_count = UINT32_MAX;
@@ -100,13 +94,10 @@ TEST(joints_fit_their_counts_and_weights_are_not_negative)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 7).weights[0]");
     add_node(&list, 7, 0)->skin = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 7).skin"); /* shows no mesh */
-    scene_destroy(scene);
 }
 
 TEST(skins_clips_and_channels_make_sense_alone)
 {
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     const uint32_t joints[] = {1, 2};
     float matrices[24] = {0};
     add_skin(&list, 5, joints, 2)->joint_count = 0;
@@ -142,15 +133,12 @@ TEST(skins_clips_and_channels_make_sense_alone)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).key_count");
     add_channel(&list, 5, 1, CHANNEL_VIEW_EYE, 1, 3, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).object");
-    scene_destroy(scene);
 }
 
 /* ---- several ------------------------------------------------------------------------------------ */
 
 TEST(skins_and_channels_refer_to_existing_objects)
 {
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     add_skin(&list, 5, (uint32_t[]){2, 9}, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (skin 5).arrays[0] (joints)[1]");
     add_skin(&list, 5, (uint32_t[]){0, 2}, 2);
@@ -178,13 +166,10 @@ TEST(skins_and_channels_refer_to_existing_objects)
     add_remove(&list, OBJECT_NODE, 3);
     add_skin(&list, 1, (uint32_t[]){2}, 1);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[2] (skin 1).arrays[0] (joints)[0]");
-    scene_destroy(scene);
 }
 
 TEST(channels_have_their_numbers_in_their_clips)
 {
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->first_time = 7;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_time");
     add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->first_time = UINT32_MAX;
@@ -214,15 +199,12 @@ TEST(channels_have_their_numbers_in_their_clips)
     add_channel(&list, 9, 1, CHANNEL_NODE_SCALE, 1, 3, 1);
     expect_commit(scene, &list);
     assert_int_equal(scene->objects[OBJECT_CHANNEL].count, 1);
-    scene_destroy(scene);
 }
 
 /* As many as are not compared one by one any more. */
 TEST(many_channels_with_equal_times_stay_distinct)
 {
     enum { COUNT = 4 << 20, CHANNELS = 20, LEAP = COUNT - 3 };
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     float *times = malloc(COUNT * sizeof(*times));
     assert_non_null(times);
     for (int i = 0; i < COUNT; i++)
@@ -242,13 +224,10 @@ TEST(many_channels_with_equal_times_stay_distinct)
     add_channel(&list, 52, 2, CHANNEL_NODE_HIDDEN, 1, 1, 3)->first_time = LEAP - 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[20] (channel 52).first_time");
     free(times);
-    scene_destroy(scene);
 }
 
 TEST(joints_of_a_mesh_have_their_places_in_its_skin)
 {
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     const uint16_t beyond[8] = {0, 1, 0, 1, 0, 2, 0, 1};
     add_skin(&list, 1, (uint32_t[]){2}, 1);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 1).joint_count");
@@ -266,15 +245,12 @@ TEST(joints_of_a_mesh_have_their_places_in_its_skin)
     add_shown(&list, 4, NODE_MESH, 3)->skin = 1;
     add_shown(&list, 5, NODE_MESH, 1);
     expect_commit(scene, &list);
-    scene_destroy(scene);
 }
 
 /* ---- removal ------------------------------------------------------------------------------------ */
 
 TEST(what_changes_something_removed_goes_along)
 {
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     const struct hashmap *channels = &scene->objects[OBJECT_CHANNEL];
     add_remove(&list, OBJECT_LIGHT, 1);
     expect_commit(scene, &list);
@@ -306,13 +282,10 @@ TEST(what_changes_something_removed_goes_along)
     expect_commit(scene, &list);
     assert_int_equal(scene->host_bytes, 0);
     assert_int_equal(scene->table_bytes, 0);
-    scene_destroy(scene);
 }
 
 TEST(a_skin_in_use_is_not_removed)
 {
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     add_remove(&list, OBJECT_SKIN, 1);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 1)");
     add_remove(&list, OBJECT_SKIN, 1);
@@ -321,15 +294,12 @@ TEST(a_skin_in_use_is_not_removed)
     add_remove(&list, OBJECT_SKIN, 1);
     add_remove(&list, OBJECT_NODE, 3);
     expect_commit(scene, &list);
-    scene_destroy(scene);
 }
 
 /* ---- accounts ----------------------------------------------------------------------------------- */
 
-TEST(memory_of_what_moves_is_counted)
+TEST_WITH(memory_of_what_moves_is_counted, begin_scene, end_scene)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_node(&list, 1, 0);
     add_mesh(&list, 1);
     expect_commit(scene, &list);
@@ -359,13 +329,10 @@ TEST(memory_of_what_moves_is_counted)
     add_channel(&list, 1, 2, CHANNEL_NODE_WEIGHTS, 1, 1024, 1);
     expect_commit(scene, &list);
     assert_true(scene->table_bytes - table_bytes > 9 * 4096);
-    scene_destroy(scene);
 }
 
 TEST(revisions_tell_what_moved)
 {
-    struct scene *scene = animated_scene();
-    struct draft_list list = {0};
     /* A joint is a node like any other, with nothing below it. */
     add_node(&list, 2, 1)->parent_from_node[3] = 5;
     expect_commit(scene, &list);
@@ -394,5 +361,4 @@ TEST(revisions_tell_what_moved)
     assert_int_equal(scene->instances_revision, before.instances_revision);
     assert_int_equal(scene->shading_revision, before.shading_revision);
     assert_int_equal(scene->lights_revision, before.lights_revision);
-    scene_destroy(scene);
 }

@@ -1,24 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Skins and morph targets on the CPU, and the bounds of what they make. */
-#include "tests/unit/scene/drafts.h"
+#include "tests/unit/scene/scene_fixture.h"
 
 #include "scene/pose.h"
-#include "tests/harness/test.h"
-
-#include <math.h>
 
 #define PI 3.14159265358979323846
 
-static void expect_near(const char *what, const float *got, const double *expected, int count, double tolerance)
-{
-    for (int i = 0; i < count; i++) {
-        if (!(fabs((double)got[i] - expected[i]) <= tolerance))
-            fail_msg("%s, number %d: %.9g, expected %.9g", what, i, (double)got[i], expected[i]);
-    }
-}
+EACH_TEST(begin_scene, end_scene)
 
-static void deform(const struct scene *scene, const struct scene_pose *pose, uint32_t node, float positions[12],
-                   float *normals)
+static void deform(const struct scene_pose *pose, uint32_t node, float positions[12], float *normals)
 {
     struct error error = {0};
     if (!scene_deform(scene, pose, scene_node(scene, node), positions, normals, &error))
@@ -30,8 +20,6 @@ static const float up_normals[12] = {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1};
 
 TEST(a_vertex_is_the_mean_of_where_its_joints_put_it)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     /* Joint 1 moves by 10 along x; joint 2 below it turns a quarter about z. */
     add_node(&list, 1, 0)->parent_from_node[3] = 10;
     const float quarter[12] = {0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
@@ -49,7 +37,7 @@ TEST(a_vertex_is_the_mean_of_where_its_joints_put_it)
     skin->joint_from_mesh = make_blob(inverse_binds, sizeof(inverse_binds));
     expect_commit(scene, &list);
     float positions[12];
-    deform(scene, NULL, 3, positions, NULL);
+    deform(NULL, 3, positions, NULL);
     /* The square is 000, 100, 110, 010. Joint 1 takes 110 to 11 1 0, joint 2 takes it to 0 1 0, then to -1 0 0,
      * then to 9 0 0; 010 to -1 1 0, to -1 -1 0, to 9 -1 0. */
     const double expected[12] = {0, 0, 0, 11, 0, 0, 9 + 0.25 * 2, 0.25, 0, 9, -1, 0};
@@ -67,13 +55,10 @@ TEST(a_vertex_is_the_mean_of_where_its_joints_put_it)
     assert_memory_equal(instances[0].world_from_object, identity, sizeof(identity));
     assert_memory_equal(instances[0].object_from_world, identity, sizeof(identity));
     free(instances);
-    scene_destroy(scene);
 }
 
 TEST(joints_below_joints_follow_a_clip)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     /* Joints at the origin and, 1 along x below it; each turns by a right angle about z in a second. */
     add_node(&list, 1, 0);
     add_node(&list, 2, 1)->parent_from_node[3] = 1;
@@ -92,7 +77,7 @@ TEST(joints_below_joints_follow_a_clip)
         const struct clip_use use = {.clip = 1, .speed = 1};
         assert_true(scene_pose_evaluate(&pose, scene, &use, 1, t, NULL));
         float positions[12];
-        deform(scene, &pose, 3, positions, NULL);
+        deform(&pose, 3, positions, NULL);
         double a = t * PI / 2, c = cos(a), s = sin(a);
         /* 110 is 0 1 0 seen from the second joint, which turns by twice as much; 010 is -1 1 0. */
         const double expected[12] = {0,
@@ -110,13 +95,10 @@ TEST(joints_below_joints_follow_a_clip)
         expect_near("bent", positions, expected, 12, 1e-6);
         scene_pose_finish(&pose);
     }
-    scene_destroy(scene);
 }
 
 TEST(targets_are_added_before_joints_move)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     const float doubled[12] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
     memcpy(add_node(&list, 1, 0)->parent_from_node, doubled, sizeof(doubled));
     const float weights[8] = {1, 0, 1, 0, 1, 0, 1, 0};
@@ -136,9 +118,9 @@ TEST(targets_are_added_before_joints_move)
     for (int i = 0; i < 12; i++)
         skinned[i] = 2 * morphed[i];
     float positions[12];
-    deform(scene, NULL, 2, positions, NULL);
+    deform(NULL, 2, positions, NULL);
     expect_near("morphed, in the node's space", positions, morphed, 12, 1e-6);
-    deform(scene, NULL, 3, positions, NULL);
+    deform(NULL, 3, positions, NULL);
     expect_near("morphed and skinned, in the world's", positions, skinned, 12, 1e-6);
     float lower[3], upper[3];
     assert_true(scene_bounds(scene, NULL, lower, upper));
@@ -150,9 +132,8 @@ TEST(targets_are_added_before_joints_move)
     add_remove(&list, OBJECT_NODE, 3);
     expect_commit(scene, &list);
     assert_false(scene_node_deforms(scene_node(scene, 2), scene_mesh(scene, 1)));
-    deform(scene, NULL, 2, positions, NULL);
+    deform(NULL, 2, positions, NULL);
     assert_memory_equal(positions, square, sizeof(square));
-    scene_destroy(scene);
 }
 
 /* Normals stay at right angles to the surface and on the same side, under any matrix. */
@@ -166,8 +147,6 @@ TEST(normals_follow_scaled_sheared_and_mirrored_joints)
         {1, 0, 0, 0, 0, 1, 0, 0, 0.5f, -0.25f, -1, 0},
     };
     for (size_t i = 0; i < sizeof(matrices) / sizeof(matrices[0]); i++) {
-        struct scene *scene = new_scene();
-        struct draft_list list = {0};
         memcpy(add_node(&list, 1, 0)->parent_from_node, matrices[i], sizeof(matrices[i]));
         const float weights[8] = {1, 0, 1, 0, 1, 0, 1, 0};
         struct scene_mesh *mesh = add_joints(add_mesh(&list, 1), both, weights);
@@ -176,7 +155,7 @@ TEST(normals_follow_scaled_sheared_and_mirrored_joints)
         add_shown(&list, 2, NODE_MESH, 1)->skin = 1;
         expect_commit(scene, &list);
         float p[12], n[12];
-        deform(scene, NULL, 2, p, n);
+        deform(NULL, 2, p, n);
         for (int v = 0; v < 4; v++) {
             double along_x = 0, along_y = 0, side = 0, length = 0;
             for (int k = 0; k < 3; k++) {
@@ -188,14 +167,11 @@ TEST(normals_follow_scaled_sheared_and_mirrored_joints)
             if (!(fabs(along_x) < 1e-6 && fabs(along_y) < 1e-6 && side > 0 && fabs(length - 1) < 1e-6))
                 fail_msg("matrix %zu, vertex %d: %g %g %g %g", i, v, along_x, along_y, side, length);
         }
-        scene_destroy(scene);
     }
 }
 
 TEST(morphed_normals_are_given_along)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     const float targets[12] = {0}, tilts[12] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     struct scene_mesh *mesh = add_targets(add_mesh(&list, 1), targets, 1);
     mesh->arrays[MESH_NORMALS] = make_blob(up_normals, sizeof(up_normals));
@@ -205,16 +181,13 @@ TEST(morphed_normals_are_given_along)
     add_shown(&list, 2, NODE_MESH, 1);
     expect_commit(scene, &list);
     float p[12], n[12];
-    deform(scene, NULL, 2, p, n);
+    deform(NULL, 2, p, n);
     const double half = sqrt(0.5), expected[12] = {half, 0, half, 0, 0, 1, 0, 0, 1, 0, 0, 1};
     expect_near("normals", n, expected, 12, 1e-6);
-    scene_destroy(scene);
 }
 
 TEST(vertices_that_leave_the_floats_are_no_part_of_the_bounds)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     /* Four scales by 1e12, one below the other. */
     for (uint32_t id = 1; id <= 4; id++) {
         struct scene_node *node = add_node(&list, id, id - 1);
@@ -230,5 +203,4 @@ TEST(vertices_that_leave_the_floats_are_no_part_of_the_bounds)
     assert_true(scene_bounds(scene, NULL, lower, upper));
     expect_near("lower", lower, (double[]){0, 0, 0}, 3, 0);
     expect_near("upper", upper, (double[]){1, 1, 0}, 3, 0);
-    scene_destroy(scene);
 }

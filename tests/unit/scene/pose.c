@@ -1,24 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Poses that clips make of a scene, against what geometry says. */
-#include "tests/unit/scene/drafts.h"
+#include "tests/unit/scene/scene_fixture.h"
 
 #include "scene/pose.h"
-#include "tests/harness/test.h"
-
-#include <math.h>
 
 #define PI 3.14159265358979323846
 
-static void expect_near(const char *what, const float *got, const double *expected, int count, double tolerance)
-{
-    for (int i = 0; i < count; i++) {
-        if (!(fabs((double)got[i] - expected[i]) <= tolerance))
-            fail_msg("%s, number %d: %.9g, expected %.9g", what, i, (double)got[i], expected[i]);
-    }
-}
+EACH_TEST(begin_scene, end_scene)
 
-static struct scene_pose pose_at(const struct scene *scene, const struct clip_use *uses, uint32_t count,
-                                 double time_s)
+static struct scene_pose pose_at(const struct clip_use *uses, uint32_t count, double time_s)
 {
     struct scene_pose pose;
     struct error error = {0};
@@ -30,10 +20,9 @@ static struct scene_pose pose_at(const struct scene *scene, const struct clip_us
 static const struct clip_use plain_use = {.clip = 1, .speed = 1};
 
 /* Where a node's own point is at a time while clip 1 plays. */
-static void expect_place(const struct scene *scene, uint32_t node, double time_s, const float point[3],
-                         const double expected[3])
+static void expect_place(uint32_t node, double time_s, const float point[3], const double expected[3])
 {
-    struct scene_pose pose = pose_at(scene, &plain_use, 1, time_s);
+    struct scene_pose pose = pose_at(&plain_use, 1, time_s);
     float m[12], got[3];
     assert_true(scene_world_from_node(scene, &pose, node, m));
     for (int row = 0; row < 3; row++)
@@ -49,8 +38,6 @@ static const float quarter_turns[15] = {0, 1, 2, 0, 0, 0, 1, 0, 0, 0.70710678f, 
 
 TEST(a_part_that_no_channel_gives_is_that_of_the_node)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     /* Turned by 90 degrees about x, scaled by 2, 3, -4: a mirror; and moved. */
     const float mirrored[12] = {2, 0, 0, 10, 0, 0, 4, 20, 0, 3, 0, 30};
     for (uint32_t node = 1; node <= 3; node++)
@@ -60,45 +47,39 @@ TEST(a_part_that_no_channel_gives_is_that_of_the_node)
     add_channel(&list, 2, 1, CHANNEL_NODE_SCALE, 2, 3, 2);
     expect_commit(scene, &list);
     /* Moved: nothing else changes. */
-    struct scene_pose pose = pose_at(scene, &plain_use, 1, 0.5);
+    struct scene_pose pose = pose_at(&plain_use, 1, 0.5);
     assert_int_equal(pose.node_count, 2);
     const double moved[12] = {2, 0, 0, 3, 0, 0, 4, 4, 0, 3, 0, 5};
     expect_near("moved", scene_pose_parent_from_node(&pose, scene_node(scene, 1)), moved, 12, 1e-6);
     /* Scaled: the mirror lies in the scale, as -2 3 4 of a turn that takes x to -x; a scale of 1 2 3 is none. */
     scene_pose_finish(&pose);
-    pose = pose_at(scene, &plain_use, 1, 0);
+    pose = pose_at(&plain_use, 1, 0);
     const double scaled[12] = {-1, 0, 0, 10, 0, 0, 3, 20, 0, 2, 0, 30};
     expect_near("scaled", scene_pose_parent_from_node(&pose, scene_node(scene, 2)), scaled, 12, 1e-6);
     /* Node 3 is in no clip. */
     assert_ptr_equal(scene_pose_parent_from_node(&pose, scene_node(scene, 3)),
                      scene_node(scene, 3)->parent_from_node);
     scene_pose_finish(&pose);
-    scene_destroy(scene);
 }
 
 TEST(a_turned_mirror_stays_a_mirror_and_keeps_its_size)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     const float mirrored[12] = {0, 3, 0, 1, 2, 0, 0, 2, 0, 0, 4, 3}; /* determinant -24 */
     memcpy(add_node(&list, 1, 0)->parent_from_node, mirrored, sizeof(mirrored));
     add_clip(&list, 1, quarter_turns, 15);
     add_channel(&list, 1, 1, CHANNEL_NODE_ROTATION, 1, 4, 3);
     expect_commit(scene, &list);
-    struct scene_pose pose = pose_at(scene, &plain_use, 1, 0.7);
+    struct scene_pose pose = pose_at(&plain_use, 1, 0.7);
     const float *m = scene_pose_parent_from_node(&pose, scene_node(scene, 1));
     /* Scale -2 3 4 turned by 63 degrees about z. */
     double c = cos(0.7 * PI / 2), s = sin(0.7 * PI / 2);
     const double expected[12] = {-2 * c, -3 * s, 0, 1, -2 * s, 3 * c, 0, 2, 0, 0, 4, 3};
     expect_near("turned", m, expected, 12, 1e-6);
     scene_pose_finish(&pose);
-    scene_destroy(scene);
 }
 
 TEST(a_flat_node_can_be_scaled_up_again)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     const float flat[12] = {0, 0, 0, 0, 0, 0, 5, 0, 0, -5, 0, 0}, point[12] = {0};
     memcpy(add_node(&list, 1, 0)->parent_from_node, flat, sizeof(flat));
     memcpy(add_node(&list, 2, 0)->parent_from_node, point, sizeof(point));
@@ -106,20 +87,17 @@ TEST(a_flat_node_can_be_scaled_up_again)
     add_channel(&list, 1, 1, CHANNEL_NODE_SCALE, 1, 3, 1);
     add_channel(&list, 2, 1, CHANNEL_NODE_SCALE, 2, 3, 1);
     expect_commit(scene, &list);
-    struct scene_pose pose = pose_at(scene, &plain_use, 1, 0);
+    struct scene_pose pose = pose_at(&plain_use, 1, 0);
     /* The column without a direction is at right angles to the others: y to -z, z to y, so x to x. */
     const double upright[12] = {1, 0, 0, 0, 0, 0, 3, 0, 0, -2, 0, 0};
     expect_near("one direction", scene_pose_parent_from_node(&pose, scene_node(scene, 1)), upright, 12, 1e-6);
     const double from_nothing[12] = {1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 3, 0};
     expect_near("no direction", scene_pose_parent_from_node(&pose, scene_node(scene, 2)), from_nothing, 12, 1e-6);
     scene_pose_finish(&pose);
-    scene_destroy(scene);
 }
 
 TEST(what_hangs_below_moves_along)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     /* An arm of two bones of length 1 and 2 along x; both turn by a quarter a second. */
     add_node(&list, 1, 0);
     add_node(&list, 2, 1)->parent_from_node[3] = 1;
@@ -130,17 +108,14 @@ TEST(what_hangs_below_moves_along)
     const float tip[3] = {2, 0, 0};
     for (double t = 0; t <= 2; t += 0.125) {
         double a = t * PI / 2, b = 2 * a;
-        expect_place(scene, 2, t, tip, (double[]){cos(a) + 2 * cos(b), sin(a) + 2 * sin(b), 0});
+        expect_place(2, t, tip, (double[]){cos(a) + 2 * cos(b), sin(a) + 2 * sin(b), 0});
     }
-    scene_destroy(scene);
 }
 
 /* ---- time --------------------------------------------------------------------------------------- */
 
 TEST(clips_begin_end_repeat_and_run_at_their_speed)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_node(&list, 1, 0);
     /* Two channels: the clip is as long as the longer one, 4 s. */
     add_clip(&list, 1, (float[]){1, 3, 10, 0, 0, 30, 0, 0, 4, 1, 1, 1}, 12);
@@ -169,19 +144,16 @@ TEST(clips_begin_end_repeat_and_run_at_their_speed)
         {{.clip = 1, .speed = 2, .start_s = 1, .loop = true}, 1 + 2 * 7 + 1, 20},
     };
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
-        struct scene_pose pose = pose_at(scene, &cases[i].use, 1, cases[i].time_s);
+        struct scene_pose pose = pose_at(&cases[i].use, 1, cases[i].time_s);
         double x = (double)scene_pose_parent_from_node(&pose, scene_node(scene, 1))[3];
         if (!(fabs(x - cases[i].x) < 1e-5))
             fail_msg("case %zu: %g, expected %g", i, x, cases[i].x);
         scene_pose_finish(&pose);
     }
-    scene_destroy(scene);
 }
 
 TEST(of_two_clips_that_change_the_same_the_later_one_counts)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_node(&list, 1, 0);
     add_clip(&list, 7, (float[]){0, 1, 2, 3}, 4);
     add_clip(&list, 8, (float[]){0, 4, 5, 6}, 4);
@@ -195,7 +167,7 @@ TEST(of_two_clips_that_change_the_same_the_later_one_counts)
     const uint32_t counts[] = {2, 2, 3};
     const double places[][3] = {{4, 5, 6}, {1, 2, 3}, {4, 5, 6}};
     for (int i = 0; i < 3; i++) {
-        struct scene_pose pose = pose_at(scene, orders[i], counts[i], 0);
+        struct scene_pose pose = pose_at(orders[i], counts[i], 0);
         const float *m = scene_pose_parent_from_node(&pose, scene_node(scene, 1));
         const double expected[12] = {1, 0, 0, places[i][0], 0, 2, 0, places[i][1], 0, 0, 3, places[i][2]};
         expect_near("pose", m, expected, 12, 1e-6);
@@ -207,15 +179,12 @@ TEST(of_two_clips_that_change_the_same_the_later_one_counts)
     assert_false(scene_pose_evaluate(&pose, scene, unknown, 2, 0, &error));
     assert_int_equal(error.kind, ERROR_UNKNOWN_ID);
     assert_string_equal(error.field, "clips[1].clip");
-    scene_destroy(scene);
 }
 
 /* ---- all that is not a place ---------------------------------------------------------------------- */
 
 TEST(lights_materials_and_the_view_stay_within_what_the_protocol_allows)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     const enum channel_path lights[] = {CHANNEL_LIGHT_COLOUR, CHANNEL_LIGHT_SIZE};
     const enum channel_path materials[] = {CHANNEL_MATERIAL_BASE_COLOUR,  CHANNEL_MATERIAL_EMISSION,
                                            CHANNEL_MATERIAL_METALLIC,     CHANNEL_MATERIAL_ROUGHNESS,
@@ -235,7 +204,7 @@ TEST(lights_materials_and_the_view_stay_within_what_the_protocol_allows)
         add_channel(&list, i + 1, 1, path, i < 8, widths[i], 2)->first_value = 6 - widths[i];
     }
     expect_commit(scene, &list);
-    struct scene_pose low = pose_at(scene, &plain_use, 1, 0), high = pose_at(scene, &plain_use, 1, 2);
+    struct scene_pose low = pose_at(&plain_use, 1, 0), high = pose_at(&plain_use, 1, 2);
     assert_int_equal(low.light_count, 1);
     assert_int_equal(low.material_count, 1);
     assert_int_equal(low.node_count, 0);
@@ -263,13 +232,10 @@ TEST(lights_materials_and_the_view_stay_within_what_the_protocol_allows)
     struct scene_pose nothing = {0};
     assert_ptr_equal(scene_pose_light(&nothing, scene_light(scene, 1)), scene_light(scene, 1));
     assert_ptr_equal(scene_pose_material(NULL, scene_material(scene, 1)), scene_material(scene, 1));
-    scene_destroy(scene);
 }
 
 TEST(a_node_is_hidden_from_a_half_on_and_all_below_with_it)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_mesh(&list, 1);
     add_node(&list, 1, 0)->hidden = true;
     add_shown(&list, 2, NODE_MESH, 1)->parent = 1;
@@ -277,7 +243,7 @@ TEST(a_node_is_hidden_from_a_half_on_and_all_below_with_it)
     add_channel(&list, 1, 1, CHANNEL_NODE_HIDDEN, 1, 1, 2);
     expect_commit(scene, &list);
     for (int i = 0; i < 8; i++) {
-        struct scene_pose pose = pose_at(scene, &plain_use, 1, i / 8.0);
+        struct scene_pose pose = pose_at(&plain_use, 1, i / 8.0);
         struct scene_instance *instances;
         size_t count;
         assert_true(scene_flatten(scene, &pose, NODE_MESH, &instances, &count));
@@ -288,13 +254,10 @@ TEST(a_node_is_hidden_from_a_half_on_and_all_below_with_it)
         free(instances);
         scene_pose_finish(&pose);
     }
-    scene_destroy(scene);
 }
 
 TEST(weights_come_from_the_clip_the_node_or_the_mesh)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     float targets[36] = {0};
     struct scene_mesh *mesh = add_targets(add_mesh(&list, 1), targets, 3);
     mesh->weights = make_weights((float[]){0.5f}, 1);
@@ -308,7 +271,7 @@ TEST(weights_come_from_the_clip_the_node_or_the_mesh)
     add_channel(&list, 1, 1, CHANNEL_NODE_WEIGHTS, 3, 2, 2);
     add_channel(&list, 2, 1, CHANNEL_NODE_WEIGHTS, 2, 1, 2);
     expect_commit(scene, &list);
-    struct scene_pose pose = pose_at(scene, &plain_use, 1, 1);
+    struct scene_pose pose = pose_at(&plain_use, 1, 1);
     const double expected[3][3] = {{0.5, 0, 0}, {5, 0, 0}, {0.5, 20, 0}};
     for (uint32_t i = 0; i < 3; i++) {
         float weights[3];
@@ -319,5 +282,4 @@ TEST(weights_come_from_the_clip_the_node_or_the_mesh)
     scene_pose_weights(NULL, scene_node(scene, 2), scene_mesh(scene, 1), weights);
     expect_near("the node's", weights, (double[]){1, 2, 3}, 3, 0);
     scene_pose_finish(&pose);
-    scene_destroy(scene);
 }

@@ -1,21 +1,25 @@
 /* SPDX-License-Identifier: MIT */
 /* Transactions: what they refuse, that they then change nothing, and what they note about a change. */
-#include "tests/unit/scene/drafts.h"
+#include "tests/unit/scene/scene_fixture.h"
 
 #include "base/clock.h"
-#include "tests/harness/test.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+static void begin_with(const struct scene_limits *limits)
+{
+    scene_destroy(scene);
+    scene = scene_create("limited", limits);
+}
+
+EACH_TEST(begin_scene, end_scene)
 
 /* ---- order and references ----------------------------------------------------------------------- */
 
 TEST(an_edit_may_refer_to_what_a_later_one_makes)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_node(&list, 3, 2);
     add_shown(&list, 2, NODE_MESH, 7);
     add_range(add_mesh(&list, 7), 0, 2, 5);
@@ -30,13 +34,10 @@ TEST(an_edit_may_refer_to_what_a_later_one_makes)
     assert_int_equal(scene_mesh(scene, 7)->base.revision, 1);
     assert_non_null(scene_texture(scene, 9)->texels);
     assert_true(scene->host_bytes > sizeof(square) + sizeof(square_indices));
-    scene_destroy(scene);
 }
 
 TEST(the_last_edit_of_an_object_counts)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_mesh(&list, 1);
     add_mesh(&list, 1);
     add_mesh(&list, 2);
@@ -53,13 +54,10 @@ TEST(the_last_edit_of_an_object_counts)
     add_remove(&list, OBJECT_MESH, 1);
     expect_commit(scene, &list);
     assert_int_equal(scene->host_bytes, 0);
-    scene_destroy(scene);
 }
 
 TEST(references_to_nothing_are_refused_and_named)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_shown(&list, 1, NODE_MESH, 4);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (node 1).object");
     add_shown(&list, 1, NODE_LIGHT, 0);
@@ -81,13 +79,10 @@ TEST(references_to_nothing_are_refused_and_named)
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (disc 1).material");
     add_node(&list, 0, 0);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 0)");
-    scene_destroy(scene);
 }
 
 TEST(what_is_in_use_is_not_removed)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_shown(&list, 1, NODE_MESH, 7);
     add_range(add_mesh(&list, 7), 0, 2, 5);
     add_set(&list, OBJECT_MATERIAL, 5)->set.material.textures[MATERIAL_BUMP].texture = 9;
@@ -110,13 +105,10 @@ TEST(what_is_in_use_is_not_removed)
     add_remove(&list, OBJECT_MATERIAL, 5);
     expect_commit(scene, &list);
     assert_int_equal(scene->host_bytes, 0);
-    scene_destroy(scene);
 }
 
 TEST(a_refused_transaction_leaves_its_blobs_with_the_edits)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct blob *positions = blob_ref(add_mesh(&list, 1)->arrays[MESH_POSITIONS]);
     add_shown(&list, 1, NODE_CAMERA, 1);
     struct error error = {0};
@@ -125,15 +117,12 @@ TEST(a_refused_transaction_leaves_its_blobs_with_the_edits)
     finish(&list);
     assert_int_equal(atomic_load(&positions->references), 1);
     blob_unref(positions);
-    scene_destroy(scene);
 }
 
 /* ---- contents ----------------------------------------------------------------------------------- */
 
 TEST(arrays_must_fit_their_counts)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_mesh(&list, 1)->vertex_count = 5;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[0] (positions)");
     add_mesh(&list, 1)->triangle_count = 1;
@@ -156,13 +145,10 @@ TEST(arrays_must_fit_their_counts)
     texture->width = texture->height = 65536; /* wraps to 0 in 32 bits */
     texture->texels = make_blob(square, 4);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (texture 9).arrays[0] (texels)");
-    scene_destroy(scene);
 }
 
 TEST(numbers_that_are_no_place_are_refused)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     const float bad[] = {NAN, INFINITY, -INFINITY, 2e18f, -2e18f};
     for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         for (size_t place = 0; place < 12; place += 11) {
@@ -192,27 +178,21 @@ TEST(numbers_that_are_no_place_are_refused)
     environment->height = 1;
     environment->texels = make_blob((const uint16_t[]){0, 0, 0, 0, 0, 0x7c00, 0, 0}, 16);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (environment).arrays[0] (texels)");
-    scene_destroy(scene);
 }
 
 TEST(indices_beyond_the_vertices_are_refused_wherever_they_stand)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     for (size_t place = 0; place < 6; place++) {
         uint32_t *indices = (uint32_t *)(void *)add_mesh(&list, 1)->arrays[MESH_INDICES]->data;
         indices[place] = place % 2 ? 4 : UINT32_MAX;
         expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
     }
-    scene_destroy(scene);
 }
 
 /* Several threads look at a part each. */
 TEST(a_large_mesh_is_checked_to_its_end_and_its_bounds_hold_each_used_vertex)
 {
     enum { TRIANGLES = 200000, BAD = 150000 };
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     for (int has_bad = 1; has_bad >= 0; has_bad--) {
         struct scene_mesh *mesh = add_mesh(&list, 1);
         blob_unref(mesh->arrays[MESH_INDICES]);
@@ -234,13 +214,10 @@ TEST(a_large_mesh_is_checked_to_its_end_and_its_bounds_hold_each_used_vertex)
     assert_float_equal(mesh->lower[0], 0, 0);
     assert_float_equal(mesh->upper[0], 1, 0);
     assert_float_equal(mesh->upper[1], 1, 0);
-    scene_destroy(scene);
 }
 
 TEST(ranges_ascend_without_overlap_and_within_bounds)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct scene_mesh *mesh = add_mesh(&list, 1);
     add_range(mesh, 0, 2, 0);
     add_range(mesh, 1, 1, 0);
@@ -257,13 +234,10 @@ TEST(ranges_ascend_without_overlap_and_within_bounds)
     add_range(mesh, 0, 1, 0);
     add_range(mesh, 1, 1, 0);
     expect_commit(scene, &list);
-    scene_destroy(scene);
 }
 
 TEST(lights_cameras_and_discs_make_sense)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct scene_light *light = &add_set(&list, OBJECT_LIGHT, 1)->set.light;
     light->kind = LIGHT_SPOT;
     light->inner_cone = 0.5f;
@@ -277,13 +251,10 @@ TEST(lights_cameras_and_discs_make_sense)
     disc->normal_world[0] = 0.99f;
     disc->radius = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (disc 3).normal_world");
-    scene_destroy(scene);
 }
 
 TEST(bounds_are_those_of_the_vertices_in_use)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct scene_mesh *mesh = add_mesh(&list, 1);
     ((float *)(void *)mesh->arrays[MESH_POSITIONS]->data)[9] = -50; /* vertex 3 */
     uint32_t *indices = (uint32_t *)(void *)mesh->arrays[MESH_INDICES]->data;
@@ -295,15 +266,12 @@ TEST(bounds_are_those_of_the_vertices_in_use)
     assert_memory_equal(scene_mesh(scene, 1)->upper, ((float[]){1, 1, 0}), 12);
     assert_memory_equal(scene_spheres(scene, 1)->lower, ((float[]){-6, -2, -2}), 12);
     assert_memory_equal(scene_spheres(scene, 1)->upper, ((float[]){1.5f, 2.5f, 3.5f}), 12);
-    scene_destroy(scene);
 }
 
 /* ---- hierarchy ---------------------------------------------------------------------------------- */
 
 TEST(parents_exist_and_circles_do_not)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_node(&list, 1, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (node 1).parent");
     add_node(&list, 1, 1);
@@ -319,14 +287,12 @@ TEST(parents_exist_and_circles_do_not)
     add_node(&list, 1, 3); /* the circle closes through nodes of an earlier transaction */
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
     assert_int_equal(scene_node(scene, 1)->parent, 0);
-    scene_destroy(scene);
 }
 
 /* A chain of `length` nodes from the root, ids from `first`. */
-static void commit_chain(struct scene *scene, uint32_t first, uint32_t length)
+static void commit_chain(uint32_t first, uint32_t length)
 {
     for (uint32_t i = 0; i < length; i++) {
-        struct draft_list list = {0};
         add_node(&list, first + i, i ? first + i - 1 : 0);
         expect_commit(scene, &list);
     }
@@ -334,9 +300,7 @@ static void commit_chain(struct scene *scene, uint32_t first, uint32_t length)
 
 TEST(the_hierarchy_has_a_maximum_depth)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
-    commit_chain(scene, 1, SCENE_DEPTH_MAX);
+    commit_chain(1, SCENE_DEPTH_MAX);
     add_node(&list, 1000, SCENE_DEPTH_MAX);
     expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1000).parent");
     /* A subtree that is moved down takes its depth along, though its lower nodes are not edited. */
@@ -346,13 +310,10 @@ TEST(the_hierarchy_has_a_maximum_depth)
     expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1).parent");
     float world[12];
     assert_true(scene_world_from_node(scene, NULL, SCENE_DEPTH_MAX, world));
-    scene_destroy(scene);
 }
 
 TEST(a_removed_node_takes_along_what_hangs_below_it)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_node(&list, 1, 0);
     add_node(&list, 2, 1);
     add_node(&list, 3, 2);
@@ -378,15 +339,13 @@ TEST(a_removed_node_takes_along_what_hangs_below_it)
     expect_commit(scene, &list);
     assert_int_equal(scene->objects[OBJECT_NODE].count, 1);
     assert_non_null(scene_node(scene, 5));
-    scene_destroy(scene);
 }
 
 /* ---- limits and revisions ----------------------------------------------------------------------- */
 
 TEST(limits_are_kept_and_reported)
 {
-    struct scene *scene = scene_create("small", &(struct scene_limits){.host_bytes = 1500, .nodes = 2});
-    struct draft_list list = {0};
+    begin_with(&(struct scene_limits){.host_bytes = 1500, .nodes = 2});
     add_node(&list, 1, 0);
     add_node(&list, 2, 0);
     expect_commit(scene, &list);
@@ -402,34 +361,29 @@ TEST(limits_are_kept_and_reported)
         numbers[4 * i + 3] = 1;
     add_spheres(&list, 1, numbers, 60);
     expect_refusal(scene, &list, ERROR_LIMIT, "edits");
-    scene_destroy(scene);
 }
 
 TEST(the_depth_may_be_limited_further)
 {
-    struct scene *scene = scene_create("flat", &(struct scene_limits){.depth = 3});
-    struct draft_list list = {0};
-    commit_chain(scene, 1, 3);
+    begin_with(&(struct scene_limits){.depth = 3});
+    commit_chain(1, 3);
     add_node(&list, 4, 3);
     expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 4).parent");
     add_node(&list, 1, 3); /* a circle is one, and not too deep, however little is allowed */
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
     add_node(&list, 4, 2);
     expect_commit(scene, &list);
-    scene_destroy(scene);
-    scene =
-        scene_create("deep", &(struct scene_limits){.depth = SCENE_DEPTH_MAX + 1}); /* more than there can be */
-    commit_chain(scene, 1, SCENE_DEPTH_MAX);
+    begin_with(&(struct scene_limits){.depth = SCENE_DEPTH_MAX + 1}); /* more than there can be */
+    commit_chain(1, SCENE_DEPTH_MAX);
     add_node(&list, 1000, SCENE_DEPTH_MAX);
     expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1000).parent");
-    scene_destroy(scene);
 }
 
 struct revisions {
     uint64_t geometry, instances, shading, lights;
 };
 
-static void expect_touched(const struct scene *scene, struct revisions expected)
+static void expect_touched(struct revisions expected)
 {
     uint64_t r = scene->revision;
     struct revisions got = {scene->geometry_revision == r, scene->instances_revision == r,
@@ -442,8 +396,6 @@ static void expect_touched(const struct scene *scene, struct revisions expected)
 
 TEST(revisions_tell_what_a_transaction_touched)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     add_mesh(&list, 1);
     add_set(&list, OBJECT_LIGHT, 1);
     add_set(&list, OBJECT_CAMERA, 1)->set.camera.fov_y = 1;
@@ -454,51 +406,48 @@ TEST(revisions_tell_what_a_transaction_touched)
     add_node(&list, 4, 0);
     add_shown(&list, 5, NODE_MESH, 1)->parent = 4;
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){1, 1, 1, 1});
+    expect_touched((struct revisions){1, 1, 1, 1});
     add_mesh(&list, 1);
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){.geometry = 1});
+    expect_touched((struct revisions){.geometry = 1});
     add_shown(&list, 1, NODE_MESH, 1)->hidden = true;
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){.instances = 1});
+    expect_touched((struct revisions){.instances = 1});
     add_shown(&list, 2, NODE_LIGHT, 1);
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){.lights = 1});
+    expect_touched((struct revisions){.lights = 1});
     add_shown(&list, 3, NODE_CAMERA, 1);
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){0});
+    expect_touched((struct revisions){0});
     add_node(&list, 4, 0); /* others hang below it */
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){.instances = 1, .lights = 1});
+    expect_touched((struct revisions){.instances = 1, .lights = 1});
     add_set(&list, OBJECT_MATERIAL, 1);
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){.shading = 1});
+    expect_touched((struct revisions){.shading = 1});
     list.edits[0] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
     list.count = 1;
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){.lights = 1});
+    expect_touched((struct revisions){.lights = 1});
     assert_int_equal(scene->environment.revision, scene->revision);
     add_remove(&list, OBJECT_NODE, 1);
     expect_commit(scene, &list);
-    expect_touched(scene, (struct revisions){.instances = 1});
-    scene_destroy(scene);
+    expect_touched((struct revisions){.instances = 1});
 }
 
-static struct scene_environment *set_environment(struct draft_list *list, size_t index)
+static struct scene_environment *set_environment(size_t index)
 {
-    list->edits[index] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
-    list->count = index + 1;
-    return &list->edits[index].set.environment;
+    list.edits[index] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
+    list.count = index + 1;
+    return &list.edits[index].set.environment;
 }
 
 TEST(an_environment_keeps_its_image_if_the_edit_says_so)
 {
     static const uint16_t dark[4] = {0}, infinite[4] = {0x7c00};
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct scene_edit read;
     struct error error = {0};
-    struct scene_environment *environment = set_environment(&list, 0);
+    struct scene_environment *environment = set_environment(0);
     environment->width = environment->height = 1;
     environment->texels = make_blob(dark, sizeof(dark));
     expect_commit(scene, &list);
@@ -506,66 +455,58 @@ TEST(an_environment_keeps_its_image_if_the_edit_says_so)
     const uint64_t bytes = scene->host_bytes;
     assert_true(scene_read_object(scene, OBJECT_ENVIRONMENT, 1, &read, &error));
     assert_true(read.set.environment.keeps_image && !read.set.environment.texels);
-    set_environment(&list, 0)->colour[0] = 3;
+    set_environment(0)->colour[0] = 3;
     list.edits[0].set.environment.keeps_image = true;
     expect_commit(scene, &list);
     assert_true(scene->environment.texels == image && scene->environment.colour[0] == 3);
     assert_int_equal(scene->environment.width, 1);
     assert_int_equal(scene->host_bytes, bytes);
     /* Of two edits the second keeps the image of the first, which is looked through all the same. */
-    environment = set_environment(&list, 0);
+    environment = set_environment(0);
     environment->width = environment->height = 1;
     environment->texels = make_blob(infinite, sizeof(infinite));
-    set_environment(&list, 1)->keeps_image = true;
+    set_environment(1)->keeps_image = true;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[1] (environment).arrays[0] (texels)");
-    set_environment(&list, 0)->keeps_image = true;
+    set_environment(0)->keeps_image = true;
     list.edits[0].set.environment.backdrop = true;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (environment).backdrop");
     assert_true(scene->environment.texels == image);
-    scene_destroy(scene);
 }
 
 /* ---- what is not looked at ---------------------------------------------------------------------- */
 
 static const float square_with_nan[12] = {0, 0, 0, 1, 0, 0, NAN, 1, 0, 0, 1, 0};
 
-static struct scene_mesh *add_bad_mesh(struct draft_list *list, uint32_t id)
+static struct scene_mesh *add_bad_mesh(uint32_t id)
 {
-    struct scene_mesh *mesh = add_mesh(list, id);
+    struct scene_mesh *mesh = add_mesh(&list, id);
     memcpy(mesh->arrays[MESH_POSITIONS]->data, square_with_nan, sizeof(square_with_nan));
     return mesh;
 }
 
 TEST(an_edit_that_a_later_one_replaces_is_not_looked_at)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
-    add_bad_mesh(&list, 1);
+    add_bad_mesh(1);
     add_mesh(&list, 1);
-    add_bad_mesh(&list, 2);
+    add_bad_mesh(2);
     add_remove(&list, OBJECT_MESH, 2);
     expect_commit(scene, &list);
     assert_true(scene_mesh(scene, 1)->upper[0] == 1.0f);
     add_mesh(&list, 1);
-    add_bad_mesh(&list, 1);
+    add_bad_mesh(1);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[1] (mesh 1).arrays[0] (positions)");
-    scene_destroy(scene);
 }
 
 TEST(limits_are_looked_at_before_the_contents_of_arrays)
 {
-    struct scene *scene = scene_create("small", &(struct scene_limits){.host_bytes = 200});
-    struct draft_list list = {0};
-    add_bad_mesh(&list, 1);
+    begin_with(&(struct scene_limits){.host_bytes = 200});
+    add_bad_mesh(1);
     expect_refusal(scene, &list, ERROR_LIMIT, "edits");
-    scene_destroy(scene);
 }
 
 TEST(meshes_that_share_arrays_have_bounds_of_their_own)
 {
     static const uint32_t first_triangle[6] = {0, 1, 2, 0, 1, 2}, edge[6] = {0, 1, 1, 0, 1, 1};
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct blob *positions = add_mesh(&list, 1)->arrays[MESH_POSITIONS];
     for (uint32_t id = 2; id <= 4; id++) {
         struct scene_mesh *mesh = add_mesh(&list, id);
@@ -582,13 +523,10 @@ TEST(meshes_that_share_arrays_have_bounds_of_their_own)
         assert_true(scene_mesh(scene, id)->upper[0] == 1.0f);
         assert_true(scene_mesh(scene, id)->upper[1] == (id == 4 ? 0.0f : 1.0f));
     }
-    scene_destroy(scene);
 }
 
 TEST(an_abandoned_transaction_changes_nothing)
 {
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct error error = {0};
     const atomic_bool abandoned = true;
     add_mesh(&list, 1);
@@ -597,15 +535,12 @@ TEST(an_abandoned_transaction_changes_nothing)
     assert_int_equal(scene->revision, 0);
     assert_int_equal(scene->objects[OBJECT_MESH].count, 0);
     expect_commit(scene, &list);
-    scene_destroy(scene);
 }
 
 /* The size of the largest model that is at hand; its time is printed. */
 TEST(a_mesh_of_871_thousand_triangles_is_checked)
 {
     const uint32_t triangles = 871414, vertices = 437645;
-    struct scene *scene = new_scene();
-    struct draft_list list = {0};
     struct scene_mesh *mesh = &add_set(&list, OBJECT_MESH, 1)->set.mesh;
     mesh->vertex_count = vertices;
     mesh->triangle_count = triangles;
@@ -624,5 +559,4 @@ TEST(a_mesh_of_871_thousand_triangles_is_checked)
     print_message("%u triangles: %.2f ms\n", triangles, (double)(clock_now_ns() - start_ns) / 1e6);
     assert_true(scene_mesh(scene, 1)->lower[0] == -500.0f);
     assert_true(scene_mesh(scene, 1)->upper[2] == 499.0f);
-    scene_destroy(scene);
 }

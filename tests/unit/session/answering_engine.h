@@ -145,26 +145,6 @@ static inline void engine_end(void)
 
 /* ---- steps ------------------------------------------------------------------------------------------- */
 
-static inline void begin_edit(uint32_t request, uint32_t scene)
-{
-    struct message message = made(MESSAGE_EDIT_BEGIN);
-    message.edit_begin.scene = scene;
-    send_message(request, 0, &message);
-}
-
-static inline void send_node(uint32_t request, uint32_t node)
-{
-    struct message message = made(MESSAGE_SET_NODE);
-    message.set_node.node = node;
-    send_message(request, 0, &message);
-}
-
-static inline void commit(uint32_t request)
-{
-    struct message message = made(MESSAGE_EDIT_COMMIT);
-    send_message(request, 0, &message);
-}
-
 static inline struct message render_message(uint32_t last_frame, uint32_t credit)
 {
     struct message message = made(MESSAGE_RENDER);

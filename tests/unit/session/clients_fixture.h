@@ -5,8 +5,8 @@
 #define FARLIGHT_TESTS_CLIENTS_FIXTURE_H
 
 #include "tests/unit/engine/engine_fake.h"
+#include "tests/unit/session/client.h"
 
-#include "session/daemon.h"
 #include "session/session.h"
 
 #include <pthread.h>
@@ -18,7 +18,6 @@
 /* ---- the daemon -------------------------------------------------------------------------------------- */
 
 static struct {
-    struct engine *engine;
     struct daemon daemon;
     pthread_t thread;
     char folder[64], address[96];
@@ -33,10 +32,12 @@ static inline void *run(void *context)
     return NULL;
 }
 
-/* What a test may change before it starts the daemon. */
-static inline struct hub_options usual_options(void)
+static struct hub_options options; /* which a test may change before it starts the daemon */
+
+static inline int set_options(void **state)
 {
-    return (struct hub_options){
+    (void)state;
+    options = (struct hub_options){
         .limits = {.clients = 16,
                    .unauthenticated = 16,
                    .unauthenticated_per_address = 16,
@@ -68,14 +69,15 @@ static inline struct hub_options usual_options(void)
                               .queued_hard_bytes = 64 << 20},
         .engine_limits = {.scene_linger_ms = 600000},
     };
+    daemon_block_signals();
+    return 0;
 }
 
-static inline void start_daemon(const struct hub_options *wanted)
+static inline void start_daemon(void)
 {
-    struct hub_options options = *wanted;
     struct error error = {0};
-    served.engine = start((struct engine_options){.limits = options.engine_limits});
-    options.engine = engine_port(served.engine);
+    start((struct engine_options){.limits = options.engine_limits});
+    options.engine = engine_port(engine);
     strcpy(served.folder, "/tmp/farlight-test-XXXXXX");
     assert_non_null(mkdtemp(served.folder));
     snprintf(served.address, sizeof(served.address), "unix:%s/s tcp:127.0.0.1:0", served.folder);
@@ -85,137 +87,15 @@ static inline void start_daemon(const struct hub_options *wanted)
     assert_int_equal(pthread_create(&served.thread, NULL, run, NULL), 0);
 }
 
-static inline int block_signals(void **state)
-{
-    (void)state;
-    daemon_block_signals();
-    return 0;
-}
-
-static inline int tear_down(void **state)
-{
-    (void)state;
-    kill(getpid(), SIGTERM); /* blocked in every thread: the daemon's loop takes it */
-    pthread_join(served.thread, NULL);
-    daemon_finish(&served.daemon);
-    stop(served.engine);
-    assert_int_equal(rmdir(served.folder), 0); /* it has taken its socket away */
-    return 0;
-}
-
 /* ---- clients ----------------------------------------------------------------------------------------- */
 
-struct client {
-    int fd;
-    uint8_t in[2 * FRAMING_MESSAGE_MAX_BYTES];
-    size_t in_used, consumed;
-    uint8_t scratch_data[SCRATCH_BYTES];
-    struct scratch scratch;
-    struct framing_header header; /* of the last message */
-    struct message message;
-    uint64_t capabilities, upload_credit;
-    struct handshake_limits limits;
-};
-
-static inline void receive_some(struct client *client)
-{
-    memmove(client->in, client->in + client->consumed, client->in_used - client->consumed);
-    client->in_used -= client->consumed;
-    client->consumed = 0;
-    struct pollfd fd = {.fd = client->fd, .events = POLLIN};
-    if (poll(&fd, 1, 20000) != 1)
-        fail_msg("nothing came for 20 s");
-    ssize_t got = recv(client->fd, client->in + client->in_used, sizeof(client->in) - client->in_used, 0);
-    if (got <= 0)
-        fail_msg("the connection is closed");
-    client->in_used += (size_t)got;
-}
-
-static inline void send_message(struct client *client, uint32_t request, uint32_t channel,
-                                const struct message *message)
-{
-    static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
-    struct writer writer;
-    writer_init(&writer, bytes, sizeof(bytes));
-    if (!message_write(&writer, request, channel, message))
-        fail_msg("%s: %s", writer.error.field, writer.error.text);
-    for (size_t sent = 0; sent < writer.used_bytes;) {
-        ssize_t now = send(client->fd, bytes + sent, writer.used_bytes - sent, MSG_NOSIGNAL);
-        assert_true(now > 0);
-        sent += (size_t)now;
-    }
-}
-
-/* The next message but credit; it stays until the next call. */
-static inline void receive(struct client *client)
-{
-    for (;;) {
-        struct frame frame;
-        struct decode_error error = {0};
-        enum framing_result result =
-            framing_parse(&frame, client->in + client->consumed, client->in_used - client->consumed,
-                          MESSAGE_FROM_SERVER, &error);
-        if (result == FRAMING_NEED_MORE) {
-            receive_some(client);
-            continue;
-        }
-        if (result == FRAMING_FATAL)
-            fail_msg("%s: %s", error.field, error.text);
-        client->consumed += frame.consumed_bytes;
-        client->header = frame.header;
-        scratch_init(&client->scratch, client->scratch_data, sizeof(client->scratch_data));
-        if (!message_decode(&client->message, frame.header.type, frame.payload, frame.header.payload_bytes,
-                            &client->scratch, &error))
-            fail_msg("%s: %s", error.field, error.text);
-        if (client->message.type != MESSAGE_CREDIT)
-            return;
-        client->upload_credit = client->message.credit.total;
-    }
-}
-
-static inline void expect(struct client *client, enum message_type type, uint32_t request)
-{
-    receive(client);
-    if (client->message.type != type || client->header.request != request)
-        fail_msg("%s of request %u came instead of %s of %u: %s", message_type_text(client->message.type),
-                 client->header.request, message_type_text(type), request,
-                 client->message.type == MESSAGE_ERROR ? client->message.error.text : "");
-}
+/* Those that are there: the end of the test closes them. */
+static struct client *present[64];
 
 static inline uint64_t expect_ok(struct client *client, uint32_t request)
 {
     expect(client, MESSAGE_OK, request);
     return client->message.ok.revision;
-}
-
-static inline void expect_error(struct client *client, uint32_t request, enum protocol_error_code code)
-{
-    expect(client, MESSAGE_ERROR, request);
-    if (client->message.error.code != code)
-        fail_msg("%s: %s", protocol_error_code_text(client->message.error.code), client->message.error.text);
-}
-
-static inline struct message made(enum message_type type)
-{
-    struct message message;
-    message_init(&message, type);
-    return message;
-}
-
-static inline void greet(struct client *client)
-{
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "test"};
-    uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
-    size_t count = handshake_hello_encode(bytes, &hello);
-    assert_int_equal(send(client->fd, bytes, count, MSG_NOSIGNAL), count);
-    struct handshake_reply reply;
-    struct decode_error error = {0};
-    while (handshake_reply_parse(&reply, client->in, client->in_used, &client->consumed, &error) ==
-           HANDSHAKE_NEED_MORE)
-        receive_some(client);
-    assert_int_equal(reply.version, 1);
-    client->capabilities = reply.capabilities;
-    client->limits = reply.limits;
 }
 
 /* Over the Unix socket, where all are one user, or over TCP, where everybody is somebody else. Says nothing yet.
@@ -228,24 +108,34 @@ static inline struct client *knock(bool over_tcp)
     client->fd = socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     assert_true(client->fd >= 0);
     assert_int_equal(connect(client->fd, (const struct sockaddr *)&address->storage, address->storage_bytes), 0);
-    return client;
+    size_t place = 0;
+    while (present[place])
+        place++;
+    return present[place] = client;
 }
 
 static inline struct client *come(bool over_tcp)
 {
     struct client *client = knock(over_tcp);
-    greet(client);
+    greet_with(client, 0);
     return client;
+}
+
+static inline void go(struct client *client)
+{
+    for (size_t i = 0; i < sizeof(present) / sizeof(present[0]); i++) {
+        if (present[i] == client)
+            present[i] = NULL;
+    }
+    close(client->fd);
+    free(client);
 }
 
 /* Without a word, as when a line is cut. With a witness, the only other client, the daemon has noticed when this
  * returns. */
 static inline void cut(struct client *client, struct client *witness)
 {
-    close(client->fd);
-    free(client);
-    if (!witness)
-        return;
+    go(client);
     uint32_t clients;
     do {
         struct message message = made(MESSAGE_STATS);
@@ -254,6 +144,21 @@ static inline void cut(struct client *client, struct client *witness)
         clients = witness->message.stats_reply.clients_count;
         usleep(1000);
     } while (clients > 1);
+}
+
+static inline int tear_down(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof(present) / sizeof(present[0]); i++) {
+        if (present[i])
+            go(present[i]);
+    }
+    kill(getpid(), SIGTERM); /* blocked in every thread: the daemon's loop takes it */
+    pthread_join(served.thread, NULL);
+    daemon_finish(&served.daemon);
+    stop();
+    assert_int_equal(rmdir(served.folder), 0); /* it has taken its socket away */
+    return 0;
 }
 
 static inline void submit_open(struct client *client, uint32_t scene, const char *name,
@@ -275,33 +180,10 @@ static inline void open_scene_as(struct client *client, uint32_t scene, const ch
 
 static inline uint64_t commit_node(struct client *client, uint32_t request, uint32_t scene, uint32_t node)
 {
-    struct message message = made(MESSAGE_EDIT_BEGIN);
-    message.edit_begin.scene = scene;
-    send_message(client, request, 0, &message);
-    message = made(MESSAGE_SET_NODE);
-    message.set_node.node = node;
-    message.set_node.parent_from_node[0] = 1;
-    send_message(client, request, 0, &message);
-    message = made(MESSAGE_EDIT_COMMIT);
-    send_message(client, request, 0, &message);
+    begin_edit(client, request, scene);
+    send_node(client, request, node, 0);
+    commit(client, request);
     return expect_ok(client, request);
-}
-
-static inline struct record_blob_ref reference_to(const void *data, size_t bytes)
-{
-    struct record_blob_ref reference = {.size_bytes = bytes};
-    blob_hash(reference.hash, data, bytes);
-    return reference;
-}
-
-static inline uint32_t offer(struct client *client, uint32_t request, struct record_blob_ref reference)
-{
-    struct message message = made(MESSAGE_BLOB_OFFER);
-    message.blob_offer.blobs = &reference;
-    message.blob_offer.blobs_count = 1;
-    send_message(client, request, 0, &message);
-    expect(client, MESSAGE_BLOB_NEED, request);
-    return client->message.blob_need.needed_count;
 }
 
 static inline void send_blob(struct client *client, uint32_t request, const struct record_blob_ref *reference,

@@ -3,23 +3,6 @@
 #include "tests/unit/session/answering_engine.h"
 #include "tests/harness/test.h"
 
-static struct record_blob_ref reference_to(const uint8_t *data, size_t bytes)
-{
-    struct record_blob_ref reference = {.size_bytes = bytes};
-    blob_hash(reference.hash, data, bytes);
-    return reference;
-}
-
-static uint32_t offer(uint32_t request, struct record_blob_ref reference)
-{
-    struct message message = made(MESSAGE_BLOB_OFFER);
-    message.blob_offer.blobs = &reference;
-    message.blob_offer.blobs_count = 1;
-    send_message(request, 0, &message);
-    expect(MESSAGE_BLOB_NEED, request);
-    return client.message.blob_need.needed_count;
-}
-
 static void send_piece(uint32_t request, const struct record_blob_ref *reference, const uint8_t *data,
                        size_t offset, size_t bytes)
 {
@@ -52,7 +35,7 @@ SESSION_TEST(edits_are_gathered_and_committed_together)
     open_scene(1, 1);
     begin_edit(2, 1);
     for (uint32_t node = 1; node <= 10; node++)
-        send_node(2, node);
+        send_node(2, node, 0);
     commit(2);
     expect(MESSAGE_OK, 2);
     assert_int_equal(client.message.ok.revision, 1);
@@ -63,17 +46,17 @@ SESSION_TEST(a_failed_transaction_has_one_answer_and_what_follows_it_is_skipped)
 {
     open_scene(1, 1);
     begin_edit(2, 9); /* no such scene */
-    send_node(2, 1);
+    send_node(2, 1, 0);
     commit(2);
     expect_error(2, PROTOCOL_ERROR_UNKNOWN_ID);
     begin_edit(3, 1);
     for (uint32_t node = 1; node <= 12; node++) /* two more than fit */
-        send_node(3, node);
+        send_node(3, node, 0);
     commit(3);
     expect_error(3, PROTOCOL_ERROR_LIMIT);
     expect_alive(4);
     begin_edit(3, 1); /* the number is free again */
-    send_node(3, 1);
+    send_node(3, 1, 0);
     commit(3);
     expect(MESSAGE_OK, 3);
     assert_int_equal(atomic_load(&engine.edits), 1);
@@ -85,17 +68,17 @@ SESSION_TEST(edits_count_until_their_transaction_is_answered)
     open_scene(1, 1);
     begin_edit(2, 1);
     for (uint32_t node = 1; node <= 10; node++)
-        send_node(2, node);
+        send_node(2, node, 0);
     commit(2);
     begin_edit(3, 1);
-    send_node(3, 11);
+    send_node(3, 11, 0);
     expect_error(3, PROTOCOL_ERROR_LIMIT);
     assert_string_not_equal(client.message.error.remedy, "");
     release_commit();
     expect(MESSAGE_OK, 2);
     begin_edit(4, 1);
     for (uint32_t node = 1; node <= 10; node++)
-        send_node(4, node);
+        send_node(4, node, 0);
     commit(4);
     release_commit();
     expect(MESSAGE_OK, 4);

@@ -14,15 +14,6 @@
 
 /* ---- steps ------------------------------------------------------------------------------------------- */
 
-static void expect_served(struct client *client)
-{
-    struct message message = made(MESSAGE_PING);
-    message.ping.sent_ns = 1234567;
-    send_message(client, 900, 0, &message);
-    expect(client, MESSAGE_PONG, 900);
-    assert_int_equal(client->message.pong.sent_ns, 1234567);
-}
-
 static void expect_limit(struct client *client, uint32_t request, const char *field, const char *option)
 {
     expect_error(client, request, PROTOCOL_ERROR_LIMIT);
@@ -36,60 +27,6 @@ static bool has_come(const struct client *client, int wait_ms)
 {
     struct pollfd fd = {.fd = client->fd, .events = POLLIN};
     return poll(&fd, 1, wait_ms) == 1;
-}
-
-/* Nothing more comes but the end. */
-static void expect_end(struct client *client)
-{
-    assert_int_equal(client->in_used, client->consumed);
-    assert_true(has_come(client, 20000));
-    assert_true(recv(client->fd, client->in, 1, 0) <= 0);
-}
-
-static void go(struct client *client)
-{
-    cut(client, NULL);
-}
-
-static void send_hello(const struct client *client)
-{
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "test"};
-    uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
-    size_t count = handshake_hello_encode(bytes, &hello);
-    assert_int_equal(send(client->fd, bytes, count, MSG_NOSIGNAL), count);
-}
-
-static struct handshake_reply receive_reply(struct client *client)
-{
-    struct handshake_reply reply;
-    struct decode_error error = {0};
-    while (handshake_reply_parse(&reply, client->in, client->in_used, &client->consumed, &error) ==
-           HANDSHAKE_NEED_MORE)
-        receive_some(client);
-    return reply;
-}
-
-static void begin_edit(struct client *client, uint32_t request, uint32_t scene)
-{
-    struct message message = made(MESSAGE_EDIT_BEGIN);
-    message.edit_begin.scene = scene;
-    send_message(client, request, 0, &message);
-}
-
-static void commit(struct client *client, uint32_t request)
-{
-    struct message message = made(MESSAGE_EDIT_COMMIT);
-    send_message(client, request, 0, &message);
-}
-
-static void send_node(struct client *client, uint32_t request, uint32_t node, uint32_t parent)
-{
-    struct message message = made(MESSAGE_SET_NODE);
-    message.set_node.node = node;
-    message.set_node.parent = parent;
-    for (int axis = 0; axis < 3; axis++)
-        message.set_node.parent_from_node[5 * axis] = 1;
-    send_message(client, request, 0, &message);
 }
 
 static void upload(struct client *client, uint32_t request, const struct record_blob_ref *reference,
@@ -123,12 +60,11 @@ static void expect_picture(struct client *client, uint32_t request)
 
 /* ---- what is told ------------------------------------------------------------------------------------ */
 
-ALL_TESTS(block_signals, NULL)
-EACH_TEST(NULL, tear_down)
+EACH_TEST(set_options, tear_down)
 
 TEST(every_limit_is_stated_in_the_handshake)
 {
-    struct hub_options options = {
+    options = (struct hub_options){
         .limits = {.clients = 101,
                    .unauthenticated = 102,
                    .unauthenticated_per_address = 103,
@@ -201,7 +137,7 @@ TEST(every_limit_is_stated_in_the_handshake)
         .scenes_lingering = 134,
         .ldc_layers_max = 116,
     };
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false);
     struct handshake_limit told, wanted;
     for (size_t i = 0; handshake_limit_at(&expected, i, &wanted); i++) {
@@ -209,102 +145,85 @@ TEST(every_limit_is_stated_in_the_handshake)
         if (told.value != wanted.value)
             fail_msg("%s: %" PRIu64 " is told, not %" PRIu64, told.name, told.value, wanted.value);
     }
-    go(client);
 }
 
 TEST(times_below_a_second_are_not_stated_as_none)
 {
-    struct hub_options options = usual_options();
     options.connection_limits.idle_ms = 900;
     options.engine_limits.scene_linger_ms = 0;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false);
     assert_int_equal(client->limits.idle_seconds, 1);
     assert_int_equal(client->limits.scene_linger_seconds, 0);
-    go(client);
 }
 
 /* ---- connections ------------------------------------------------------------------------------------- */
 
 static void expect_refused(struct client *client, const char *why)
 {
-    send_hello(client);
+    send_hello(client, 0);
     struct handshake_reply reply = receive_reply(client);
     assert_int_equal(reply.version, 0);
     assert_true(reply.capabilities & HANDSHAKE_TRY_AGAIN);
     if (!strstr(reply.text, why))
         fail_msg("\"%s\" does not say \"%s\"", reply.text, why);
     expect_end(client);
-    go(client);
 }
 
 TEST(one_client_too_many_is_refused_and_may_connect_later)
 {
-    struct hub_options options = usual_options();
     options.limits.clients = 2;
-    start_daemon(&options);
+    start_daemon();
     struct client *one = come(true), *other = come(true);
     expect_refused(knock(true), "2 clients are connected");
-    expect_served(one);
-    expect_served(other);
+    expect_alive(one, 900);
+    expect_alive(other, 900);
     cut(other, one);
     other = come(true);
-    expect_served(other);
-    go(other);
-    go(one);
+    expect_alive(other, 900);
 }
 
 TEST(the_daemons_own_user_finds_a_place_where_others_do_not)
 {
-    struct hub_options options = usual_options();
     options.limits.clients = 1;
-    start_daemon(&options);
-    struct client *stranger = come(true), *own[4];
-    for (int i = 0; i < 3; i++)
-        own[i] = come(false); /* by the Unix socket, which tells the user */
-    own[3] = come(false);
+    start_daemon();
+    struct client *stranger = come(true);
+    for (int i = 0; i < 4; i++)
+        come(false); /* by the Unix socket, which tells the user */
     expect_refused(knock(true), "1 clients are connected");
     expect_refused(knock(false), "1 clients are connected");
-    expect_served(stranger);
-    for (int i = 0; i < 4; i++)
-        go(own[i]);
-    go(stranger);
+    expect_alive(stranger, 900);
 }
 
 TEST(one_user_leaves_places_for_others)
 {
-    struct hub_options options = usual_options();
     options.limits.clients = 8;
     options.limits.share_percent = 50;
-    start_daemon(&options);
-    struct client *clients[4];
+    start_daemon();
     for (int i = 0; i < 4; i++)
-        clients[i] = come(true);
+        come(true);
     expect_refused(knock(true), "4 of 8 places");
     struct client *other = come(false);
-    expect_served(other);
+    expect_alive(other, 900);
     go(other);
-    for (int i = 0; i < 4; i++)
-        go(clients[i]);
 }
 
 /* Those that say nothing give way to the next, whichever user they are: only a client of their own may have to
  * come again, and none of another. */
 TEST(silent_connections_keep_no_one_out)
 {
-    struct hub_options options = usual_options();
     options.limits.unauthenticated = 8;
     options.limits.unauthenticated_per_address = 64;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *silent[32];
     for (int i = 0; i < 32; i++)
         silent[i] = knock(true);
-    expect_served(client);
+    expect_alive(client, 900);
     struct client *late = knock(false);
-    expect_served(client); /* `late` is silent as well for now, and stays */
-    struct client *another = come(false);
-    greet(late);
-    expect_served(late);
+    expect_alive(client, 900); /* `late` is silent as well for now, and stays */
+    come(false);
+    greet_with(late, 0);
+    expect_alive(late, 900);
     int told = 0;
     for (int i = 0; i < 32; i++) {
         if (has_come(silent[i], 0)) {
@@ -314,36 +233,28 @@ TEST(silent_connections_keep_no_one_out)
         go(silent[i]);
     }
     assert_true(told >= 32 - 4); /* half of the limit may stay */
-    go(late);
-    go(another);
-    go(client);
 }
 
 /* Begins a transaction with one edit, for which room for 32 is taken. */
 static void begin_with_node(struct client *client, uint32_t request)
 {
     begin_edit(client, request, 1);
-    struct message message = made(MESSAGE_SET_NODE);
-    message.set_node.node = 1;
-    for (int i = 0; i < 3; i++)
-        message.set_node.parent_from_node[5 * i] = 1;
-    send_message(client, request, 0, &message);
+    send_node(client, request, 1, 0);
 }
 
 TEST(edits_of_one_user_leave_memory_for_those_of_others)
 {
-    struct hub_options options = usual_options();
     options.limits.transaction_bytes = 3 * 32 * sizeof(struct scene_edit);
     options.limits.share_percent = 70; /* two of the three */
-    start_daemon(&options);
+    start_daemon();
     struct client *one = come(true), *two = come(true), *other = come(false);
     open_scene_as(one, 1, "", PROTOCOL_SHARING_PRIVATE);
     open_scene_as(two, 1, "", PROTOCOL_SHARING_PRIVATE);
     open_scene_as(other, 1, "", PROTOCOL_SHARING_PRIVATE);
     begin_with_node(one, 1);
-    expect_served(one); /* it has been read */
+    expect_alive(one, 900); /* it has been read */
     begin_with_node(two, 2);
-    expect_served(two);
+    expect_alive(two, 900);
     begin_with_node(one, 3);
     expect_error(one, 3, PROTOCOL_ERROR_LIMIT);
     begin_with_node(other, 4);
@@ -354,19 +265,15 @@ TEST(edits_of_one_user_leave_memory_for_those_of_others)
     begin_with_node(one, 5);
     commit(one, 5);
     assert_int_equal(expect_ok(one, 5), 1);
-    go(one);
-    go(two);
-    go(other);
 }
 
 #define SLOW_BYTES 30000
 
 TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
 {
-    struct hub_options options = usual_options();
     options.connection_limits.progress_grace_ms = 200;
     options.connection_limits.progress_bytes_per_s = 300;
-    start_daemon(&options);
+    start_daemon();
     static uint8_t data[SLOW_BYTES], bytes[FRAMING_MESSAGE_MAX_BYTES];
     struct record_blob_ref reference = reference_to(data, sizeof(data));
     struct client *within = come(false), *slower = come(false);
@@ -395,18 +302,15 @@ TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
     expect_error(slower, 0, PROTOCOL_ERROR_TIMEOUT);
     assert_non_null(strstr(slower->message.error.text, "at less than 300 bytes a second"));
     expect(slower, MESSAGE_GOODBYE, 0);
-    expect_served(within);
-    go(slower);
-    go(within);
+    expect_alive(within, 900);
 }
 
 TEST(a_client_with_too_much_unread_output_is_disconnected_at_once)
 {
-    struct hub_options options = usual_options();
     options.connection_limits.queued_hard_bytes = 64 << 10;
     options.connection_limits.queued_soft_bytes = 1 << 30; /* which would have it wait to read more */
     options.connection_limits.queued_soft_ms = 600000;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *within = come(false);
     struct message message = made(MESSAGE_PING);
     for (uint32_t request = 1; request <= 500; request++)
@@ -424,18 +328,15 @@ TEST(a_client_with_too_much_unread_output_is_disconnected_at_once)
     assert_true(pings * writer.used_bytes > 64 << 10); /* and not before that */
     for (uint32_t request = 1; request <= 500; request++)
         expect(within, MESSAGE_PONG, request);
-    expect_served(within);
-    go(client);
-    go(within);
+    expect_alive(within, 900);
 }
 
 /* ---- scenes ------------------------------------------------------------------------------------------ */
 
 TEST(nodes_of_a_scene_are_limited)
 {
-    struct hub_options options = usual_options();
     options.engine_limits.scene.nodes = 3;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
     begin_edit(client, 1, 1);
@@ -450,15 +351,12 @@ TEST(nodes_of_a_scene_are_limited)
     /* Another one has as many of its own. */
     open_scene_as(other, 1, "", PROTOCOL_SHARING_PRIVATE);
     assert_int_equal(commit_node(other, 1, 1, 4), 1);
-    go(client);
-    go(other);
 }
 
 TEST(the_depth_of_a_hierarchy_is_limited)
 {
-    struct hub_options options = usual_options();
     options.engine_limits.scene.depth = options.limits.depth = 3;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     assert_int_equal(client->limits.depth_max, 3);
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
@@ -476,18 +374,15 @@ TEST(the_depth_of_a_hierarchy_is_limited)
     send_node(client, 3, 4, 2);
     commit(client, 3);
     assert_int_equal(expect_ok(client, 3), 2);
-    expect_served(other);
-    go(client);
-    go(other);
+    expect_alive(other, 900);
 }
 
 #define SPHERES 1000
 
 TEST(memory_of_a_scene_is_limited)
 {
-    struct hub_options options = usual_options();
     options.engine_limits.scene.host_bytes = 20000; /* one set of 16,000 bytes, not two */
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     static float spheres[4 * SPHERES];
     for (size_t i = 0; i < sizeof(spheres) / sizeof(spheres[0]); i++)
@@ -508,9 +403,7 @@ TEST(memory_of_a_scene_is_limited)
             assert_int_equal(expect_ok(client, 3), 1);
     }
     expect_limit(client, 4, "edits", "memory.scene");
-    expect_served(other);
-    go(client);
-    go(other);
+    expect_alive(other, 900);
 }
 
 /* An image of so many texels, which has been uploaded where it is within the limit. */
@@ -530,8 +423,7 @@ static void send_texture(struct client *client, uint32_t request, uint32_t width
 
 TEST(edges_of_images_are_limited)
 {
-    struct hub_options options = usual_options();
-    start_daemon(&options); /* 64 */
+    start_daemon(); /* 64 */
     struct client *client = come(false), *other = come(true);
     static uint8_t texels[64 * 64 * 4];
     struct record_blob_ref reference = reference_to(texels, sizeof(texels));
@@ -552,18 +444,15 @@ TEST(edges_of_images_are_limited)
     send_message(client, 6, 0, &message);
     commit(client, 6);
     expect_limit(client, 6, "set_environment", "limits.texture_edge");
-    expect_served(other);
-    go(client);
-    go(other);
+    expect_alive(other, 900);
 }
 
 /* ---- blobs ------------------------------------------------------------------------------------------- */
 
 TEST(blobs_of_a_connection_are_limited)
 {
-    struct hub_options options = usual_options();
     options.limits.blobs_per_client = 3;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     uint8_t data[4] = {0};
     for (uint8_t i = 1; i <= 3; i++) {
@@ -580,21 +469,18 @@ TEST(blobs_of_a_connection_are_limited)
     send_message(client, 8, 0, &message);
     expect_limit(client, 8, "blob_offer.blobs", "limits.blobs");
     upload(other, 1, &reference, data);
-    expect_served(client);
-    go(client);
-    go(other);
+    expect_alive(client, 900);
 }
 
 TEST(upload_credit_limits_what_is_sent_ahead)
 {
-    struct hub_options options = usual_options();
     options.limits.upload_window_bytes = 1000; /* less than one message may have */
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     static uint8_t data[2500];
     struct record_blob_ref all = reference_to(data, 1000), more = reference_to(data, 1001);
     upload(client, 1, &all, data);
-    expect_served(client);
+    expect_alive(client, 900);
     assert_int_equal(client->upload_credit, 2000);
     assert_int_equal(offer(client, 3, more), 1);
     send_blob(client, 4, &more, data);
@@ -603,20 +489,17 @@ TEST(upload_credit_limits_what_is_sent_ahead)
     assert_non_null(strstr(client->message.error.text, "credit"));
     expect(client, MESSAGE_GOODBYE, 0);
     expect_end(client);
-    expect_served(other);
-    go(client);
-    go(other);
+    expect_alive(other, 900);
 }
 
 /* ---- pictures ---------------------------------------------------------------------------------------- */
 
 TEST(pixels_and_samples_of_a_picture_are_limited)
 {
-    struct hub_options options = usual_options();
     options.limits.width_pixels = 100;
     options.limits.height_pixels = 50;
     options.limits.samples = 16;
-    start_daemon(&options);
+    start_daemon();
     static const struct {
         uint32_t width, height, samples;
         const char *field;
@@ -635,15 +518,12 @@ TEST(pixels_and_samples_of_a_picture_are_limited)
         send_message(both[i], 10, 0, &message);
         expect_picture(both[i], 10);
     }
-    go(client);
-    go(other);
 }
 
 TEST(frames_that_wait_for_a_slow_reader_are_limited)
 {
-    struct hub_options options = usual_options();
     options.limits.frame_window_bytes = 2 << 20;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(false);
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
     struct message message = render_message(512, 512, 1); /* 1 MiB, more than the socket takes */
@@ -653,7 +533,7 @@ TEST(frames_that_wait_for_a_slow_reader_are_limited)
     wait_until(&fake.frames_begun, 2 + 3); /* two here, three in the engine */
     usleep(300000);
     assert_int_equal(atomic_load(&fake.frames_begun), 2 + 3);
-    expect_served(other);
+    expect_alive(other, 900);
     for (uint32_t frame = 0; frame <= 9; frame++) {
         expect(client, MESSAGE_FRAME_BEGIN, 1);
         assert_int_equal(client->message.frame_begin.frame, frame);
@@ -663,6 +543,4 @@ TEST(frames_that_wait_for_a_slow_reader_are_limited)
         assert_int_equal(client->message.type, MESSAGE_FRAME_END);
     }
     expect_ok(client, 1);
-    go(client);
-    go(other);
 }

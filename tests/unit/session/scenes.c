@@ -10,27 +10,24 @@ static const float sphere[SPHERE_FLOATS] = {1, 2, 3, 0.5f};
 
 static int set_up(void **state)
 {
-    (void)state;
-    struct hub_options options = usual_options();
-    start_daemon(&options);
+    set_options(state);
+    start_daemon();
     return 0;
 }
 
 static int set_up_for_readers(void **state)
 {
-    (void)state;
-    struct hub_options options = usual_options();
+    set_options(state);
     options.readers = (struct readers){{(uint32_t)getuid()}, 1};
-    start_daemon(&options);
+    start_daemon();
     return 0;
 }
 
 static int set_up_with_few_blobs(void **state)
 {
-    (void)state;
-    struct hub_options options = usual_options();
+    set_options(state);
     options.limits.blob_bytes = 300000;
-    start_daemon(&options);
+    start_daemon();
     return 0;
 }
 
@@ -65,10 +62,8 @@ static void commit_sphere(struct client *client, uint32_t scene)
         send_blob(client, 2, &reference, sphere);
         expect_ok(client, 2);
     }
-    struct message message = made(MESSAGE_EDIT_BEGIN);
-    message.edit_begin.scene = scene;
-    send_message(client, 3, 0, &message);
-    message = made(MESSAGE_SET_SPHERES);
+    begin_edit(client, 3, scene);
+    struct message message = made(MESSAGE_SET_SPHERES);
     message.set_spheres.spheres = 1;
     message.set_spheres.sphere_count = 1;
     message.set_spheres.arrays = &reference;
@@ -81,14 +76,12 @@ static void commit_sphere(struct client *client, uint32_t scene)
     for (int axis = 0; axis < 3; axis++)
         message.set_node.parent_from_node[5 * axis] = 1;
     send_message(client, 3, 0, &message);
-    message = made(MESSAGE_EDIT_COMMIT);
-    send_message(client, 3, 0, &message);
+    commit(client, 3);
     assert_int_equal(expect_ok(client, 3), 1);
 }
 
 /* ---- sharing ----------------------------------------------------------------------------------------- */
 
-ALL_TESTS(block_signals, NULL)
 EACH_TEST(set_up, tear_down)
 
 TEST(an_edit_by_one_appears_to_the_other)
@@ -104,8 +97,6 @@ TEST(an_edit_by_one_appears_to_the_other)
     assert_int_equal(commit_node(other, 23, 7, 6), 3);
     expect_changed(one, 1, 3);
     assert_int_equal(render_frame(one, 24, 1), 3);
-    cut(one, NULL);
-    cut(other, NULL);
 }
 
 /* Messages of a view until a frame of that revision has come whole; it is acknowledged. */
@@ -152,8 +143,6 @@ TEST(a_view_at_rest_shows_what_another_client_changes)
     expect_view_of(other, 20, 2);
     assert_int_equal(commit_node(one, 22, 1, 6), 3);
     expect_view_of(other, 20, 3);
-    cut(one, NULL);
-    cut(other, NULL);
 }
 
 TEST(many_changes_reach_a_slow_reader_as_one)
@@ -172,8 +161,6 @@ TEST(many_changes_reach_a_slow_reader_as_one)
         told = other->message.scene_changed.revision;
     }
     assert_int_equal(told, CHANGES);
-    cut(one, NULL);
-    cut(other, NULL);
 }
 
 /* ---- reading and changing what others made ------------------------------------------------------------ */
@@ -200,8 +187,7 @@ static void submit_material(struct client *client, uint32_t request, uint64_t ba
     message.set_material.roughness = roughness;
     message.set_material.name = "steel";
     send_message(client, request, 0, &message);
-    message = made(MESSAGE_EDIT_COMMIT);
-    send_message(client, request, 0, &message);
+    commit(client, request);
 }
 
 TEST(an_object_is_read_as_it_was_set)
@@ -235,8 +221,6 @@ TEST(an_object_is_read_as_it_was_set)
     get_object(other, 9, 5, PROTOCOL_OBJECT_NODE, 1);
     expect_error(other, 9, PROTOCOL_ERROR_UNKNOWN_ID);
     assert_string_equal(other->message.error.field, "object_get.scene");
-    cut(one, NULL);
-    cut(other, NULL);
 }
 
 TEST(objects_are_listed_by_name_and_page_by_page)
@@ -252,8 +236,7 @@ TEST(objects_are_listed_by_name_and_page_by_page)
         message.set_material.name = i == 7 ? "steel" : "paint";
         send_message(one, 2, 0, &message);
     }
-    message = made(MESSAGE_EDIT_COMMIT);
-    send_message(one, 2, 0, &message);
+    commit(one, 2);
     expect_ok(one, 2);
     struct message question = made(MESSAGE_SCENE_OBJECTS);
     const struct message_scene_objects_reply *reply = &one->message.scene_objects_reply;
@@ -295,7 +278,6 @@ TEST(objects_are_listed_by_name_and_page_by_page)
     expect(one, MESSAGE_SCENE_OBJECTS_REPLY, 6);
     assert_int_equal(reply->objects_count, 0);
     assert_int_equal(reply->next, 0);
-    cut(one, NULL);
 }
 
 TEST(an_edit_of_what_has_changed_since_it_was_read_is_refused)
@@ -323,8 +305,6 @@ TEST(an_edit_of_what_has_changed_since_it_was_read_is_refused)
     get_object(one, 26, 1, PROTOCOL_OBJECT_MATERIAL, 8);
     expect(one, MESSAGE_SET_MATERIAL, 26);
     assert_true(one->message.set_material.roughness == 0.75f);
-    cut(one, NULL);
-    cut(other, NULL);
 }
 
 TEST(contents_of_a_scene_are_reported)
@@ -361,8 +341,6 @@ TEST(contents_of_a_scene_are_reported)
     assert_int_equal(one->message.scene_list_reply.scenes_count, 2);
     assert_string_equal(one->message.scene_list_reply.scenes[0].name, "mine");
     assert_int_equal(one->message.scene_list_reply.scenes[0].sharing, PROTOCOL_SHARING_KEPT);
-    cut(one, NULL);
-    cut(other, NULL);
 }
 
 TEST(scenes_that_cannot_be_attached_are_refused_by_field)
@@ -381,8 +359,6 @@ TEST(scenes_that_cannot_be_attached_are_refused_by_field)
     expect_error(one, 104, PROTOCOL_ERROR_LIMIT); /* attached ones count as well */
     /* The number of one that failed is free. */
     open_scene_as(other, 1, "", PROTOCOL_SHARING_PRIVATE);
-    cut(one, NULL);
-    cut(other, NULL);
 }
 
 /* ---- lost connections -------------------------------------------------------------------------------- */
@@ -398,8 +374,6 @@ TEST(a_cut_connection_finds_its_scene_again_without_sending_it)
     assert_int_equal(render_frame(one, 20, 9), 1);
     struct record_blob_ref reference = reference_to(sphere, sizeof(sphere));
     assert_int_equal(offer(one, 21, reference), 0); /* it is held, by the scene */
-    cut(one, NULL);
-    cut(witness, NULL);
 }
 
 TEST(a_client_that_leaves_a_shared_scene_does_not_change_it)
@@ -419,7 +393,6 @@ TEST(a_client_that_leaves_a_shared_scene_does_not_change_it)
     assert_int_equal(witness->message.stats_reply.blob_bytes, sizeof(sphere));
     assert_int_equal(witness->message.stats_reply.scenes_count, 1);
     assert_int_equal(offer(witness, 22, reference_to(sphere, sizeof(sphere))), 1);
-    cut(witness, NULL);
 }
 
 TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_down)
@@ -438,17 +411,14 @@ TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_do
     assert_int_equal(offer(one, 1, references[0]), 1);
     send_blob(one, 2, &references[0], spheres[0]);
     expect_ok(one, 2);
-    struct message message = made(MESSAGE_EDIT_BEGIN);
-    message.edit_begin.scene = 1;
-    send_message(one, 3, 0, &message);
-    message = made(MESSAGE_SET_SPHERES);
+    begin_edit(one, 3, 1);
+    struct message message = made(MESSAGE_SET_SPHERES);
     message.set_spheres.spheres = 1;
     message.set_spheres.sphere_count = 12500;
     message.set_spheres.arrays = references;
     message.set_spheres.arrays_count = 1;
     send_message(one, 3, 0, &message);
-    message = made(MESSAGE_EDIT_COMMIT);
-    send_message(one, 3, 0, &message);
+    commit(one, 3);
     expect_ok(one, 3);
     cut(one, witness);
     assert_int_equal(offer(witness, 1, references[1]), 1);
@@ -469,7 +439,6 @@ TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_do
     }
     submit_attach(witness, 1, "shared");
     expect_error(witness, 101, PROTOCOL_ERROR_UNKNOWN_ID);
-    cut(witness, NULL);
 }
 
 /* ---- what stats tell whom ---------------------------------------------------------------------------- */
@@ -507,8 +476,6 @@ TEST(what_others_keep_to_themselves_has_no_name_in_stats)
     assert_int_equal(stats->clients_count, 2);
     for (uint32_t i = 0; i < 2; i++)
         assert_int_equal(strncmp(stats->clients[i].name, "test (", 6), 0);
-    cut(other, NULL);
-    cut(owner, NULL);
 }
 
 static void start_job(struct client *client, uint32_t scene, uint32_t channel)
@@ -549,8 +516,6 @@ TEST(a_job_is_told_with_its_owner_its_frames_and_the_name_of_a_scene_that_is_no_
         named += job->scene[0] != '\0';
     }
     assert_int_equal(named, 1);
-    cut(other, NULL);
-    cut(owner, NULL);
 }
 
 TEST_WITH(a_reader_hears_of_no_other_client, set_up_for_readers, tear_down)
@@ -562,8 +527,6 @@ TEST_WITH(a_reader_hears_of_no_other_client, set_up_for_readers, tear_down)
     assert_int_equal(stats->clients_count, 1);
     assert_int_equal(stats->clients[0].client, 2);
     assert_int_equal(stats_of(owner)->clients_count, 2);
-    cut(reader, NULL);
-    cut(owner, NULL);
 }
 
 /* ---- readers ----------------------------------------------------------------------------------------- */
@@ -590,16 +553,11 @@ TEST_WITH(a_reader_looks_and_changes_nothing, set_up_for_readers, tear_down)
     send_blob(reader, 22, &reference, sphere);
     expect_error(reader, 22, PROTOCOL_ERROR_DENIED);
     /* One answer to a whole transaction, whose edits are on their way when it is refused. */
-    message = made(MESSAGE_EDIT_BEGIN);
-    message.edit_begin.scene = 1;
-    send_message(reader, 23, 0, &message);
+    begin_edit(reader, 23, 1);
     message = made(MESSAGE_SET_NODE);
     message.set_node.node = 1;
     send_message(reader, 23, 0, &message);
-    message = made(MESSAGE_EDIT_COMMIT);
-    send_message(reader, 23, 0, &message);
+    commit(reader, 23);
     expect_error(reader, 23, PROTOCOL_ERROR_DENIED);
     assert_int_equal(render_frame(reader, 24, 1), 1); /* as before */
-    cut(reader, NULL);
-    cut(writer, NULL);
 }

@@ -119,7 +119,7 @@ SESSION_TEST(the_65th_request_in_flight_is_refused_and_can_be_retried)
     begin_edit(66, 1);
     expect_error(66, PROTOCOL_ERROR_LIMIT);
     assert_int_equal(client.message.error.retryable, 1);
-    send_node(66, 1);
+    send_node(66, 1, 0);
     commit(66);
     commit(2);
     expect(MESSAGE_OK, 2);
@@ -150,14 +150,15 @@ TEST_WITH(every_message_of_a_client_has_a_row, NULL, NULL)
 
 /* ---- patience ---------------------------------------------------------------------------------------- */
 
-static void expect_closed_within_5_s(void)
+/* Sooner than anything but what the test limits would close it. */
+static void expect_closed(void)
 {
-    uint64_t before_ns = clock_now_ns();
     struct pollfd fd = {.fd = client.fd, .events = POLLIN};
     uint8_t bytes[4096];
-    while (poll(&fd, 1, 20000) == 1 && recv(client.fd, bytes, sizeof(bytes), 0) > 0)
-        continue;
-    assert_in_range((clock_now_ns() - before_ns) / 1000000, 0, 5000);
+    ssize_t got;
+    do
+        assert_int_equal(poll(&fd, 1, 20000), 1);
+    while ((got = recv(client.fd, bytes, sizeof(bytes), 0)) > 0);
 }
 
 TEST(a_client_without_a_hello_is_disconnected)
@@ -166,7 +167,7 @@ TEST(a_client_without_a_hello_is_disconnected)
     limits.handshake_ms = 50;
     start(&limits);
     send_bytes("FARL", 4);
-    expect_closed_within_5_s();
+    expect_closed();
 }
 
 TEST(a_client_with_an_unfinished_message_is_disconnected)
@@ -182,7 +183,7 @@ TEST(a_client_with_an_unfinished_message_is_disconnected)
     send_bytes(header, sizeof(header));
     expect_error(0, PROTOCOL_ERROR_TIMEOUT);
     expect(MESSAGE_GOODBYE, 0);
-    expect_closed_within_5_s();
+    expect_closed();
 }
 
 TEST(a_client_that_the_daemon_does_not_read_has_its_time_later)
@@ -234,7 +235,7 @@ TEST(a_silent_client_is_disconnected_unless_it_waits)
     expect(MESSAGE_OK, 4);
     expect_error(0, PROTOCOL_ERROR_TIMEOUT);
     expect(MESSAGE_GOODBYE, 0);
-    expect_closed_within_5_s();
+    expect_closed();
 }
 
 TEST(a_client_that_does_not_read_is_disconnected)
@@ -248,7 +249,7 @@ TEST(a_client_that_does_not_read_is_disconnected)
     struct message message = render_message(50, 51);
     send_message(2, 0, &message);
     usleep(500000);
-    expect_closed_within_5_s();
+    expect_closed();
     assert_int_equal(atomic_load(&engine.gone), 1);
 }
 
@@ -260,7 +261,7 @@ TEST(a_sealed_client_without_a_hello_is_disconnected)
     limits.handshake_ms = 200;
     start(&limits);
     seal_with(&session_key);
-    expect_closed_within_5_s();
+    expect_closed();
 }
 
 TEST(a_client_with_an_unfinished_record_is_disconnected)
@@ -273,7 +274,7 @@ TEST(a_client_with_an_unfinished_record_is_disconnected)
     greet();
     const uint8_t length_and_a_byte[5] = {200};
     send_plainly(length_and_a_byte, sizeof(length_and_a_byte));
-    expect_closed_within_5_s();
+    expect_closed();
 }
 
 TEST(a_changed_record_is_reported_and_closes_the_connection)
@@ -337,7 +338,7 @@ TEST(a_wrong_key_is_answered_after_a_while)
         assert_int_equal(poll(&fd, 1, 20000), 1);
         assert_true(receive_sealed());
     }
-    assert_in_range((clock_now_ns() - before_ns) / 1000000, 300, 5000);
+    assert_true(clock_now_ns() - before_ns >= UINT64_C(300000000));
     assert_int_equal(result, SEALED_REFUSED);
     assert_int_equal(sealed_status(client.link->sealed), SEALED_WRONG_KEY);
     assert_false(receive_sealed());

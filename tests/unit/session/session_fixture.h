@@ -4,9 +4,9 @@
 #ifndef FARLIGHT_TESTS_SESSION_FIXTURE_H
 #define FARLIGHT_TESTS_SESSION_FIXTURE_H
 
+#include "tests/unit/session/client.h"
+
 #include "base/sys.h"
-#include "protocol/sealed/link.h"
-#include "session/daemon.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -62,20 +62,6 @@ static inline int interrupted_wait(int fd, struct epoll_event *events, int max_e
 
 /* ---- the daemon on a thread, a client here ----------------------------------------------------------- */
 
-struct client {
-    int fd;
-    struct sealed_link *link; /* NULL: it is not sealed */
-    uint8_t in[2 * FRAMING_MESSAGE_MAX_BYTES];
-    size_t in_used, consumed;
-    uint8_t scratch_data[SCRATCH_BYTES];
-    struct scratch scratch;
-    struct framing_header header; /* of the last message */
-    struct message message;
-    uint64_t upload_credit;
-    unsigned blocked; /* how often it was told so, and why the last time */
-    char blocked_text[129];
-};
-
 static struct daemon served;
 static pthread_t thread;
 static struct client client;
@@ -97,212 +83,29 @@ static struct auth_keys session_keys = {
     .read_only = {false, true},
     .count = 2};
 
-/* Opens what has come; how many bytes of plain text that was. */
-static inline size_t open_records(void)
-{
-    struct decode_error error = {0};
-    size_t before = client.in_used;
-    enum sealed_result result = sealed_link_handshake(client.link, &error);
-    while (result == SEALED_CONSUMED && !sealed_has_opened_last(client.link->sealed)) {
-        size_t bytes = 0;
-        result = sealed_link_open(client.link, client.in + client.in_used, sizeof(client.in) - client.in_used,
-                                  &bytes, &error);
-        client.in_used += bytes;
-    }
-    if (result == SEALED_FATAL || result == SEALED_REFUSED)
-        fail_msg("%s: %s", error.field, error.text);
-    return client.in_used - before;
-}
-
-/* False: the daemon has closed the connection. */
-static inline bool receive_sealed(void)
-{
-    size_t free_bytes;
-    uint8_t *space = sealed_link_space(client.link, &free_bytes);
-    ssize_t got = recv(client.fd, space, free_bytes, 0);
-    sealed_link_came(client.link, got > 0 ? (size_t)got : 0);
-    return got > 0;
-}
-
-static inline void receive_some(void)
-{
-    memmove(client.in, client.in + client.consumed, client.in_used - client.consumed);
-    client.in_used -= client.consumed;
-    client.consumed = 0;
-    if (client.link && open_records())
-        return;
-    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
-    if (poll(&fd, 1, 20000) != 1)
-        fail_msg("nothing came for 20 s");
-    if (client.link) {
-        if (!receive_sealed())
-            fail_msg("the connection is closed");
-        open_records();
-        return;
-    }
-    ssize_t got = recv(client.fd, client.in + client.in_used, sizeof(client.in) - client.in_used, 0);
-    if (got <= 0)
-        fail_msg("the connection is closed");
-    client.in_used += (size_t)got;
-}
-
-static inline void send_plainly(const uint8_t *next, size_t bytes)
-{
-    while (bytes) {
-        ssize_t sent = send(client.fd, next, bytes, MSG_NOSIGNAL);
-        assert_true(sent > 0);
-        next += sent;
-        bytes -= (size_t)sent;
-    }
-}
-
-/* What waits in the link. */
-static inline void send_sealed(void)
-{
-    size_t bytes;
-    const uint8_t *waiting = sealed_link_waiting(client.link, &bytes);
-    send_plainly(waiting, bytes);
-    sealed_link_sent(client.link, bytes);
-}
-
-static inline void send_bytes(const void *data, size_t bytes)
-{
-    const uint8_t *next = data;
-    if (!client.link)
-        send_plainly(next, bytes);
-    for (size_t taken; client.link && bytes; next += taken, bytes -= taken) {
-        taken = sealed_link_seal(client.link, next, bytes);
-        send_sealed();
-    }
-}
-
-/* Until both have proved that they have the key. */
-static inline void seal_with(const struct sealed_key *key)
-{
-    client.link = sealed_link_client(key);
-    assert_non_null(client.link);
-    while (!sealed_is_open(client.link->sealed)) {
-        send_sealed();
-        receive_some();
-    }
-}
-
-static inline void send_message(uint32_t request, uint32_t channel, const struct message *message)
-{
-    static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
-    struct writer writer;
-    writer_init(&writer, bytes, sizeof(bytes));
-    if (!message_write(&writer, request, channel, message))
-        fail_msg("%s: %s", writer.error.field, writer.error.text);
-    send_bytes(bytes, writer.used_bytes);
-}
-
-/* The next message but credit and blocked, NULL: none is there; it stays until the next call. */
-static inline const struct message *receive_now(void)
-{
-    for (;;) {
-        struct frame frame;
-        struct decode_error error = {0};
-        enum framing_result result = framing_parse(&frame, client.in + client.consumed,
-                                                   client.in_used - client.consumed, MESSAGE_FROM_SERVER, &error);
-        if (result == FRAMING_NEED_MORE) {
-            struct pollfd fd = {.fd = client.fd, .events = POLLIN};
-            if (poll(&fd, 1, 0) != 1)
-                return NULL;
-            receive_some();
-            continue;
-        }
-        if (result == FRAMING_FATAL)
-            fail_msg("%s: %s", error.field, error.text);
-        client.consumed += frame.consumed_bytes;
-        client.header = frame.header;
-        scratch_init(&client.scratch, client.scratch_data, sizeof(client.scratch_data));
-        if (!message_decode(&client.message, frame.header.type, frame.payload, frame.header.payload_bytes,
-                            &client.scratch, &error))
-            fail_msg("%s: %s", error.field, error.text);
-        if (client.message.type == MESSAGE_CREDIT)
-            client.upload_credit = client.message.credit.total;
-        else if (client.message.type == MESSAGE_BLOCKED && ++client.blocked)
-            snprintf(client.blocked_text, sizeof(client.blocked_text), "%s", client.message.blocked.text);
-        else
-            return &client.message;
-    }
-}
-
-/* The same, but waits for it. */
-static inline const struct message *receive(void)
-{
-    const struct message *message;
-    while (!(message = receive_now())) {
-        struct pollfd fd = {.fd = client.fd, .events = POLLIN};
-        if (poll(&fd, 1, 20000) != 1)
-            fail_msg("nothing came for 20 s");
-    }
-    return message;
-}
-
-static inline void expect(enum message_type type, uint32_t request)
-{
-    const struct message *message = receive();
-    if (message->type != type || client.header.request != request)
-        fail_msg("%s of request %u came instead of %s of %u: %s", message_type_text(message->type),
-                 client.header.request, message_type_text(type), request,
-                 message->type == MESSAGE_ERROR ? message->error.text : "");
-}
-
-static inline void expect_error(uint32_t request, enum protocol_error_code code)
-{
-    expect(MESSAGE_ERROR, request);
-    assert_int_equal(client.message.error.code, code);
-}
-
-static inline void expect_end(void)
-{
-    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
-    assert_int_equal(client.in_used, client.consumed);
-    while (client.link && receive_sealed())
-        assert_int_equal(open_records(), 0);
-    assert_true(!client.link || sealed_has_opened_last(client.link->sealed));
-    assert_int_equal(poll(&fd, 1, 20000), 1);
-    assert_int_equal(recv(client.fd, client.in, 1, 0), 0);
-}
-
-static inline struct message made(enum message_type type)
-{
-    struct message message;
-    message_init(&message, type);
-    return message;
-}
-
-static inline void expect_alive(uint32_t request)
-{
-    struct message message = made(MESSAGE_PING);
-    message.ping.sent_ns = 1234567;
-    send_message(request, 0, &message);
-    expect(MESSAGE_PONG, request);
-    assert_int_equal(client.message.pong.sent_ns, 1234567);
-}
-
-/* The capabilities that both have. */
-static inline uint64_t greet_with(uint64_t capabilities)
-{
-    struct handshake_hello hello = {
-        .version_min = 1, .version_max = 1, .capabilities = capabilities, .name = "test"};
-    uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
-    send_bytes(bytes, handshake_hello_encode(bytes, &hello));
-    struct handshake_reply reply;
-    struct decode_error error = {0};
-    while (handshake_reply_parse(&reply, client.in, client.in_used, &client.consumed, &error) ==
-           HANDSHAKE_NEED_MORE)
-        receive_some();
-    assert_int_equal(reply.version, 1);
-    assert_int_equal(reply.limits.requests_in_flight, 64);
-    return reply.capabilities;
-}
+/* All of these are said to the one client. */
+#define send_bytes(...) send_bytes(&client, __VA_ARGS__)
+#define send_plainly(...) send_plainly(&client, __VA_ARGS__)
+#define send_sealed() send_sealed(&client)
+#define send_message(...) send_message(&client, __VA_ARGS__)
+#define receive_sealed() receive_sealed(&client)
+#define receive_now() receive_now(&client)
+#define receive() receive(&client)
+#define expect(...) expect(&client, __VA_ARGS__)
+#define expect_error(...) expect_error(&client, __VA_ARGS__)
+#define expect_end() expect_end(&client)
+#define expect_alive(...) expect_alive(&client, __VA_ARGS__)
+#define seal_with(...) seal_with(&client, __VA_ARGS__)
+#define greet_with(...) greet_with(&client, __VA_ARGS__)
+#define begin_edit(...) begin_edit(&client, __VA_ARGS__)
+#define send_node(...) send_node(&client, __VA_ARGS__)
+#define commit(...) commit(&client, __VA_ARGS__)
+#define offer(...) offer(&client, __VA_ARGS__)
 
 static inline void greet(void)
 {
     assert_true(greet_with(HANDSHAKE_CAN_ABANDON) & HANDSHAKE_CAN_ABANDON);
+    assert_int_equal(client.limits.requests_in_flight, 64);
 }
 
 static inline void start(const struct connection_limits *connection_limits)
@@ -345,11 +148,11 @@ static inline void start(const struct connection_limits *connection_limits)
 }
 
 static const struct connection_limits patient = {
-    .handshake_ms = 10000,
-    .progress_grace_ms = 10000,
+    .handshake_ms = 600000,
+    .progress_grace_ms = 600000,
     .progress_bytes_per_s = 1,
-    .idle_ms = 60000,
-    .queued_soft_ms = 10000,
+    .idle_ms = 600000,
+    .queued_soft_ms = 600000,
     .queued_soft_bytes = 16 << 20,
     .queued_hard_bytes = 64 << 20,
 };
