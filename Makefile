@@ -104,14 +104,6 @@ VIDEO_C := $(filter-out $(PALETTE_C),$(call sources,client/video,c))
 VIEWER_C := $(call sources,client/viewer,c)
 WEB_C := $(call sources,client/web,c)
 SHADERS := $(patsubst shaders/%,%,$(call sources,shaders,h glsl comp vert geom frag))
-# make EXTRA_TRACER=FOLDER B=build/OTHER builds the product with one more tracer: its rows are FOLDER/tracers.def, its C
-# FOLDER/*.c, its shaders FOLDER/shaders/, and its row of the contract suite FOLDER/row.c.
-ifdef EXTRA_TRACER
-CPPFLAGS_ALL += -DFARLIGHT_EXTRA_TRACER='"$(EXTRA_TRACER)/tracers.def"'
-SERVER_SRC += $(filter-out %/row.c,$(wildcard $(EXTRA_TRACER)/*.c))
-EXTRA_SHADERS := $(patsubst $(EXTRA_TRACER)/shaders/%,%,$(call sources,$(EXTRA_TRACER)/shaders,h glsl comp vert geom frag))
-EXTRA_EMBEDDED := -- $(CURDIR)/$(EXTRA_TRACER)/shaders $(EXTRA_SHADERS)
-endif
 
 # V=1 shows the commands.
 ifeq ($(V),)
@@ -208,7 +200,7 @@ $(B)/libfarlight.a: $(SHARED_OBJ) client/lib/libfarlight.map
 
 $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
 	@mkdir -p $(@D)
-	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) $(EXTRA_EMBEDDED) >$@.new && mv $@.new $@
+	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) >$@.new && mv $@.new $@
 $(B)/shader_sources.o: $(B)/shader_sources.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
@@ -282,7 +274,7 @@ $(B)/tests/unit/fault_tests: $(call obj,$(FAULT_TEST_SRC))
 $(B)/tests/unit/corpus_tests: $(call obj,$(CORPUS_TEST_SRC))
 # What every tracer promises: one program of a folder, with the rows of all tracers.
 CONTRACT := $(B)/tests/tracers/test_contract
-CONTRACT_OBJ := $(call obj,$(filter-out tests/tracers/test_%,$(wildcard tests/tracers/*.c $(EXTRA_TRACER:%=%/row.c))))
+CONTRACT_OBJ := $(call obj,$(filter-out tests/tracers/test_%,$(wildcard tests/tracers/*.c)))
 $(CONTRACT): %: %.o $(CONTRACT_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 MODEL_OBJ := $(B)/tests/fixtures/load_model.o

@@ -3,7 +3,7 @@
 """Writes farlight/messages.py from the tables of protocol/, or says whether it is current.
 
 Usage: generate.py [--check]. The C preprocessor reads the tables, as it does for the C side. A record or a message
-becomes a dataclass with the defaults of the table, an enumeration an IntEnum. EXTRA_TRACER has no part in it.
+becomes a dataclass with the defaults of the table, an enumeration an IntEnum.
 """
 import ast
 import keyword

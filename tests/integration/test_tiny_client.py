@@ -379,6 +379,7 @@ class Session(Case):
             self.assertLessEqual(error, error if before is None else before)
             before = error
         self.assertEqual(before, 0)
+
     def test_what_sticks_is_what_the_document_says(self):
         """The triangle as a mirror, and as what scatters all light. Blocks at its edges, or a pixel off, are left out."""
         for metallic, roughness, inside in ((1, 0, 7), (1, 1, 0), (0, 1, 0)):

@@ -5,7 +5,6 @@ import array
 import itertools
 import os
 import pathlib
-import random
 import selectors
 import socket
 import struct
@@ -352,21 +351,14 @@ def uncommitted(address):
 
 
 def noise(address):
-    """Connections that each leave a line in the log: what no hello is, wrong messages."""
-    chance, family = random.Random(1), socket.AF_UNIX if isinstance(address, str) else socket.AF_INET
+    """Connections that each leave a line in the log: what is no transaction is committed."""
     begun()
     while True:
         try:
-            if chance.random() < 0.5:
-                with socket.socket(family) as one:
-                    one.connect(address)
-                    one.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
-                    one.recv(4096)
-            else:
-                client = Client(address)
-                client.socket.sendall(struct.pack("<I2H2I", 8, 0x0fff, 0, 1, 0) + bytes(8))
-                client.socket.recv(4096)
-                client.socket.close()
+            client = Client(address)
+            client.send(tiny_client.EDIT_COMMIT, 1, 0, tiny_client.payload())
+            client.socket.recv(4096)
+            client.socket.close()
         except (OSError, EOFError, tiny_client.Failed):
             pass
 

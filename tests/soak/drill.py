@@ -7,6 +7,7 @@ Exit status: 0 it held, 1 it did not, 2 wrong usage."""
 import argparse
 import collections
 import contextlib
+import itertools
 import os
 import pathlib
 import random
@@ -23,15 +24,28 @@ sys.path.insert(0, str(HERE.parent / "integration"))
 import farlight_test  # pylint: disable=wrong-import-position
 
 ROUNDS = 1000
-TIMEOUT_S = 120  # of one client
+TIMEOUT_S = 120  # of one client, and of what a killed one's helpers still do
 FRAMES = 8
 TRY_AGAIN = 75
 REQUEUED_MAX = 10
+TRIES_MAX = 20
+ENDINGS = ("png", "exr")
 # The first as when a client comes to a daemon of its own; the others, to one that a service manager starts again, with a
 # socket of its own or with the manager's, on which connections wait meanwhile.
 KINDS = ("private", "listening", "activated")
 SIGNALS = {"daemon": (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM),
            "client": (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)}
+
+# A kill: of the daemon or the client, with which signal; when: "loading" before the first picture, "rendering" after it, or
+# as a share of what an undisturbed run takes; patient: the client waits for a daemon that is away.
+Kill = collections.namedtuple("Kill", "kind victim ending signal when patient")
+# Every victim at either moment, and every kind.
+FEW = (Kill("private", "daemon", "png", signal.SIGKILL, "loading", True),
+       Kill("listening", "daemon", "exr", signal.SIGKILL, "rendering", True),
+       Kill("activated", "daemon", "png", signal.SIGTERM, "rendering", True),
+       Kill("private", "client", "exr", signal.SIGKILL, "loading", True),
+       Kill("listening", "client", "png", signal.SIGKILL, "rendering", False),
+       Kill("activated", "client", "exr", signal.SIGINT, "rendering", True))
 MARK = "FARLIGHT_DRILL"  # in the environment of all that a drill starts
 SCENE = """v
 from 0 0 5
@@ -112,20 +126,15 @@ def marked(folder):
 
 
 class Drill:
-    def __init__(self, folder, seed):
-        self.folder, self.seed = pathlib.Path(folder), seed
+    def __init__(self, folder):
+        self.folder = pathlib.Path(folder)
         self.scene = self.folder / "scene.nff"
         self.scene.write_text(SCENE)
         self.environment = {**farlight_test.private_daemon(), MARK: str(self.folder),
                             "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(self.folder / "cache"))}
         self.counts = collections.Counter()
-        self.services, self.whole, self.whole_s = {}, {}, {}
-        for kind in KINDS:
-            if kind != "private":
-                self.services[kind] = Service(self.folder, kind, self.environment)
-            for ending in ("png", "exr"):
-                # The first time fills caches.
-                self.whole_s[kind, ending] = min(self.make_whole(kind, ending) for _ in range(3))
+        self.whole, self.whole_s = {}, {}
+        self.services = {kind: Service(self.folder, kind, self.environment) for kind in KINDS if kind != "private"}
 
     def make_whole(self, kind, ending):
         """What an undisturbed run makes, which is the same of every daemon, and how long it takes."""
@@ -137,6 +146,12 @@ class Drill:
             raise Wrong(f"undisturbed runs make {sorted(made)} and {sorted(self.whole[ending])}, or other bytes")
         shutil.rmtree(out)
         return needed_s
+
+    def measure(self):
+        for kind in KINDS:
+            for ending in ENDINGS:
+                # The first time fills caches.
+                self.whole_s[kind, ending] = min(self.make_whole(kind, ending) for _ in range(3))
 
     @staticmethod
     def files(out):
@@ -177,45 +192,52 @@ class Drill:
             time.sleep(0.002)
         return False
 
-    def disturb(self, client, out, delay_s, kind, victim, number):
-        """Returns the statuses with which the client may end."""
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            client.wait(delay_s)
-        if client.poll() is not None or (victim == "daemon" and not self.kill_daemon(kind, client, number)):
-            self.counts["too late"] += 1
-            return (0,)
-        self.counts[f"{victim} killed while {'rendering' if any(out.iterdir()) else 'loading'}"] += 1
-        if victim == "daemon":
-            return (0,)
-        client.send_signal(number)
-        # It may have been about to end, or have been too young to know the signal.
-        return (0, -number) if number == signal.SIGKILL else (0, -number, 128 + number)
+    def wait_until(self, kill, client, out):
+        """Up to the moment of the kill, or until the client has ended."""
+        if kill.when == "rendering":
+            while client.poll() is None and not any(out.iterdir()):
+                time.sleep(0.002)
+        elif kill.when != "loading":
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                client.wait(kill.when * self.whole_s[kill.kind, kill.ending])
 
-    def round(self, number):
-        chance = random.Random(f"{self.seed}/{number}")
-        kind, victim, ending = chance.choice(KINDS), chance.choice(("daemon", "client")), chance.choice(("png", "exr"))
-        sent, delay_s = chance.choice(SIGNALS[victim]), 0.95 * chance.random() ** 1.5 * self.whole_s[kind, ending]
-        patient = chance.random() < 0.75
-        out = self.folder / f"round-{number}"
-        server = self.server(kind)
-        if not patient:
+    def disturb(self, kill, client, out):
+        """Returns the statuses with which the client may end; none: it had ended before."""
+        self.wait_until(kill, client, out)
+        moment = "rendering" if any(out.iterdir()) else "loading"
+        if client.poll() is not None or (kill.victim == "daemon" and not self.kill_daemon(kill.kind, client, kill.signal)):
+            return ()
+        self.counts[f"{kill.victim} killed while {moment}"] += 1
+        if kill.victim == "daemon":
+            return (0,)
+        client.send_signal(kill.signal)
+        # It may have been about to end, or have been too young to know the signal.
+        return (0, -kill.signal) if kill.signal == signal.SIGKILL else (0, -kill.signal, 128 + kill.signal)
+
+    def round(self, kill):
+        """False: it came too late."""
+        out = self.folder / "round"
+        server = self.server(kill.kind)
+        if not kill.patient:
             server += ["--retry-for", "0"]
-        elif kind == "listening":
+        elif kill.kind == "listening":
             server += ["--retry-for", "1m"]  # else a daemon that is not yet there again would end it
-        client = self.start(out, ending, server)
-        allowed = self.disturb(client, out, delay_s, kind, victim, sent)
-        status = self.finish(client, *allowed, *(() if patient else (TRY_AGAIN,)))
+        client = self.start(out, kill.ending, server)
+        allowed = self.disturb(kill, client, out)
+        impatient = () if kill.patient else (TRY_AGAIN,)
+        status = self.finish(client, *(allowed or (0,)), *impatient)
         for _ in range(REQUEUED_MAX):
             if status == 0:
                 break
             self.counts[f"requeued after {status if status >= 0 else signal.Signals(-status).name}"] += 1
-            status = self.finish(self.start(out, ending, [*server, "--resume"]), 0, *(() if patient else (TRY_AGAIN,)))
+            status = self.finish(self.start(out, kill.ending, [*server, "--resume"]), 0, *impatient)
             if status == TRY_AGAIN:
                 time.sleep(0.2)
-        self.check(out, ending)
+        self.check(out, kill.ending)
+        return bool(allowed)
 
     def check(self, out, ending):
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + TIMEOUT_S
         while sorted(path.name for path in out.iterdir()) != sorted(self.whole[ending]):
             if time.monotonic() > deadline:  # until then a killed client's helpers finish their files
                 raise Wrong(f"there are {sorted(path.name for path in out.iterdir())}")
@@ -232,7 +254,7 @@ class Drill:
         """Ends the daemons. Everything else must have ended by itself."""
         for service in self.services.values():
             service.close()
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + TIMEOUT_S
         while (left := marked(self.folder)) and time.monotonic() < deadline:
             time.sleep(0.05)
         if left:
@@ -240,17 +262,48 @@ class Drill:
             raise Wrong(f"processes are left over: {names}")
 
 
-def drill(folder, rounds, seed, first=1):
-    """Counts of what was done. Wrong: what failed, with how to do it again."""
-    done = Drill(folder, seed)
+def by_chance(seed, number):
+    """The kill of a round, and of each further try of it, sooner than the one before, where that comes too late."""
+    for tries in itertools.count():
+        chance = random.Random(f"{seed}/{number}/{tries}")
+        victim = chance.choice(tuple(SIGNALS))
+        yield Kill(chance.choice(KINDS), victim, chance.choice(ENDINGS), chance.choice(SIGNALS[victim]),
+                   0.95 * chance.random() ** 1.5 / (1 + tries), chance.random() < 0.75)
+
+
+@contextlib.contextmanager
+def drilling(folder):
+    done = Drill(folder)
     try:
-        for number in range(first, first + rounds):
-            try:
-                done.round(number)
-            except Wrong as wrong:
-                raise Wrong(f"round {number} of seed {seed}: {wrong}") from wrong
+        yield done
     finally:
         done.close()
+
+
+def drill_few(folder):
+    """FEW; counts of what was done."""
+    with drilling(folder) as done:
+        for ending in ENDINGS:
+            done.make_whole("private", ending)
+        for kill in FEW:
+            try:
+                # A busy machine may look for the first picture when the last one is there.
+                if not any(done.round(kill) for _ in range(TRIES_MAX)):
+                    raise Wrong(f"{TRIES_MAX} times too late")
+            except Wrong as wrong:
+                raise Wrong(f"{kill}: {wrong}") from wrong
+    return done.counts
+
+
+def drill(folder, rounds, seed, first=1):
+    """Counts of what was done. Wrong: what failed, with how to do it again."""
+    with drilling(folder) as done:
+        done.measure()
+        for number in range(first, first + rounds):
+            try:
+                next(kill for kill in by_chance(seed, number) if done.round(kill))
+            except Wrong as wrong:
+                raise Wrong(f"round {number} of seed {seed}: {wrong}") from wrong
     return done.counts
 
 

@@ -26,7 +26,7 @@ static void *work_and_wait(void *unused)
 static bool sleeps_soon(const int *threads, size_t count)
 {
     const struct timespec step = {.tv_nsec = 1000000};
-    for (int i = 0; i < 10000; i++) {
+    for (int i = 0; i < 60000; i++) {
         if (host_threads_sleep(threads, count))
             return true;
         (void)nanosleep(&step, NULL);

@@ -62,7 +62,7 @@ TEST(a_pop_from_an_empty_queue_waits_until_its_timeout)
     uint64_t before_ns = clock_now_ns();
     assert_null(queue_pop(queue, 30000000));
     uint64_t waited_ns = clock_now_ns() - before_ns;
-    assert_in_range(waited_ns, 30000000, 10000000000);
+    assert_true(waited_ns >= 30000000);
     queue_destroy(queue, NULL);
 }
 
