@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Denoised pictures: nearer to the truth than noisy ones, the same where there is no noise, and as samples are
- * added the same in the end. That no scene is worse for it: tests/integration/test_denoise.py. */
+ * added the same in the end. That no scene is worse for it: tests/integration/test_pictures.py. */
 #include "tests/accuracy/path_fixture.h"
 #include "tests/harness/test.h"
 

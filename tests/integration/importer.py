@@ -440,3 +440,17 @@ class Written(Case):
         if status == 0:
             self.assertEqual(inconsistencies(result), [])
         return result
+
+    def assert_has(self, got, wanted, where=""):
+        """Dictionaries have at least the members that are wanted; numbers are equal to five places; all else is the same."""
+        if isinstance(wanted, dict):
+            for key, value in wanted.items():
+                self.assert_has(got[key], value, f"{where}.{key}")
+        elif isinstance(wanted, (list, tuple)):
+            self.assertEqual(len(got), len(wanted), f"{where}: {got}")
+            for i, value in enumerate(wanted):
+                self.assert_has(got[i], value, f"{where}[{i}]")
+        elif isinstance(wanted, float):
+            self.assertAlmostEqual(got, wanted, 5, where)
+        else:
+            self.assertEqual(got, wanted, where)

@@ -20,9 +20,9 @@ import threading
 import time
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, OneDaemon, SHARED_SCENES, bundled_scenes, farlight, needs_shared_scenes
+from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight
 
-SIZE = ["--size", "96x64"]
+SIZE = ["--size", "48x32"]
 
 
 def digest(path):
@@ -169,13 +169,14 @@ class Parts(OneDaemon, Animations):
         self.assertIn("part 9 has none", result.stderr)
 
     def test_resuming_makes_what_is_missing_and_leaves_the_rest_alone(self):
+        """Also of a part. With all frames present no daemon is asked."""
         whole, _ = self.animate("whole", self.model, *self.RANGE)
         folder = self.folder / "whole"
         (folder / "0010.exr").unlink()
         (folder / "0013.exr").unlink()
         data = (folder / "0019.exr").read_bytes()
         (folder / "0019.exr").write_bytes(data[:-1])  # as a full disk leaves copies
-        self.expect(farlight("animate", self.model, "--frames", "31", "--size", "48x32", "-o", folder / "%04d.exr"), 0)
+        self.expect(farlight("animate", self.model, "--frames", "31", "--size", "40x32", "-o", folder / "%04d.exr"), 0)
         kept = {frame: (folder / f"{frame:04d}.exr").stat() for frame in (16, 22, 25, 28)}
         again, result = self.animate("whole", self.model, *self.RANGE, "--resume")
         self.assertEqual(again, whole)
@@ -183,6 +184,12 @@ class Parts(OneDaemon, Animations):
         for frame, before in kept.items():
             after = (folder / f"{frame:04d}.exr").stat()
             self.assertEqual((after.st_ino, after.st_mtime_ns), (before.st_ino, before.st_mtime_ns))
+        again, _ = self.animate("whole", self.model, *self.RANGE, "--resume", "--server", "unix:/nonexistent")
+        self.assertEqual(again, whole, "with all frames present no daemon is asked")
+        for frame in (10, 22):
+            (folder / f"{frame:04d}.exr").unlink()
+        again, _ = self.animate("whole", self.model, *self.RANGE, "--resume", "--shard", "2/3")
+        self.assertEqual(again, {frame: of for frame, of in whole.items() if frame != 10}, "only what the part has is made")
 
     def test_files_of_all_formats_are_known(self):
         """That of a frame alone lets no daemon be asked for it."""
@@ -192,23 +199,17 @@ class Parts(OneDaemon, Animations):
                 self.expect(farlight(*arguments), 0)
                 self.expect(farlight(*arguments, "--resume", "--server", "unix:/nonexistent"), 0)
 
-    def test_with_all_frames_present_no_daemon_is_asked(self):
-        whole, _ = self.animate("whole", self.model, *self.RANGE)
-        again, _ = self.animate("whole", self.model, *self.RANGE, "--resume", "--server", "unix:/nonexistent")
-        self.assertEqual(again, whole)
-
-    def test_a_part_can_be_resumed(self):
-        whole, _ = self.animate("whole", self.model, *self.RANGE)
-        self.animate("part", self.model, *self.RANGE, "--shard", "2/3")
-        (self.folder / "part" / "0022.exr").unlink()
-        got, _ = self.animate("part", self.model, *self.RANGE, "--shard", "2/3", "--resume")
-        self.assertEqual(got, {frame: whole[frame] for frame in (13, 22, 31)})
-
 
 class Lost(Animations):
     """The daemon goes away in the middle."""
 
     FRAMES = ["--frames", "1-24", "--samples", "2"]
+    reference = {}  # digests of the frames, made once
+
+    def whole(self):
+        if not self.reference:
+            self.reference.update(self.animate("whole", self.model, *self.FRAMES)[0])
+        return self.reference
 
     def start(self, folder, *arguments):
         path = self.folder / folder
@@ -232,7 +233,6 @@ class Lost(Animations):
         return errors
 
     def test_a_killed_private_daemon_is_started_again_and_nothing_is_lost(self):
-        whole, _ = self.animate("whole", self.model, *self.FRAMES)
         child = self.start("killed")
         for count in (3, 9):
             self.wait_for_files("killed", count, child)
@@ -241,67 +241,42 @@ class Lost(Animations):
                 self.assertIsNone(child.poll())
                 time.sleep(0.005)
         errors = self.finish(child, 0)
-        self.assertEqual(self.digests("killed"), whole)
+        self.assertEqual(self.digests("killed"), self.whole())
         self.assertEqual(errors.count("trying again"), 2, errors)
         self.assertEqual([p.name for p in (self.folder / "killed").iterdir() if p.suffix != ".exr"], [])
 
-    def test_a_killed_daemon_is_sought_again_until_it_is_back(self):
-        whole, _ = self.animate("whole", self.model, *self.FRAMES)
-        daemon = Daemon()
-        with daemon:
-            child = self.start("killed", "--server", daemon.address)
-            self.wait_for_files("killed", 4, child)
-            address = daemon.address
-            daemon.process.kill()
-            daemon.process.wait()
-            made = len(self.digests("killed"))
-            self.assertLess(made, 24)
-            os.unlink(daemon.path)
-            time.sleep(0.7)  # so that the first attempt finds nobody
-            with Daemon(listen=address):
-                errors = self.finish(child, 0)
-        self.assertEqual(self.digests("killed"), whole)
-        self.assertIn("trying again", errors)
+    def test_a_daemon_that_is_killed_or_shuts_down_is_sought_again_until_it_is_back(self):
+        for how in (signal.SIGKILL, signal.SIGTERM):
+            with self.subTest(how=how), Daemon() as daemon:
+                folder = how.name
+                child = self.start(folder, "--server", daemon.address)
+                self.wait_for_files(folder, 4, child)
+                daemon.stop(how)
+                if how == signal.SIGKILL:
+                    os.unlink(daemon.path)
+                    time.sleep(0.7)  # so that the first attempt finds nobody
+                with Daemon(listen=daemon.address):
+                    errors = self.finish(child, 0)
+                self.assertEqual(self.digests(folder), self.whole())
+                self.assertIn("trying again", errors)
 
-    def test_a_daemon_that_shuts_down_is_sought_again(self):
-        whole, _ = self.animate("whole", self.model, *self.FRAMES)
-        with Daemon() as daemon:
-            child = self.start("left", "--server", daemon.address)
-            self.wait_for_files("left", 2, child)
-            daemon.stop()
-            with Daemon(listen=daemon.address):
-                self.finish(child, 0)
-        self.assertEqual(self.digests("left"), whole)
-
-    def test_without_retries_it_fails_with_complete_files_only(self):
-        with Daemon() as daemon:
-            child = self.start("failed", "--server", daemon.address, "--retry-for", "0")
-            self.wait_for_files("failed", 2, child)
-            daemon.process.kill()
-            errors = self.finish(child, 75)
-        self.assertNotIn("trying again", errors)
-        whole, _ = self.animate("whole", self.model, *self.FRAMES)
-        made = self.digests("failed")
-        self.assertLess(len(made), 24)
-        self.assertEqual(made, {frame: whole[frame] for frame in made})
-
-    def test_attempts_end(self):
-        with Daemon() as daemon:
-            child = self.start("failed", "--server", daemon.address, "--retries", "2")
-            self.wait_for_files("failed", 2, child)
-            daemon.process.kill()
-            errors = self.finish(child, 75)
-        self.assertEqual(errors.count("trying again"), 2, errors)
-
-    def test_attempts_end_after_the_time_that_was_given(self):
-        with Daemon() as daemon:
-            child = self.start("failed", "--server", daemon.address, "--retry-for", "1.5s")
-            self.wait_for_files("failed", 2, child)
-            daemon.process.kill()
-            begin = time.monotonic()
-            errors = self.finish(child, 75)
-            self.assertGreater(time.monotonic() - begin, 1.4)
-        self.assertIn("given up after", errors)
+    def test_attempts_end_after_the_number_or_the_time_that_was_given(self):
+        """With complete files only."""
+        for name, options, tries in (("none", ["--retry-for", "0"], 0), ("two", ["--retries", "2"], 2), ("time", ["--retry-for", "1.5s"], None)):
+            with self.subTest(options=options), Daemon() as daemon:
+                child = self.start(name, "--server", daemon.address, *options)
+                self.wait_for_files(name, 2, child)
+                daemon.process.kill()
+                begin = time.monotonic()
+                errors = self.finish(child, 75)
+                if tries is None:
+                    self.assertGreater(time.monotonic() - begin, 1.4)
+                    self.assertIn("given up after", errors)
+                else:
+                    self.assertEqual(errors.count("trying again"), tries, errors)
+                made = self.digests(name)
+                self.assertLess(len(made), 24)
+                self.assertEqual(made, {frame: self.whole()[frame] for frame in made})
 
     def test_a_daemon_that_never_was_is_not_waited_for(self):
         begin = time.monotonic()
@@ -322,24 +297,20 @@ class Lost(Animations):
             self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
 
     def test_a_private_daemon_that_is_killed_while_the_scene_is_loading_is_started_again(self):
-        for command, name in (("animate", "%d.exr"), ("render", "1.exr")):
-            with self.subTest(command=command):
-                (self.folder / command).mkdir()
-                frames = ["--frames", "1-2"] if command == "animate" else []
-                child = subprocess.Popen([BIN / "farlight", command, self.model, *frames, *SIZE, "-o",
-                                          self.folder / command / name], stderr=subprocess.PIPE, text=True)
-                self.addCleanup(child.stderr.close)
-                while not (daemons := children(child.pid, "farlightd")):
-                    self.assertIsNone(child.poll())
-                os.kill(daemons[0], signal.SIGKILL)
-                errors = child.stderr.read()
-                self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
-                self.assertEqual(errors.count("trying again"), 1, errors)
+        child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-2", *SIZE, "-o", self.folder / "%d.exr"],
+                                 stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.stderr.close)
+        while not (daemons := children(child.pid, "farlightd")):
+            self.assertIsNone(child.poll())
+        os.kill(daemons[0], signal.SIGKILL)
+        errors = child.stderr.read()
+        self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
+        self.assertEqual(errors.count("trying again"), 1, errors)
 
     def test_a_daemon_that_is_lost_while_the_scene_is_loading_is_sought_again(self):
         """It hangs up at each step of the beginning: before the handshake, after the scene was opened, and so on."""
         with Daemon() as daemon:
-            for cut in (0, 1, 100, 1000, 3000):
+            for cut in (0, 100, 3000):
                 with self.subTest(cut=cut), Cut(daemon.path, cut) as proxy:
                     result = self.expect(farlight("render", self.model, *SIZE, "-o", self.folder / "one.exr", "--server",
                                                   proxy.address), 0)
@@ -352,14 +323,11 @@ class Lost(Animations):
                     self.expect(farlight(*command, "--server", proxy.address), 75)
 
     def test_what_would_fail_again_ends_with_1_and_is_not_tried_again(self):
-        result = self.expect(farlight("render", self.model, *SIZE, "-o", self.folder / "one.exr", "--retry-for", "1m",
-                                      "--server", f"unix:{self.model}/socket"), 1)
-        self.assertNotIn("trying again", result.stderr)
-
-    def test_a_private_daemon_that_cannot_start_is_not_tried_again(self):
-        result = self.expect(farlight("render", self.model, *SIZE, "-o", self.folder / "one.exr",
-                                      env=farlight_test.private_daemon(FARLIGHT_LIMITS_SAMPLES="none")), 1)
-        self.assertNotIn("trying again", result.stderr)
+        """As there is no socket within a file, or the private daemon cannot start."""
+        for more, environment in ((["--retry-for", "1m", "--server", f"unix:{self.model}/socket"], None),
+                                  ([], farlight_test.private_daemon(FARLIGHT_LIMITS_SAMPLES="none"))):
+            result = self.expect(farlight("render", self.model, *SIZE, "-o", self.folder / "one.exr", *more, env=environment), 1)
+            self.assertNotIn("trying again", result.stderr)
 
     def test_an_interrupt_while_waiting_ends_it(self):
         with Daemon() as daemon:
@@ -397,12 +365,12 @@ class Lost(Animations):
 class Videos(OneDaemon, Animations):
     def test_one_script_writes_a_video_and_images(self):
         (self.folder / "f").mkdir()
-        script = self.write({"model": str(self.model), "frames": "1-5", "size": [96, 64], "camera": {"orbit": True},
+        script = self.write({"model": str(self.model), "frames": "1-5", "size": [48, 32], "camera": {"orbit": True},
                              "outputs": ["f/%d.png", "movie.mp4", "raw.y4m"]})
         self.expect(farlight("animate", "--script", script), 0)
         self.assertEqual(self.leftovers(), [*(f"f/{n}.png" for n in range(1, 6)), "movie.mp4", "raw.y4m", "shot.json"])
         raw = (self.folder / "raw.y4m").read_bytes()
-        self.assertTrue(raw.startswith(b"YUV4MPEG2 W96 H64 F24:1"), raw[:60])
+        self.assertTrue(raw.startswith(b"YUV4MPEG2 W48 H32 F24:1"), raw[:60])
         self.assertEqual(raw.count(b"FRAME\n"), 5)
         got = subprocess.run(["ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames",
                               "-of", "csv=p=0", self.folder / "movie.mp4"], check=True, stdout=subprocess.PIPE, text=True)
@@ -412,9 +380,9 @@ class Videos(OneDaemon, Animations):
         result = farlight("animate", self.model, "--frames", "1-3", "--fps", "25", *SIZE, "-o", "-", "--timings",
                           text=False)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertTrue(result.stdout.startswith(b"YUV4MPEG2 W96 H64 F25:1"), result.stdout[:60])
+        self.assertTrue(result.stdout.startswith(b"YUV4MPEG2 W48 H32 F25:1"), result.stdout[:60])
         header = result.stdout.index(b"\n") + 1
-        self.assertEqual(len(result.stdout) - header, 3 * (len(b"FRAME\n") + 96 * 64 * 3 // 2))
+        self.assertEqual(len(result.stdout) - header, 3 * (len(b"FRAME\n") + 48 * 32 * 3 // 2))
 
     def test_a_terminal_gets_no_video(self):
         ours, theirs = pty.openpty()
@@ -472,7 +440,7 @@ class MovingPictures(OneDaemon, Animations):
 
     def pictures(self, **more):
         """Renders into PNG files and what else is wanted; returns what it said, and their pixels, RGBA."""
-        script = self.write({"model": str(self.model), "frames": f"1-{self.COUNT}", "size": [96, 64], "samples": 1,
+        script = self.write({"model": str(self.model), "frames": f"1-{self.COUNT}", "size": [48, 32], "samples": 1,
                              "camera": {"orbit": True}, "outputs": ["%d.png", "around.gif"], **more})
         result = self.expect(farlight("animate", "--script", script), 0)
         return result, [self.decode(self.folder / f"{n}.png") for n in range(1, self.COUNT + 1)]
@@ -528,8 +496,8 @@ class MovingPictures(OneDaemon, Animations):
         for number, (frame, wanted) in enumerate(zip(frames, pictures)):
             milliseconds, disposed = self.show(canvas, frame)
             times.append(milliseconds)
-            for at in range(96 * 64):
-                got, right = canvas.get((at // 96, at % 96), clear), wanted[4 * at:4 * at + 4]
+            for at in range(48 * 32):
+                got, right = canvas.get((at // 48, at % 48), clear), wanted[4 * at:4 * at + 4]
                 if got != right and (got[3] or right[3]):
                     self.fail(f"frame {number}, pixel {at}: {got} in place of {right}")
             for place in disposed or ():
@@ -537,14 +505,12 @@ class MovingPictures(OneDaemon, Animations):
         self.assertIn(sum(times), range(1000 * self.COUNT // 24 - 1, 1000 * self.COUNT // 24 + 2), times)
 
     def test_standard_output_gets_the_same_file(self):
-        for ending in ("gif", "webp"):
-            command = ("animate", self.model, "--frames", "1-3", "--fps", "25", *SIZE, "--samples", "1")
-            result = farlight(*command, "-o", "-", "--format", ending, text=False)
-            self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertNotIn(b"note", result.stderr)  # 25 per second are 4 hundredths
-            path = self.folder / f"around.{ending}"
-            self.expect(farlight(*command, "-o", path), 0)
-            self.assertEqual(result.stdout, path.read_bytes())
+        command = ("animate", self.model, "--frames", "1-3", "--fps", "25", *SIZE, "--samples", "1")
+        result = farlight(*command, "-o", "-", "--format", "gif", text=False)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn(b"note", result.stderr)  # 25 per second are 4 hundredths
+        self.expect(farlight(*command, "-o", self.folder / "around.gif"), 0)
+        self.assertEqual(result.stdout, (self.folder / "around.gif").read_bytes())
 
 
 class Scripts(OneDaemon, Animations):
@@ -555,7 +521,7 @@ class Scripts(OneDaemon, Animations):
 
     def shot(self, folder, name="shot.json", **more):
         (self.folder / folder).mkdir(exist_ok=True)
-        script = self.write({"model": str(self.model), "size": [96, 64], "output": f"{folder}/%04d.exr", **more}, name)
+        script = self.write({"model": str(self.model), "size": [48, 32], "output": f"{folder}/%04d.exr", **more}, name)
         result = self.expect(farlight("animate", "--script", script), 0)
         return self.digests(folder), result
 
@@ -584,7 +550,7 @@ class Scripts(OneDaemon, Animations):
     def test_models_have_their_places(self):
         """As the command line's --at has them; a model of the command line replaces them all."""
         models = [str(self.model), {"model": str(self.model), "at": [1, 0, 0], "rotation_degrees": [0, 90, 0], "scale": 0.5}]
-        script = self.write({"models": models, "camera": self.camera(), "size": [96, 64], "frames": "1-1", "samples": 1})
+        script = self.write({"models": models, "camera": self.camera(), "size": [48, 32], "frames": "1-1", "samples": 1})
         for more, typed in (((), (self.model, "--at", "1,0,0:0,90,0:0.5")), ((self.model,), ())):
             self.expect(farlight("animate", "--script", script, *more, "-o", self.folder / "script-%d.exr"), 0)
             self.assertEqual(digest(self.folder / "script-1.exr"),
@@ -602,8 +568,6 @@ class Scripts(OneDaemon, Animations):
                 self.assertEqual(len(set(got.values())), 7)
                 self.assertEqual(got[1], self.still("--eye", "2,1.5,2.5", "--look-at", "0,0,0", "--fov", "40"))
                 self.assertEqual(got[7], self.still("--eye", "3,1,1", "--look-at", "0,0,0", "--fov", "60"))
-
-    def test_steps_stand_still_between_keys(self):
         got, _ = self.shot("steps", frames="1-6", camera=self.camera(
             eye={"times": [0, 0.125], "values": [self.EYE, [3, 1, 1]], "interpolation": "step"}))
         self.assertEqual([got[n] == got[1] for n in range(1, 7)], [True, True, True, False, False, False])
@@ -615,17 +579,6 @@ class Scripts(OneDaemon, Animations):
         ease, _ = self.shot("ease", frames="1-5", camera=self.camera(dolly={"to": [3, 1, 1], "ease": True}))
         self.assertEqual((ease[1], ease[5]), (got[1], got[5]))
         self.assertNotEqual(ease[2], got[2])
-
-    def test_parts_of_a_script_equal_the_whole_to_the_bit(self):
-        keyed = {"camera": self.camera(eye={"times": [0, 0.2, 0.5], "values": [self.EYE, [3, 1, 1], [1, 3, 1]],
-                                            "interpolation": "catmull-rom"},
-                                       exposure={"times": [0, 0.5], "values": [0, -2]}),
-                 "samples": 2, "frames": "1-9"}
-        whole, _ = self.shot("whole", **keyed)
-        self.assertEqual(len(set(whole.values())), 9)
-        first, _ = self.shot("first", shard="1/2", **keyed)
-        second, _ = self.shot("second", shard="2/2", **keyed)
-        self.assertEqual({**first, **second}, whole)
 
     def test_names_that_the_model_lacks_are_reported_with_their_line(self):
         model = moving_model(self.folder / "moving.gltf")
@@ -651,7 +604,7 @@ class Scripts(OneDaemon, Animations):
 
 
 class Clips(OneDaemon, Animations):
-    """Clips of a small model of our own, and of a real one."""
+    """Clips of a small model of our own, and of a bundled one."""
 
     VIEW = ["--eye", "0,2,7", "--look-at", "0,0.5,0", "--fov", "45"]
 
@@ -670,7 +623,7 @@ class Clips(OneDaemon, Animations):
                 got, _ = self.animate(f"clip-{clip}", self.model, "--clip", clip, "--fps", "8", *self.VIEW)
                 self.assertEqual(list(got), list(range(1, 9)), "the ninth would be the first again")
                 self.assertGreater(len(set(got.values())), 7)
-                for frame in (1, 4, 8):
+                for frame in (1, 4):
                     self.assertEqual(got[frame], self.still("--clip", clip, "--time", (frame - 1) / 8))
 
     def test_clips_end_once_begin_later_and_run_faster(self):
@@ -699,7 +652,7 @@ class Clips(OneDaemon, Animations):
                                *self.VIEW)
         (self.folder / "script").mkdir()
         script = self.write({
-            "model": str(self.model), "fps": 4, "frames": "1-5", "size": [96, 64], "output": "script/%04d.exr",
+            "model": str(self.model), "fps": 4, "frames": "1-5", "size": [48, 32], "output": "script/%04d.exr",
             "camera": {"eye": [0, 2, 7], "look_at": [0, 0.5, 0], "fov": 45},
             "nodes": [{"target": "pyramid", "translation": {"times": [0, 1], "values": [[-1, 0, 0], [1, 0, 0]]}}]})
         self.expect(farlight("animate", "--script", script), 0)
@@ -721,7 +674,7 @@ class Clips(OneDaemon, Animations):
             with self.subTest(change=name):
                 folder = self.folder / name.replace(" ", "-")
                 folder.mkdir()
-                script = self.write({"model": str(self.model), "fps": 1, "frames": "1-2", "size": [96, 64],
+                script = self.write({"model": str(self.model), "fps": 1, "frames": "1-2", "size": [48, 32],
                                      "output": f"{folder.name}/%d.exr", **view, **change})
                 self.expect(farlight("animate", "--script", script), 0)
                 first, second = (digest(folder / f"{n}.exr") for n in (1, 2))
@@ -731,7 +684,7 @@ class Clips(OneDaemon, Animations):
 
     def test_a_turn_of_360_degrees_is_a_full_turn(self):
         """Between 0 and 360 degrees the shorter arc would stand still."""
-        script = self.write({"model": str(self.model), "fps": 4, "frames": "1-5", "size": [96, 64], "output": "%d.exr",
+        script = self.write({"model": str(self.model), "fps": 4, "frames": "1-5", "size": [48, 32], "output": "%d.exr",
                              "camera": {"eye": [0, 2, 7], "look_at": [0, 0.5, 0]},
                              "nodes": [{"target": "pyramid", "rotation_degrees": {"times": [0, 1], "values":
                                                                                  [[0, 0, 0], [0, 360, 0]]}},
@@ -741,21 +694,19 @@ class Clips(OneDaemon, Animations):
         self.assertEqual(frames[0], frames[4])
         self.assertEqual(len(set(frames)), 4)
 
-    @needs_shared_scenes
-    def test_a_skinned_model_in_parts_and_resumed_equals_the_whole_to_the_bit(self):
-        self.model = SHARED_SCENES / "gltf" / "Fox.glb"
-        common = ["--clip", "Run", "--fps", "12", "--samples", "2"]
-        whole, _ = self.animate("whole", self.model, *common)
-        self.assertEqual(len(whole), 14)
-        self.assertEqual(len(set(whole.values())), 14, "a running fox stands still in no frame")
-        parts = {}
-        for part in (2, 1, 3):
-            parts.update(self.animate("parts", self.model, *common, "--shard", f"{part}/3")[0])
+    def test_blurred_frames_are_the_same_to_the_bit_however_the_range_was_divided(self):
+        """Of a skinned model, with shutter and lens."""
+        common = ["--clip", "ride", "--fps", "12", "--frames", "3-6", "--samples", "2", "--shutter", "0.5", "--aperture", "0.3", "--focus", "7.4"]
+        model = bundled_scenes() / "carousel.glb"
+        whole, _ = self.animate("whole", model, *common)
+        self.assertEqual(len(set(whole.values())), 4)
+        for part in (2, 1):
+            parts, _ = self.animate("parts", model, *common, "--shard", f"{part}/2")
         self.assertEqual(parts, whole)
-        for frame in (1, 5, 6, 14):
-            (self.folder / "parts" / f"{frame:04d}.exr").unlink()
-        resumed, _ = self.animate("parts", self.model, *common, "--resume")
-        self.assertEqual(resumed, whole)
+        (self.folder / "parts/0004.exr").unlink()
+        self.assertEqual(self.animate("parts", model, *common, "--resume")[0], whole)
+        still, _ = self.animate("still", model, *common[:4], "--frames", "3", "--samples", "2", *common[-4:])
+        self.assertNotEqual(still[3], whole[3], "an open shutter is seen")
 
 
 class Info(Animations):
