@@ -29,13 +29,17 @@ ZINK_ALONE = (r"test_stacks",)
 # What GPUs do, in `make test`.
 LIKE_GPU = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)",)
 # Left to `make test-all`: breadth that costs much, beside what others see of the same kind.
-LEFT = ()
+LEFT = (r"contract/\w+(,| in | with | by ).*", r"test_bench")
 
 # With config=sanitize, `make test` runs what needs no OpenGL device: codecs, sessions, scenes, readers of files.
 WITHOUT_DEVICE = (r"unit/(base|client|edit|encode|fuzz|helper|import|net|protocol|scene|session|store|viewer|warp|web)/.*",)
 # The sanitizers see nothing of shaders, which Mesa compiles at run time, and make what rasterises large structures take
 # ten times as long: pictures against closed forms, forms of a tracer that differ in shaders, commands whose pictures are compared.
-NOT_SANITIZED = ()
+NOT_SANITIZED = (
+    r"accuracy/(?!render_frame|tracer_owners|wave_comparison).*",
+    r"contract/.*(ray alone|packets of|rays? a call)", r"contract/bvh in the plain form", r"contract/(ldc|abuffer|rayspace,|quadtree).*",
+    r"unit/trace/(abuffer|ldc)/traversal", r"unit/trace/quadtree/layers",
+    r"test_(animate|bench|check_device|compare.*|denoise|guide|import_animation|layers|light|models|pictures|poses|shot|siege|view)")
 
 # Targets of make that are no tests of the runner: their part of the rest, and a command that says why if they cannot run here.
 Step = collections.namedtuple("Step", "target part check")
