@@ -47,7 +47,7 @@ NO_FIDELITY = 'test -e "${FARLIGHT_SCENES:-../shared/scenes}/fidelity" || { echo
 ROOT = "tests/packages/clean_install.sh --check"
 STEPS = (
     Step("check-sync", 1, "true"),
-    Step("soak ROUNDS=160", 1, "true"),
+    Step("soak ROUNDS=400", 1, "true"),
     Step("deb-test", 2, ROOT),
     Step("container-test", 2, f"{ROOT} && unshare --net --pid --fork --mount-proc true"),
     Step("web-test", 3, "true"),
