@@ -132,6 +132,7 @@ class Edits(Shared):
         self.assertIn({"kind": "material", "id": 2, "name": "red"}, names)
         self.assertEqual({entry["kind"] for entry in names}, {"material", "light", "camera", "node", "environment"})
 
+    @long_test
     def test_two_clients_that_change_one_object_lose_nothing(self):
         """Each adds to another field, or to the same one: no edit may be made of values that are out of date."""
         self.addCleanup(self.edit, "material.mirror.roughness=0", "material.mirror.ior=1.5", "material.mirror.metallic=1")
@@ -150,6 +151,7 @@ class Edits(Shared):
         fields = self.fields("material.mirror")
         self.assertEqual([fields[name] for name in ("roughness", "ior", "metallic")], [1, 2, 1])
 
+    @long_test
     def test_an_open_view_shows_what_another_client_changes(self):
         events = self.folder / "events"
         looks = [event for i in range(2000) for event in ({"screenshot": f"{i}.png", "after": 0.1}, {"state": f"{i}"})]
@@ -183,6 +185,7 @@ class Edits(Shared):
         result = farlight("render", "--scene", "room", "--edit", "hide=room", "-o", self.folder / "a.png")
         self.assertIn("farlight edit", self.expect(result, 2).stderr)
 
+    @long_test
     def test_a_model_may_be_changed_for_one_picture(self):
         before = self.picture()
         model, path = bundled_scenes() / self.model, self.folder / "own.png"
@@ -223,6 +226,7 @@ class Environment(Shared):
         self.assertEqual((self.picture(), self.fields("environment")), (before, fields))
         self.assertIn("a backdrop is a colour alone", self.edit("environment.backdrop=true", status=1).stderr)
 
+    @long_test
     def test_two_clients_that_change_the_environment_lose_nothing(self):
         self.edit_for_now("environment.rotation=0", "environment.intensity=1")
 
@@ -286,12 +290,14 @@ class Animated(Shared):
         self.edit_for_now("material.cream.base_colour=0,0,1")
         self.assertNotEqual(self.picture(*riding), moving)
 
+    @long_test
     def test_a_light_is_known_by_the_node_that_shows_it(self):
         before = self.fields("light.key light")["intensity"]
         self.edit_for_now("light.key light.intensity*=2", "light.*fill light.intensity*=0")
         self.assertAlmostEqual(self.fields("light.key light")["intensity"], 2 * before, 3)
         self.assertEqual(self.fields("light.fill light")["intensity"], 0)
 
+    @long_test
     def test_an_animation_goes_on_while_its_scene_is_edited(self):
         command = [BIN / "farlight", "animate", "--scene", self.scene, "--clip", "ride", "--frames", "0-23", "--fps", "8",
                    *PICTURE, "-o", self.folder / "%d.png"]

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
 """libfarlight as it is installed: found by pkg-config alone, its header in C and C++, its example, and a binding."""
-import ctypes
 import os
 import pathlib
 import re
@@ -8,7 +7,7 @@ import subprocess
 import tempfile
 import unittest
 
-from farlight_test import BIN, ROOT, Daemon, bundled_scenes, read_png
+from farlight_test import BIN, ROOT, Daemon, bundled_scenes, long_test, read_png
 
 PREFIX = "/usr/local"
 
@@ -68,6 +67,7 @@ class LibFarlight(unittest.TestCase):
     def test_the_example_is_built_by_pkg_config_alone_and_renders(self):
         self.render(self.example(*self.pkg_config("--cflags", "--libs")))
 
+    @long_test
     def test_the_example_is_built_with_the_static_library(self):
         flags = self.pkg_config("--static", "--cflags", "--libs")
         archive = str(self.installed / "lib/libfarlight.a")
@@ -110,6 +110,7 @@ class LibFarlight(unittest.TestCase):
         self.assertGreater(len(self.declared()), 150)
         self.assertEqual(self.exported(), self.declared())
 
+    @long_test
     def test_a_program_can_use_each_of_them_with_either_library(self):
         source = self.work / "each.c"
         uses = ", ".join(f"(const void *)&{name}" for name in sorted(self.declared()))
@@ -140,28 +141,7 @@ class LibFarlight(unittest.TestCase):
         described = set(re.findall(r"^\.Fn (\w+)", manual, re.MULTILINE))
         self.assertEqual({name for name in self.exported() if name.startswith("fl_")} - described, set())
 
-    def test_python_binds_to_it(self):
-        class Error(ctypes.Structure):
-            _fields_ = [("code", ctypes.c_int), ("server_code", ctypes.c_int), ("retryable", ctypes.c_bool),
-                        ("retry_after_ms", ctypes.c_uint32), ("field", ctypes.c_char * 160),
-                        ("text", ctypes.c_char * 640), ("remedy", ctypes.c_char * 256)]
-
-        class Assignment(ctypes.Structure):
-            _fields_ = [("kind", ctypes.c_int), ("id", ctypes.c_uint32), ("which", ctypes.c_char * 129),
-                        ("field", ctypes.c_char * 48), ("way", ctypes.c_int), ("count", ctypes.c_uint),
-                        ("values", ctypes.c_double * 12)]
-
-        library = ctypes.CDLL(str(self.installed / "lib/libfarlight.so"))
-        library.fl_assignment_parse.restype = ctypes.c_bool
-        error, read = Error(), Assignment()
-        self.assertTrue(library.fl_assignment_parse(b"node.Door.translate=1,2.5,-3", ctypes.byref(read),
-                                                    ctypes.byref(error)), error.text)
-        self.assertEqual((read.which, read.field, read.count), (b"Door", b"translate", 3))
-        self.assertEqual(read.values[:3], [1, 2.5, -3])
-        self.assertFalse(library.fl_assignment_parse(b"node.Door.colour=1", ctypes.byref(read), ctypes.byref(error)))
-        self.assertEqual((error.code, error.field), (1, b"node.Door.colour=1"))
-        self.assertNotEqual(error.text, b"")
-
+    @long_test
     def test_uninstall_leaves_no_file_but_the_configuration(self):
         root = self.work / "removed"
         self.make("install", root)

@@ -13,7 +13,7 @@ import time
 import unittest.mock
 
 import farlight_test
-from farlight_test import Case, OneDaemon, bundled_scenes
+from farlight_test import Case, OneDaemon, bundled_scenes, long_test
 from test_sealed import SealedDaemon
 from test_python import DEBIANS, PACKAGE, STRAIGHT, begin, python, say, started, triangle
 
@@ -218,6 +218,7 @@ class WithDaemon(OneDaemon):
         with client.view(scene, STRAIGHT, encoding="jpeg", **size) as view:
             self.assertEqual(view.next_frame().size, (120, 90))
 
+    @long_test
     def test_the_environment_of_another_client_is_read_and_edited_and_keeps_its_image(self):
         owner, guest = self.connect(), self.connect()
         scene = farlight.Scene("python-sky", "shared")
@@ -273,6 +274,7 @@ class WithDaemon(OneDaemon):
         self.assertEqual(bytes(asked.core.unsent()), sent)
         self.assertFalse(asked.core.capabilities & handshake.CAN_READ_OBJECTS)
 
+    @long_test
     def test_clips_of_a_file_are_played_by_their_objects(self):
         client, scene = self.connect(), farlight.load(bundled_scenes() / "carousel.glb")
         clip, = scene.objects("clip")
@@ -284,6 +286,7 @@ class WithDaemon(OneDaemon):
         self.assertNotEqual(moved, still)
         self.assertEqual(moved, same)
 
+    @long_test
     def test_objects_of_others_are_removed_by_their_numbers(self):
         owner, guest = self.connect(), self.connect()
         scene = farlight.Scene("python-removed", "shared")
@@ -353,6 +356,7 @@ class WithDaemon(OneDaemon):
         self.assertLess(told[2][1], size)
         self.assertGreater(told[-1][1], size // 2)
 
+    @long_test
     def test_a_task_that_is_cancelled_in_an_upload_leaves_a_client_that_works(self):
         async def all_of_it():
             task = None
@@ -372,6 +376,7 @@ class WithDaemon(OneDaemon):
 
 
 class Sealed(Case):
+    @long_test
     def test_a_large_upload_over_tcp_waits_for_nothing_but_the_daemon(self):
         """The system may take all that is queued at once; then no answer is due, and the rest must follow all the same. Pings
         would hide it: each makes an answer."""
@@ -389,7 +394,9 @@ class Ends(Case):
         os.environ.pop("FARLIGHT_SERVER", None)
 
         def kill(client):
-            client._link.process.kill()  # pylint: disable=protected-access
+            process = client._link.process  # pylint: disable=protected-access
+            process.kill()
+            process.wait()
 
         scene, _ = triangle()
         with farlight.connect() as client:
@@ -410,6 +417,7 @@ class Ends(Case):
                     pass
             self.assertIn("farlightd was ended by signal 9", str(raised.exception))
 
+    @long_test
     def test_ctrl_c_ends_the_command_line_without_a_traceback_and_leaves_no_daemon(self):
         parent, child = pty.openpty()
         path = os.pathsep.join([str(PACKAGE)] + [DEBIANS] * (DEBIANS in sys.path))
@@ -441,6 +449,7 @@ class Ends(Case):
         self.assertNotIn(b"Traceback", said)
         self.assertEqual(list(self.folder.iterdir()), [])
 
+    @long_test
     def test_the_command_line_says_what_is_wrong_before_it_reads_a_model(self):
         output = ("-o", self.folder / "a.png")
         for arguments, text in ((("--size", "64", *output), "not WxH"), (("--eye", "1,2", *output), "not X,Y,Z"), (("--samples", "0", *output), "render.samples"),

@@ -14,7 +14,7 @@ import subprocess
 import threading
 import time
 
-from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, exr_attributes, farlight
+from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, exr_attributes, farlight, long_test
 from farlight_test import read_exr, read_png
 from test_animate import children
 from test_daemon import (EDIT_BEGIN, EDIT_COMMIT, ERROR, GOODBYE, OK, SCENE_OPEN, SET_NODE, STATS, STATS_REPLY, Peer,
@@ -195,6 +195,7 @@ class Serve(Case):
             self.assertEqual(early.wait(TIMEOUT_S), 0)
         self.assertEqual(exr_attributes(self.folder / "mine.exr")["farlight/revision"], b"1")
 
+    @long_test
     def test_an_animation_of_a_scene_that_is_up_leaves_it_as_it_was(self):
         self.serve()
         script = self.folder / "shot.json"
@@ -257,6 +258,7 @@ class Serve(Case):
         self.assertEqual((kind, error_code(payload)), (ERROR, DENIED))
         self.assertEqual(self.scenes()[0]["revision"], 1)
 
+    @long_test
     def test_a_model_that_changes_is_loaded_into_the_scene_that_is_up(self):
         tile = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\n"
         model = self.folder / "tile.obj"
@@ -290,6 +292,7 @@ class Serve(Case):
                 self.assertEqual([scene["clients"] for scene in self.scenes(daemon.address)], [1])
                 self.assertEqual(serving.stop(signal.SIGTERM), 0)
 
+    @long_test
     def test_a_scene_is_left_for_as_long_as_the_configuration_says(self):
         config = self.folder / "conf"
         config.write_text("[limits]\nscene_linger = 1\n")
@@ -300,6 +303,7 @@ class Serve(Case):
             result = self.render(self.folder / "a.png", "--scene", "teapot.glb", status=1, address=daemon.address)
             self.assertIn("farlight scenes", result.stderr)
 
+    @long_test
     def test_a_serving_client_is_not_idle(self):
         config = self.folder / "conf"
         config.write_text("[network]\nidle = 5000\n")
@@ -307,6 +311,7 @@ class Serve(Case):
             Viewer(daemon.path, "teapot.glb").until_closed()  # so long that who says nothing is sent away
             self.assertEqual(self.scenes(daemon.address)[0]["clients"], 1)
 
+    @long_test
     def test_an_importer_that_says_nothing_for_long_is_waited_for(self):
         config = self.folder / "conf"
         config.write_text("[network]\nidle = 1000\n")
@@ -336,6 +341,7 @@ class Serve(Case):
                                      [("mine", 1)])
                     self.assertEqual(serving.stop(), 0)
 
+    @long_test
     def test_the_client_that_started_a_daemon_may_be_silent(self):
         config = self.folder / "conf"
         config.write_text("[network]\nidle = 300\n")
@@ -393,12 +399,6 @@ class Serve(Case):
             self.assertEqual(result.returncode, 2, arguments)
             self.assertIn(part, result.stderr)
         self.assertEqual(self.leftovers(), [])
-
-    def test_an_unusable_address_is_reported_in_the_daemons_words(self):
-        (self.folder / "file").write_text("mine")
-        result = self.expect(farlight("serve", self.model, "--listen", f"unix:{self.folder}/file"), 1)
-        self.assertIn("not a socket; it was left alone", result.stderr)
-        self.assertEqual((self.folder / "file").read_text(), "mine")
 
     def test_an_unknown_name_is_reported(self):
         self.serve()

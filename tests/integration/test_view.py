@@ -16,7 +16,7 @@ import time
 import unittest
 import unittest.mock
 
-from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, long_test, read_png, tracers
+from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, long_test, read_png
 
 SIZE = (160, 90)  # of tests whose claim has another need say so: pixels are what they cost
 # Structures whose accuracy is not what is tested.
@@ -166,13 +166,6 @@ class WithoutAWindow(Viewer):
                 self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
 
     @long_test
-    def test_with_both_eyes_errors_are_those_against_rendered_views(self):
-        states = self.replay([{"key": "b"}, {"key": "x"}, rest(4), {"state": "from layers"}, {"key": "b", "shift": True},
-                              rest(4), {"state": "rendered"}])
-        self.assertLess(states["rendered"]["errors"]["mean"], 1e-4)
-        self.assertGreater(states["from layers"]["errors"]["mean"], 10 * states["rendered"]["errors"]["mean"])
-
-    @long_test
     def test_the_view_of_either_eye_can_be_pointed_at(self):
         """The middle of each view is what the camera looks at."""
         clicks = [{"mouse": "down", "button": "left", "y": 45, "clicks": 2}, {"mouse": "up", "button": "left", "y": 45}]
@@ -199,24 +192,6 @@ class WithoutAWindow(Viewer):
                                (["--stereo", "0.1", "--shutter", "0.5"], "--shutter: depth layers")):
             self.replay([rest(1)], *options, status=2)
             self.assertIn(words, self.errors)
-
-    @long_test
-    def test_motion_may_travel_as_video_and_rest_without_loss(self):
-        """It moves for a second or so, a little at a time: what is shown then has been a stream, afterwards not."""
-        moves = [{"mouse": "move", "x": 110 + step / 20, "y": 55, "after": 0.03} for step in range(40)]
-        let_go = {"mouse": "up", "button": "left", "x": 112, "y": 55}
-        states = {}
-        for motion, still in (("h264", "predicted"), ("raw", "raw")):
-            states[motion] = self.replay([rest(8), *HIDE, drag(80, 45, 0, 0)[0], *moves, {"state": "moving"},
-                                          {"screenshot": f"moving-{motion}.png"}, let_go, rest(8), {"state": "rested"},
-                                          {"screenshot": f"rested-{motion}.png"}],
-                                         "--encoding", motion, "--still-encoding", still, "--no-adapt")
-        self.assertEqual([states["h264"][when]["encoding"] for when in ("moving", "rested")], ["h264", "predicted"])
-        self.assertEqual(states["h264"]["rested"]["eye"], states["raw"]["rested"]["eye"])
-        moving, rested, exact = (self.folder / name for name in ("moving-h264.png", "rested-h264.png", "rested-raw.png"))
-        self.assertEqual(difference(rested, exact), 0)
-        # Some of the last steps behind, and what is lost in motion.
-        self.assertTrue(0 < difference(moving, rested) < 5)
 
     @long_test
     def test_what_moves_gives_way_to_the_rate_and_rest_is_the_full_picture(self):
@@ -411,22 +386,6 @@ class MadeHere(Viewer):
                 true = self.rendered(state, eye, *eyes, "--views", "rays")
                 self.assertLess(error_of(made, true), error_of(before, true) / 3)
 
-    @long_test
-    def test_both_eyes_at_rest_are_those_of_the_daemon(self):
-        moves = [{"mouse": "move", "x": 80 + step, "y": 45, "after": 0.02} for step in range(1, 51)]
-        events = [rest(8), drag(80, 45, 0, 0)[0], *moves, {"state": "moving"}, {"mouse": "up", "button": "left", "x": 130, "y": 45},
-                  rest(8), {"state": "rested"}, *HIDE, {"screenshot": "rested.png"}]
-        states = {}
-        for mode in ("on", "off"):
-            states[mode] = self.replay(events, "--views", mode, "--stereo", "0.1")
-            (self.folder / "rested.png").rename(self.folder / f"{mode}.png")
-        local = states["on"]["moving"]["local"]
-        self.assertTrue(local["shown"] and local["made"] > 0 and local["depth_bytes"] > 0)
-        self.assertEqual(states["off"]["moving"]["local"]["made"], 0)
-        self.assertFalse(states["on"]["rested"]["local"]["shown"])
-        self.assertEqual(states["on"]["rested"]["eye"], states["off"]["rested"]["eye"])
-        self.assertEqual(difference(self.folder / "on.png", self.folder / "off.png"), 0)
-
     def test_a_view_is_near_to_what_is_rendered_from_there(self):
         size = (240, 270)
         state, before, made = self.moved_while_lost("made", size=size)
@@ -459,16 +418,6 @@ class MadeHere(Viewer):
                           without["moving"]["local"]["depth_bytes"]), (False, 0, 0))
         self.assertEqual(states["rested"]["eye"], without["rested"]["eye"])
         self.assertEqual(difference(self.folder / "with.png", self.folder / "rested.png"), 0)
-
-    @long_test
-    def test_auto_makes_views_once_pictures_are_known_to_be_slow(self):
-        """Over a link that takes some frames of a display."""
-        moves = [event for step in range(4) for event in (*drag(60, 45, 20 + step, 0), rest(1))]
-        states = self.replay([rest(), {"state": "first"}, *moves, {"state": "known"}, {"key": "l"}, {"state": "on"}, {"key": "l"},
-                              {"state": "off"}], "--link", "1gbit,60ms")
-        self.assertEqual([states[name]["local"]["views"] for name in ("first", "known", "on", "off")],
-                         ["auto", "auto", "on", "off"])
-        self.assertEqual([states[name]["local"]["on"] for name in ("first", "known", "on", "off")], [False, True, True, False])
 
 class Relay:
     """A socket before a daemon's that can be cut; counts what clients send."""
@@ -557,12 +506,12 @@ class Watching(Viewer):
 
 class OnADaemon(Viewer):
     def test_a_daemon_that_comes_back_shows_the_scene_again(self):
-        size = (320, 180)  # of which a word in the middle leaves the top as it is
-        events = [rest(), *drag(160, 90, 40, 10), rest(), {"state": "before"}, *HIDE, {"screenshot": "before.png"},
-                  {"wait": "lost"}, {"state": "lost"}, {"screenshot": "lost.png"}, {"wait": "live"}, rest(8),
+        size = (240, 136)  # of which a word in the middle leaves the top as it is
+        events = [rest(), *drag(120, 68, 40, 10), rest(), {"state": "before"}, *HIDE, {"screenshot": "before.png"},
+                  {"wait": "lost"}, {"state": "lost"}, {"screenshot": "lost.png"}, {"wait": "live"}, rest(2),
                   {"state": "after"}, {"screenshot": "after.png"}]
         with Daemon() as first:
-            process = self.start(events, "--headless", "--server", first.address, size=size)
+            process = self.start(events, "--headless", "--server", first.address, "--samples", "2", size=size)
             lines = []
             for line in process.stdout:
                 lines.append(json.loads(line))
@@ -582,7 +531,7 @@ class OnADaemon(Viewer):
         self.assertEqual((before["eye"], before["look_at"]), (after["eye"], after["look_at"]))
         # The picture stays while the connection is lost, with a word about it in its middle, and is made again.
         rows = {name: read_png(self.folder / f"{name}.png")[2] for name in ("before", "lost")}
-        self.assertEqual(rows["before"][:30], rows["lost"][:30])
+        self.assertEqual(rows["before"][:20], rows["lost"][:20])
         self.assertNotEqual(rows["before"][size[1] // 2], rows["lost"][size[1] // 2])
         self.assertLess(difference(self.folder / "before.png", self.folder / "after.png"), 2)
 

@@ -80,14 +80,35 @@ static struct fl_frame *receive(enum protocol_encoding encoding, const uint8_t *
     return frame;
 }
 
+static void expect_refused(enum protocol_encoding encoding, const uint8_t *bytes, size_t count)
+{
+    assert_null(receive(encoding, bytes, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+}
+
+/* As its pixels were. */
+static void expect_exact(struct fl_frame *frame)
+{
+    assert_non_null(frame);
+    assert_true(frame->digest_checked);
+    assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
+}
+
+/* All that came of one frame, in one message. */
+static struct fl_frame *assemble(struct fl_assembly *assembly, const struct message_frame_begin *message,
+                                 const uint8_t *bytes, size_t count)
+{
+    struct fl_frame *frame = begin(assembly, message) && give(assembly, bytes, count, 0) ? end(assembly) : NULL;
+    fl_assembly_finish(assembly);
+    return frame;
+}
+
 ALL_TESTS(fill_pixels, NULL)
 
 TEST(a_raw_frame_arrives)
 {
     struct fl_frame *frame = receive(PROTOCOL_ENCODING_RAW, pixels, sizeof(pixels));
-    assert_non_null(frame);
-    assert_true(frame->digest_checked);
-    assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
+    expect_exact(frame);
     assert_int_equal(frame->frame, 3);
     assert_int_equal(frame->primary_rays, 960);
     assert_int_equal(frame->stage_count, 1);
@@ -101,9 +122,7 @@ TEST(a_zstd_frame_arrives)
     const size_t count = ZSTD_compress(packed, sizeof(packed), pixels, sizeof(pixels), 1);
     assert_false(ZSTD_isError(count));
     struct fl_frame *frame = receive(PROTOCOL_ENCODING_ZSTD, packed, count);
-    assert_non_null(frame);
-    assert_true(frame->digest_checked);
-    assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
+    expect_exact(frame);
     fl_frame_destroy(frame);
 }
 
@@ -133,11 +152,8 @@ TEST(a_predicted_frame_arrives_in_every_pixel_format)
         struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_PREDICTED, count);
         message.height = assembly.expected.height = picture.height;
         message.format = assembly.expected.format = format;
-        assert_true(begin(&assembly, &message) && give(&assembly, packed, count, 0));
-        struct fl_frame *frame = end(&assembly);
-        assert_non_null(frame);
-        assert_true(frame->digest_checked);
-        assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
+        struct fl_frame *frame = assemble(&assembly, &message, packed, count);
+        expect_exact(frame);
         fl_frame_destroy(frame);
         free(packed);
     }
@@ -150,12 +166,10 @@ TEST(a_damaged_predicted_frame_is_refused)
     smaller.height--;
     uint8_t *packed;
     size_t count = make_predicted(&picture, &packed);
-    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count - 1));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    expect_refused(PROTOCOL_ENCODING_PREDICTED, packed, count - 1);
     free(packed);
     count = make_predicted(&smaller, &packed);
-    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    expect_refused(PROTOCOL_ENCODING_PREDICTED, packed, count);
     free(packed);
     uint8_t other[PIXELS_BYTES];
     memcpy(other, pixels, sizeof(other));
@@ -216,8 +230,7 @@ TEST(what_is_attached_arrives_beside_any_encoding)
             make_attached(encoding, i % 8, (const uint8_t *)depth, normals, sticking, &bytes);
         const size_t count =
             (size_t)(message.size_bytes + message.depth_bytes + message.normal_bytes + message.sticking_bytes);
-        assert_true(begin(&assembly, &message) && give(&assembly, bytes, count, 0));
-        struct fl_frame *frame = end(&assembly);
+        struct fl_frame *frame = assemble(&assembly, &message, bytes, count);
         assert_non_null(frame);
         assert_int_equal(frame->wire_bytes, count);
         assert_int_equal(frame->depth != NULL, (i & FL_ATTACH_DEPTH) != 0);
@@ -234,7 +247,6 @@ TEST(what_is_attached_arrives_beside_any_encoding)
         else if (encoding != PROTOCOL_ENCODING_JPEG)
             assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
         fl_frame_destroy(frame);
-        fl_assembly_finish(&assembly);
         free(bytes);
     }
 }
@@ -273,14 +285,12 @@ TEST(inverse_depths_arrive_in_metres)
     uint8_t *bytes;
     size_t count;
     const struct message_frame_begin message = make_inverse(&bytes, &count);
-    assert_true(begin(&assembly, &message) && give(&assembly, bytes, count, 0));
-    struct fl_frame *frame = end(&assembly);
+    struct fl_frame *frame = assemble(&assembly, &message, bytes, count);
     assert_non_null(frame);
     assert_true(frame->depth_step == 0.5f);
     for (size_t i = 0; i < WIDTH * HEIGHT; i++)
         assert_true(frame->depth[i] == depths[i % 3]);
     fl_frame_destroy(frame);
-    fl_assembly_finish(&assembly);
     free(bytes);
 }
 
@@ -363,16 +373,13 @@ TEST(what_cannot_be_sticking_is_refused)
                                                            &bytes);
         bytes[PIXELS_BYTES] ^= i == 4 ? 0xff : 0;
         message.sticking_bytes = i == 5 ? 0 : i == 6 ? UINT32_MAX : message.sticking_bytes;
-        struct fl_frame *frame = NULL;
-        if (begin(&assembly, &message) &&
-            give(&assembly, bytes, (size_t)(message.size_bytes + message.sticking_bytes), 0))
-            frame = end(&assembly);
+        struct fl_frame *frame =
+            assemble(&assembly, &message, bytes, (size_t)(message.size_bytes + message.sticking_bytes));
         assert_int_equal(frame != NULL, i == 0);
         assert_int_equal(error.code, i == 0 ? FL_ERROR_NONE : FL_ERROR_PROTOCOL);
         if (frame)
             assert_true(frame->sticking[WIDTH * HEIGHT - 1] == 255 && frame->sticking[0] == 0);
         fl_frame_destroy(frame);
-        fl_assembly_finish(&assembly);
         free(bytes);
     }
 }
@@ -422,23 +429,15 @@ TEST(a_jpeg_frame_arrives_with_an_opaque_alpha)
     tjFree(packed);
 }
 
-TEST(a_jpeg_of_another_size_is_refused)
+TEST(a_damaged_jpeg_and_one_of_another_size_are_refused)
 {
     uint8_t *packed = NULL;
-    const unsigned long count = make_jpeg(WIDTH, HEIGHT - 8, &packed);
-    assert_null(receive(PROTOCOL_ENCODING_JPEG, packed, count));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    unsigned long count = make_jpeg(WIDTH, HEIGHT - 8, &packed);
+    expect_refused(PROTOCOL_ENCODING_JPEG, packed, count);
     tjFree(packed);
-}
-
-TEST(a_damaged_jpeg_is_refused)
-{
-    uint8_t *packed = NULL;
-    const unsigned long count = make_jpeg(WIDTH, HEIGHT, &packed);
-    assert_null(receive(PROTOCOL_ENCODING_JPEG, packed, count - 20));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
-    assert_null(receive(PROTOCOL_ENCODING_JPEG, pixels, 100));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    count = make_jpeg(WIDTH, HEIGHT, &packed);
+    expect_refused(PROTOCOL_ENCODING_JPEG, packed, count - 20);
+    expect_refused(PROTOCOL_ENCODING_JPEG, pixels, 100);
     tjFree(packed);
 }
 
@@ -456,13 +455,10 @@ TEST(a_zstd_frame_that_unpacks_to_more_or_less_is_refused)
     uint8_t *large = calloc(1, 100 * PIXELS_BYTES), packed[2 * PIXELS_BYTES];
     assert_non_null(large);
     size_t count = ZSTD_compress(packed, sizeof(packed), large, 100 * PIXELS_BYTES, 1);
-    assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    expect_refused(PROTOCOL_ENCODING_ZSTD, packed, count);
     count = ZSTD_compress(packed, sizeof(packed), large, PIXELS_BYTES - 1, 1);
-    assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
-    assert_null(receive(PROTOCOL_ENCODING_ZSTD, large, 50));
-    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    expect_refused(PROTOCOL_ENCODING_ZSTD, packed, count);
+    expect_refused(PROTOCOL_ENCODING_ZSTD, large, 50);
     free(large);
 }
 
@@ -512,9 +508,7 @@ TEST(layers_arrive_one_behind_the_other_under_one_digest)
     struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_ZSTD, packed_bytes);
     assembly.expected.layers = message.layers = 3;
     message.digest = XXH3_64bits(both, sizeof(both));
-    assert_true(begin(&assembly, &message));
-    assert_true(give(&assembly, packed, packed_bytes, 0));
-    struct fl_frame *frame = end(&assembly);
+    struct fl_frame *frame = assemble(&assembly, &message, packed, packed_bytes);
     assert_non_null(frame);
     assert_int_equal(frame->layers, 3);
     assert_int_equal(frame->pixels_bytes, sizeof(both));

@@ -131,29 +131,6 @@ TEST(a_helper_that_is_not_installed_is_named)
 
 #define EDGE 64u
 
-static bool find_exporter(void)
-{
-    char self[4096], program[4200];
-    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1);
-    assert_true(length > 0);
-    self[length] = '\0';
-    for (int i = 0; i < 3; i++) /* build/CONFIG/tests/unit/test: the programs are in build/CONFIG */
-        *strrchr(self, '/') = '\0';
-    snprintf(program, sizeof(program), "%s/farlight-export", self);
-    setenv("FARLIGHT_LIBEXEC", self, 1);
-    return access(program, X_OK) == 0;
-}
-
-static struct fl_frame some_frame(enum protocol_pixel_format format, uint8_t *pixels)
-{
-    struct fl_frame frame = {
-        .width = EDGE, .height = EDGE, .samples = 1, .layers = 1, .format = format, .fov_y = 1};
-    frame.world_from_view[0] = frame.world_from_view[5] = frame.world_from_view[10] = 1;
-    frame.pixels = pixels;
-    frame.pixels_bytes = (size_t)EDGE * EDGE * fl_bytes_per_pixel(format);
-    return frame;
-}
-
 static size_t count_files(const char *where)
 {
     size_t count = 0;
@@ -163,6 +140,75 @@ static size_t count_files(const char *where)
         count += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
     closedir(listing);
     return count;
+}
+
+static uint8_t *pixels; /* of as many layers as there are */
+static struct fl_exporter *exporter;
+static size_t files_before;
+static bool has_exporter;
+
+static void start_exporter(const char *format)
+{
+    if (!has_exporter) {
+        print_message("skipped: farlight-export is not built\n");
+        skip();
+    }
+    exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder, .format = format}, &error);
+    assert_non_null(exporter);
+}
+
+static int begin_export(void **state)
+{
+    (void)state;
+    char self[4096], program[4200];
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1);
+    assert_true(length > 0);
+    self[length] = '\0';
+    for (int i = 0; i < 3; i++) /* build/CONFIG/tests/unit/test: the programs are in build/CONFIG */
+        *strrchr(self, '/') = '\0';
+    snprintf(program, sizeof(program), "%s/farlight-export", self);
+    setenv("FARLIGHT_LIBEXEC", self, 1);
+    has_exporter = access(program, X_OK) == 0;
+    files_before = count_files(folder);
+    pixels = calloc(PROTOCOL_LAYER_COUNT, EDGE * EDGE * 16);
+    assert_non_null(pixels);
+    return 0;
+}
+
+/* Nothing is left in the folder. */
+static int end_export(void **state)
+{
+    (void)state;
+    fl_exporter_destroy(exporter);
+    exporter = NULL;
+    free(pixels);
+    assert_int_equal(count_files(folder), files_before);
+    return 0;
+}
+
+static const char *path_of(const char *name)
+{
+    static char path[128];
+    snprintf(path, sizeof(path), "%s/%s", folder, name);
+    return path;
+}
+
+/* Whether the file is there then. */
+static bool export_as(const struct fl_frame *frame, const struct fl_export_options *options)
+{
+    error = (struct fl_error){0};
+    assert_true(fl_exporter_write(exporter, frame, options, &error));
+    return fl_exporter_wait(exporter, &error);
+}
+
+static struct fl_frame some_frame(enum protocol_pixel_format format)
+{
+    struct fl_frame frame = {
+        .width = EDGE, .height = EDGE, .samples = 1, .layers = 1, .format = format, .fov_y = 1};
+    frame.world_from_view[0] = frame.world_from_view[5] = frame.world_from_view[10] = 1;
+    frame.pixels = pixels;
+    frame.pixels_bytes = (size_t)EDGE * EDGE * fl_bytes_per_pixel(format);
+    return frame;
 }
 
 static void check_magic(const char *path, const char *magic, size_t count)
@@ -176,7 +222,7 @@ static void check_magic(const char *path, const char *magic, size_t count)
     assert_memory_equal(found, magic, count);
 }
 
-TEST(one_exporter_writes_every_format)
+TEST_WITH(one_exporter_writes_every_format, begin_export, end_export)
 {
     static const struct {
         const char *name, *magic;
@@ -187,53 +233,25 @@ TEST(one_exporter_writes_every_format)
                  {"c.exr", "\x76\x2f\x31\x01", 4, PROTOCOL_PIXEL_FORMAT_RGBA16F},
                  {"d.exr", "\x76\x2f\x31\x01", 4, PROTOCOL_PIXEL_FORMAT_RGBA32F},
                  {"e.hdr", "#?RADIANCE", 10, PROTOCOL_PIXEL_FORMAT_RGBA32F}};
-    if (!find_exporter()) {
-        print_message("skipped: farlight-export is not built\n");
-        skip();
-    }
-    const size_t before = count_files(folder);
-    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
-    assert_non_null(exporter);
-    uint8_t *pixels = calloc(1, EDGE * EDGE * 16);
+    start_exporter(NULL);
     for (size_t i = 0; i < sizeof(files) / sizeof(files[0]); i++) {
-        char path[128];
-        const struct fl_frame frame = some_frame(files[i].format, pixels);
-        snprintf(path, sizeof(path), "%s/%s", folder, files[i].name);
-        error = (struct fl_error){0};
-        if (!fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error) ||
-            !fl_exporter_wait(exporter, &error))
+        const char *path = path_of(files[i].name);
+        const struct fl_frame frame = some_frame(files[i].format);
+        if (!export_as(&frame, &(struct fl_export_options){.path = path}))
             fail_msg("%s: %s", path, error.text);
         check_magic(path, files[i].magic, files[i].magic_bytes);
         unlink(path);
     }
-    free(pixels);
-    fl_exporter_destroy(exporter);
-    assert_int_equal(count_files(folder), before);
 }
 
-TEST(an_exporter_for_one_format_refuses_those_that_it_did_not_load)
+TEST_WITH(an_exporter_for_one_format_refuses_those_that_it_did_not_load, begin_export, end_export)
 {
-    if (!find_exporter()) {
-        print_message("skipped: farlight-export is not built\n");
-        skip();
-    }
-    char path[128];
-    uint8_t *pixels = calloc(1, EDGE * EDGE * 16);
-    const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA8, pixels);
-    struct fl_exporter *exporter =
-        fl_exporter_start(&(struct fl_exporter_options){.folder = folder, .format = "png"}, &error);
-    assert_non_null(exporter);
-    snprintf(path, sizeof(path), "%s/a.webp", folder);
-    assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
-    assert_false(fl_exporter_wait(exporter, &error));
+    const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA8);
+    start_exporter("png");
+    assert_false(export_as(&frame, &(struct fl_export_options){.path = path_of("a.webp")}));
     check_error(FL_ERROR_FILE, "started for other formats");
-    snprintf(path, sizeof(path), "%s/a.png", folder);
-    error = (struct fl_error){0};
-    assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
-    assert_true(fl_exporter_wait(exporter, &error));
-    unlink(path);
-    free(pixels);
-    fl_exporter_destroy(exporter);
+    assert_true(export_as(&frame, &(struct fl_export_options){.path = path_of("a.png")}));
+    unlink(path_of("a.png"));
 }
 
 /* ---- layers ---- */
@@ -257,7 +275,7 @@ static void read_channels(const char *path, char *text, size_t text_bytes)
                                  at[strlen(at) + 1]);
 }
 
-TEST(layers_become_channels_by_name)
+TEST_WITH(layers_become_channels_by_name, begin_export, end_export)
 {
     static const struct {
         unsigned layers;
@@ -272,33 +290,22 @@ TEST(layers_become_channels_by_name)
          "normal.Y:1 "
          "normal.Z:1 position.X:2 position.Y:2 position.Z:2 unknown.Y:1"},
     };
-    if (!find_exporter()) {
-        print_message("skipped: farlight-export is not built\n");
-        skip();
-    }
-    char path[128], found[512];
-    uint8_t *pixels = calloc(PROTOCOL_LAYER_COUNT, EDGE * EDGE * 16);
-    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
-    assert_non_null(exporter);
-    snprintf(path, sizeof(path), "%s/layers.exr", folder);
+    char found[512];
+    const char *path = path_of("layers.exr");
+    start_exporter(NULL);
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
-        struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA32F, pixels);
+        struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA32F);
         frame.layers = cases[i].layers;
         frame.pixels_bytes *= (size_t)__builtin_popcount(frame.layers);
-        error = (struct fl_error){0};
-        if (!fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path, .half = cases[i].half},
-                               &error) ||
-            !fl_exporter_wait(exporter, &error))
+        if (!export_as(&frame, &(struct fl_export_options){.path = path, .half = cases[i].half}))
             fail_msg("%#x: %s", frame.layers, error.text);
         read_channels(path, found, sizeof(found));
         assert_string_equal(found, cases[i].channels);
         unlink(path);
     }
-    fl_exporter_destroy(exporter);
-    free(pixels);
 }
 
-TEST(layers_that_a_file_cannot_have_are_refused_and_the_next_picture_is_written)
+TEST_WITH(layers_that_a_file_cannot_have_are_refused_and_the_next_picture_is_written, begin_export, end_export)
 {
     static const struct {
         const char *name;
@@ -306,91 +313,51 @@ TEST(layers_that_a_file_cannot_have_are_refused_and_the_next_picture_is_written)
     } wrong[] = {{"a.png", PROTOCOL_PIXEL_FORMAT_RGBA8},
                  {"a.hdr", PROTOCOL_PIXEL_FORMAT_RGBA32F},
                  {"a.exr", PROTOCOL_PIXEL_FORMAT_RGBA16F}};
-    if (!find_exporter()) {
-        print_message("skipped: farlight-export is not built\n");
-        skip();
-    }
-    const size_t before = count_files(folder);
-    uint8_t *pixels = calloc(2, EDGE * EDGE * 16);
-    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
-    assert_non_null(exporter);
+    start_exporter(NULL);
     for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
-        char path[128];
-        struct fl_frame frame = some_frame(wrong[i].format, pixels);
-        snprintf(path, sizeof(path), "%s/%s", folder, wrong[i].name);
+        const struct fl_export_options options = {.path = path_of(wrong[i].name)};
+        struct fl_frame frame = some_frame(wrong[i].format);
         frame.layers = LAYER_SET(BEAUTY) | LAYER_SET(ALBEDO);
         frame.pixels_bytes *= 2;
-        error = (struct fl_error){0};
-        assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
-        assert_false(fl_exporter_wait(exporter, &error));
+        assert_false(export_as(&frame, &options));
         check_error(FL_ERROR_FILE, "layers");
-        assert_int_equal(count_files(folder), before);
-        frame = some_frame(wrong[i].format, pixels);
-        error = (struct fl_error){0};
-        assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
-        assert_true(fl_exporter_wait(exporter, &error));
-        unlink(path);
+        assert_int_equal(count_files(folder), files_before);
+        frame = some_frame(wrong[i].format);
+        assert_true(export_as(&frame, &options));
+        unlink(options.path);
     }
-    fl_exporter_destroy(exporter);
-    free(pixels);
 }
 
-TEST(a_file_that_cannot_be_written_is_named_and_nothing_is_left)
+TEST_WITH(a_file_that_cannot_be_written_is_named_and_nothing_is_left, begin_export, end_export)
 {
-    static const char *const wrong[] = {"%s/missing/a.png", "%s/a.bmp", "%s/no-ending", "/a.png"};
-    if (!find_exporter()) {
-        print_message("skipped: farlight-export is not built\n");
-        skip();
-    }
-    const size_t before = count_files(folder);
-    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
-    assert_non_null(exporter);
-    uint8_t pixels[EDGE * EDGE * 4] = {0};
-    const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA8, pixels);
+    static const char *const wrong[] = {"missing/a.png", "a.bmp", "no-ending", "../a.png"};
+    start_exporter(NULL);
+    const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA8);
     for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
-        char path[128];
-        snprintf(path, sizeof(path), "%s%s", wrong[i][0] == '%' ? folder : "",
-                 wrong[i] + (wrong[i][0] == '%' ? 2 : 0));
-        error = (struct fl_error){0};
-        assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
-        if (fl_exporter_wait(exporter, &error))
+        const char *path = path_of(wrong[i]);
+        if (export_as(&frame, &(struct fl_export_options){.path = path}))
             fail_msg("%s was written", path);
         assert_int_equal(error.code, FL_ERROR_FILE);
         assert_string_equal(error.field, path);
     }
-    fl_exporter_destroy(exporter);
-    assert_int_equal(count_files(folder), before);
 }
 
-TEST(a_full_disk_is_reported_and_no_file_is_left)
+TEST_WITH(a_full_disk_is_reported_and_no_file_is_left, begin_export, end_export)
 {
     struct rlimit saved, small;
-    char path[128];
-    if (!find_exporter()) {
-        print_message("skipped: farlight-export is not built\n");
-        skip();
-    }
-    const size_t before = count_files(folder);
-    snprintf(path, sizeof(path), "%s/large.exr", folder);
+    const char *path = path_of("large.exr");
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &saved), 0);
     small = (struct rlimit){.rlim_cur = 4096, .rlim_max = saved.rlim_max};
     setrlimit(RLIMIT_FSIZE, &small); /* inherited by the exporter */
-    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
+    start_exporter(NULL);
     setrlimit(RLIMIT_FSIZE, &saved);
-    assert_non_null(exporter);
-    uint8_t *pixels = malloc(EDGE * EDGE * 16);
-    assert_non_null(pixels);
     uint32_t noise = 1;
     for (size_t i = 0; i < EDGE * EDGE * 16; i++) { /* finite floats that do not compress */
         noise = noise * 1664525u + 1013904223u;
         pixels[i] = i % 4 == 3 ? 0x3f : (uint8_t)(noise >> 24);
     }
-    const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA32F, pixels);
-    assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
-    assert_false(fl_exporter_wait(exporter, &error));
+    const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA32F);
+    assert_false(export_as(&frame, &(struct fl_export_options){.path = path}));
     check_error(FL_ERROR_FILE, "File too large");
     assert_string_equal(error.field, path);
-    fl_exporter_destroy(exporter);
-    free(pixels);
-    assert_int_equal(count_files(folder), before);
 }

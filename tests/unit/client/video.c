@@ -112,12 +112,18 @@ static void write_frames(struct fl_video *video, uint32_t count, uint32_t width,
     }
 }
 
-static void write_video(const struct fl_video_options *options, uint32_t count, uint32_t width, uint32_t height)
+static struct fl_video *begin_video(const struct fl_video_options *options)
 {
     error = (struct fl_error){0};
     struct fl_video *video = fl_video_start(options, &error);
     if (!video)
         fail_msg("%s: %s", error.field, error.text);
+    return video;
+}
+
+static void write_video(const struct fl_video_options *options, uint32_t count, uint32_t width, uint32_t height)
+{
+    struct fl_video *video = begin_video(options);
     write_frames(video, count, width, height);
     if (!fl_video_finish(video, &error))
         fail_msg("%s: %s", error.field, error.text);
@@ -286,8 +292,7 @@ TEST(a_lossless_video_gives_every_pixel_back)
         const uint32_t width = sizes[i][0], height = sizes[i][1];
         struct ycbcr_converter converter;
         struct fl_video *video =
-            fl_video_start(&(struct fl_video_options){.path = path_of("a.mkv"), .lossless = true}, &error);
-        assert_non_null(video);
+            begin_video(&(struct fl_video_options){.path = path_of("a.mkv"), .lossless = true});
         assert_string_equal(fl_video_info(video)->encoder, "ffv1");
         struct fl_frame frames[2] = {make_frame(0, width, height), make_frame(1, width, height)};
         for (size_t at = 0; at < frames[1].pixels_bytes; at++) { /* alpha too: over black */
@@ -324,9 +329,7 @@ TEST(an_odd_picture_repeats_its_last_column_and_row)
 {
     const uint32_t width = 65, height = 33;
     need(true);
-    struct fl_video *video =
-        fl_video_start(&(struct fl_video_options){.path = path_of("a.mkv"), .quality = 1}, &error);
-    assert_non_null(video);
+    struct fl_video *video = begin_video(&(struct fl_video_options){.path = path_of("a.mkv"), .quality = 1});
     write_frames(video, 2, width, height);
     assert_true(fl_video_finish(video, &error));
     assert_int_equal(fl_video_info(video)->width, 66);
@@ -376,8 +379,7 @@ TEST(lower_quality_makes_smaller_files)
     need(false);
     for (unsigned quality = 10; quality <= 40; quality += 15) {
         struct fl_video *video =
-            fl_video_start(&(struct fl_video_options){.path = path_of("a.mp4"), .quality = quality}, &error);
-        assert_non_null(video);
+            begin_video(&(struct fl_video_options){.path = path_of("a.mp4"), .quality = quality});
         struct fl_frame frame = make_frame(0, 256, 256);
         uint32_t noise = 1;
         for (size_t i = 0; i < frame.pixels_bytes; i++) {
@@ -459,8 +461,7 @@ TEST(a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left)
                  "smaller"}};
     need(false);
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
-        struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = path_of("a.mp4")}, &error);
-        assert_non_null(video);
+        struct fl_video *video = begin_video(&(struct fl_video_options){.path = path_of("a.mp4")});
         if (rows[i].first[0] > 0)
             write_frames(video, 1, rows[i].first[0], rows[i].first[1]);
         struct fl_frame frame = {
@@ -486,8 +487,7 @@ TEST(a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left)
 TEST(a_video_without_frames_is_refused)
 {
     need(false);
-    struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = path_of("a.mkv")}, &error);
-    assert_non_null(video);
+    struct fl_video *video = begin_video(&(struct fl_video_options){.path = path_of("a.mkv")});
     assert_false(fl_video_finish(video, &error));
     assert_non_null(strstr(error.text, "a video needs at least one frame"));
     assert_non_null(strstr(error.remedy, "at least one"));
@@ -503,8 +503,7 @@ TEST(an_unfinished_video_leaves_nothing_and_keeps_the_old_file)
     assert_non_null(old);
     fputs("old", old);
     fclose(old);
-    struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = video_path}, &error);
-    assert_non_null(video);
+    struct fl_video *video = begin_video(&(struct fl_video_options){.path = video_path});
     write_frames(video, 3, 64, 64);
     assert_int_equal(count_files(), 2);
     fl_video_destroy(video);
@@ -535,8 +534,7 @@ TEST(a_killed_writer_is_reported_and_leaves_no_file)
     static const int numbers[] = {SIGTERM, SIGKILL};
     need(false);
     for (size_t i = 0; i < 2; i++) {
-        struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = path_of("a.mkv")}, &error);
-        assert_non_null(video);
+        struct fl_video *video = begin_video(&(struct fl_video_options){.path = path_of("a.mkv")});
         write_frames(video, 3, 64, 64);
         const pid_t child = find_child();
         if (child == 0) {
@@ -589,10 +587,8 @@ TEST(an_interrupted_video_can_be_finished_with_the_frames_so_far)
     uint32_t written = 0;
     need(true);
     assert_int_equal(pipe(interrupt), 0);
-    struct fl_video *video = fl_video_start(
-        &(struct fl_video_options){.path = path_of("a.mkv"), .lossless = true, .interrupt_fd = interrupt[0]},
-        &error);
-    assert_non_null(video);
+    struct fl_video *video = begin_video(
+        &(struct fl_video_options){.path = path_of("a.mkv"), .lossless = true, .interrupt_fd = interrupt[0]});
     const struct fl_frame frame = make_frame(0, 1024, 1024); /* far more than a socket holds */
     assert_true(fl_video_write(video, &frame, &error));
     assert_int_equal(write(interrupt[1], "x", 1), 1);

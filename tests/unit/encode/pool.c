@@ -33,30 +33,33 @@ static struct engine_frame *new_frame(enum encoding encoding, uint32_t number)
     return frame;
 }
 
-struct fixture {
+static struct fixture {
     struct queue *events;
     struct stage_totals totals;
     struct encode_pool *pool;
     struct job_output *output;
     struct encode_lane *lane;
-};
+} fixture;
 
-static void begin(struct fixture *fixture, unsigned threads)
+static void begin_with(unsigned threads)
 {
     struct error error = {0};
-    *fixture = (struct fixture){.events = queue_create(2 * FRAMES, false), .lane = encode_lane_create(30)};
-    fixture->pool = encode_pool_create(
-        &(struct encode_pool_options){.threads = threads, .totals = &fixture->totals, .on_done = on_done}, &error);
-    fixture->output = job_output_create(
-        &(struct job_output_options){.events = fixture->events, .window = 2 * FRAMES, .credit = UINT64_MAX});
-    assert_true(fixture->events && fixture->pool && fixture->output && fixture->lane);
+    fixture = (struct fixture){.events = queue_create(2 * FRAMES, false), .lane = encode_lane_create(30)};
+    fixture.pool = encode_pool_create(
+        &(struct encode_pool_options){.threads = threads, .totals = &fixture.totals, .on_done = on_done}, &error);
+    fixture.output = job_output_create(
+        &(struct job_output_options){.events = fixture.events, .window = 2 * FRAMES, .credit = UINT64_MAX});
+    assert_true(fixture.events && fixture.pool && fixture.output && fixture.lane);
 }
 
-static void submit(struct fixture *fixture, enum encoding encoding, uint32_t number)
+static void submit_to(struct encode_lane *lane, struct engine_frame *made)
 {
-    uint64_t position = job_output_reserve(fixture->output);
-    assert_true(
-        encode_pool_submit(fixture->pool, fixture->output, fixture->lane, position, new_frame(encoding, number)));
+    assert_true(encode_pool_submit(fixture.pool, fixture.output, lane, job_output_reserve(fixture.output), made));
+}
+
+static void submit(enum encoding encoding, uint32_t number)
+{
+    submit_to(fixture.lane, new_frame(encoding, number));
 }
 
 static void drop_event(void *item)
@@ -64,17 +67,37 @@ static void drop_event(void *item)
     engine_event_destroy(item);
 }
 
-static void end(struct fixture *fixture)
+static void end_all(void)
 {
-    encode_pool_destroy(fixture->pool);
-    encode_lane_unref(fixture->lane);
-    job_output_unref(fixture->output);
-    queue_destroy(fixture->events, drop_event);
+    encode_pool_destroy(fixture.pool);
+    encode_lane_unref(fixture.lane);
+    job_output_unref(fixture.output);
+    queue_destroy(fixture.events, drop_event);
 }
 
-static struct engine_event *next(struct fixture *fixture)
+static int begin(void **state)
 {
-    struct engine_event *event = queue_pop(fixture->events, 10000000000);
+    (void)state;
+    begin_with(2);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    end_all();
+    return 0;
+}
+
+static void use_threads(unsigned threads)
+{
+    end_all();
+    begin_with(threads);
+}
+
+static struct engine_event *next(void)
+{
+    struct engine_event *event = queue_pop(fixture.events, 10000000000);
     assert_non_null(event);
     if (event->kind != ENGINE_FRAME)
         fail_msg("%s", event->error.text);
@@ -82,16 +105,16 @@ static struct engine_event *next(struct fixture *fixture)
 }
 
 ALL_TESTS(skip_without_h264, NULL)
+EACH_TEST(begin, end)
 
 TEST(a_stream_is_encoded_in_order_by_however_many_threads)
 {
-    struct fixture fixture;
     struct player player = player_begin();
-    begin(&fixture, 8);
+    use_threads(8);
     for (uint32_t i = 0; i < FRAMES; i++)
-        submit(&fixture, ENCODING_H264, i);
+        submit(ENCODING_H264, i);
     for (uint32_t i = 0; i < FRAMES; i++) {
-        struct engine_event *event = next(&fixture);
+        struct engine_event *event = next();
         const struct engine_frame *frame = event->frame;
         assert_int_equal(frame->frame, i);
         assert_int_equal(frame->key_frame, i == 0);
@@ -103,29 +126,23 @@ TEST(a_stream_is_encoded_in_order_by_however_many_threads)
         engine_event_destroy(event);
     }
     player_end(&player);
-    end(&fixture);
 }
 
 TEST(frames_that_stand_alone_do_not_wait_for_the_stream)
 {
-    struct fixture fixture;
-    begin(&fixture, 2);
     for (uint32_t i = 0; i < FRAMES; i++)
-        submit(&fixture, i % 2 ? ENCODING_PREDICTED : ENCODING_H264, i);
+        submit(i % 2 ? ENCODING_PREDICTED : ENCODING_H264, i);
     for (uint32_t i = 0; i < FRAMES; i++) {
-        struct engine_event *event = next(&fixture);
+        struct engine_event *event = next();
         assert_int_equal(event->frame->frame, i);
         assert_int_equal(event->frame->key_frame, i == 0 || i % 2);
         assert_int_equal(event->frame->quality, i % 2 ? 0 : 90);
         engine_event_destroy(event);
     }
-    end(&fixture);
 }
 
 TEST(what_is_attached_lies_behind_the_picture)
 {
-    struct fixture fixture;
-    begin(&fixture, 2);
     for (uint32_t attachments = 0; attachments <= 7; attachments++) {
         struct engine_frame *made = new_frame(attachments % 2 ? ENCODING_H264 : ENCODING_RAW, attachments);
         const size_t plane_bytes = (size_t)4 * WIDTH * HEIGHT;
@@ -133,9 +150,8 @@ TEST(what_is_attached_lies_behind_the_picture)
         made->result.pixels = realloc(made->result.pixels, 4 * plane_bytes);
         assert_non_null(made->result.pixels);
         memset(made->result.pixels + plane_bytes, 3, 3 * plane_bytes);
-        uint64_t position = job_output_reserve(fixture.output);
-        assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
-        struct engine_event *event = next(&fixture);
+        submit_to(fixture.lane, made);
+        struct engine_event *event = next();
         const struct engine_frame *frame = event->frame;
         assert_int_equal(frame->depth_bytes > 0, (attachments & 1u << ATTACHMENT_DEPTH) != 0);
         assert_int_equal(frame->normal_bytes > 0, (attachments & 1u << ATTACHMENT_NORMALS) != 0);
@@ -155,7 +171,6 @@ TEST(what_is_attached_lies_behind_the_picture)
             assert_memory_equal(behind + frame->depth_bytes + frame->normal_bytes, magic, sizeof(magic));
         engine_event_destroy(event);
     }
-    end(&fixture);
 }
 
 static float depth_of(size_t pixel)
@@ -184,13 +199,10 @@ TEST(inverse_depths_keep_the_bound_that_was_asked_for)
         float fov_y, nearest;
         bool is_inverse;
     } cases[] = {{1.0f, 0.4f, true}, {0.0f, 0.4f, false}, {1.0f, 1e-5f, false}};
-    struct fixture fixture;
-    begin(&fixture, 2);
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct engine_frame *made = frame_with_depth(cases[i].fov_y, cases[i].nearest);
-        uint64_t position = job_output_reserve(fixture.output);
-        assert_true(encode_pool_submit(fixture.pool, fixture.output, NULL, position, made));
-        struct engine_event *event = next(&fixture);
+        submit_to(NULL, made);
+        struct engine_event *event = next();
         const struct engine_frame *frame = event->frame;
         assert_int_equal(frame->depth_step > 0.0f, cases[i].is_inverse);
         if (cases[i].is_inverse) {
@@ -210,15 +222,12 @@ TEST(inverse_depths_keep_the_bound_that_was_asked_for)
         }
         engine_event_destroy(event);
     }
-    end(&fixture);
 }
 
 /* Other planes than an encoder takes are an error of that frame. */
 TEST(planes_come_to_the_encoder_as_they_are)
 {
-    struct fixture fixture;
     struct player player = player_begin();
-    begin(&fixture, 2);
     struct engine_frame *made = new_frame(ENCODING_H264, 0);
     const size_t row_bytes = ycbcr_row_bytes(WIDTH), luma_bytes = ycbcr_luma_bytes(WIDTH);
     made->result.ycbcr = YCBCR_VIDEO;
@@ -227,9 +236,8 @@ TEST(planes_come_to_the_encoder_as_they_are)
         memset(made->result.pixels + y * row_bytes, 80, luma_bytes);
         memset(made->result.pixels + y * row_bytes + luma_bytes, y % 2 ? 170 : 100, luma_bytes / 2);
     }
-    uint64_t position = job_output_reserve(fixture.output);
-    assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
-    struct engine_event *event = next(&fixture);
+    submit_to(fixture.lane, made);
+    struct engine_event *event = next();
     assert_true(play(&player, event->frame->bytes, event->frame->size_bytes));
     assert_in_range(player.frame->data[0][0], 79, 81);
     assert_in_range(player.frame->data[1][0], 99, 101);
@@ -237,35 +245,28 @@ TEST(planes_come_to_the_encoder_as_they_are)
     engine_event_destroy(event);
     made = new_frame(ENCODING_RAW, 1);
     made->result.ycbcr = YCBCR_VIDEO;
-    position = job_output_reserve(fixture.output);
-    assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
+    submit_to(fixture.lane, made);
     event = queue_pop(fixture.events, 10000000000);
     assert_non_null(event);
     assert_int_equal(event->kind, ENGINE_FAILED);
     assert_int_equal(event->error.kind, ERROR_UNSUPPORTED);
     engine_event_destroy(event);
     player_end(&player);
-    end(&fixture);
 }
 
 /* What is left over, under the address sanitizer. */
 TEST(a_pool_that_ends_drops_what_waits_in_a_lane)
 {
-    struct fixture fixture;
-    begin(&fixture, 1);
+    use_threads(1);
     for (uint32_t i = 0; i < FRAMES; i++)
-        submit(&fixture, ENCODING_H264, i);
-    end(&fixture);
+        submit(ENCODING_H264, i);
 }
 
 TEST(frames_of_a_closed_output_are_not_encoded)
 {
-    struct fixture fixture;
-    begin(&fixture, 2);
     job_output_close(fixture.output, NULL);
     for (uint32_t i = 0; i < FRAMES; i++)
-        submit(&fixture, ENCODING_H264, i);
-    end(&fixture);
+        submit(ENCODING_H264, i);
 }
 
 /* Coarse depths come beside those of the picture, which is as long as it was. */
@@ -273,14 +274,11 @@ TEST(a_frame_in_parts_has_first_colours_and_coarse_depth_first)
 {
     static const enum frame_part_kind order[] = {FRAME_PART_COLOURS, FRAME_PART_COARSE_DEPTH, FRAME_PART_COLOURS,
                                                  FRAME_PART_DEPTH, FRAME_PART_COLOURS};
-    struct fixture fixture;
-    begin(&fixture, 2);
     struct engine_frame *made = frame_with_depth(1.0f, 0.4f);
     made->encoding = ENCODING_JPEG;
     made->in_parts = true;
-    uint64_t position = job_output_reserve(fixture.output);
-    assert_true(encode_pool_submit(fixture.pool, fixture.output, NULL, position, made));
-    struct engine_event *event = next(&fixture);
+    submit_to(NULL, made);
+    struct engine_event *event = next();
     const struct engine_frame *frame = event->frame;
     size_t sums[FRAME_PART_COUNT] = {0}, bytes = 0;
     assert_int_equal(frame->parts.count, sizeof(order) / sizeof(order[0]));
@@ -298,21 +296,16 @@ TEST(a_frame_in_parts_has_first_colours_and_coarse_depth_first)
     assert_int_equal(parts_end(&frame->parts, needed), needed);
     assert_int_equal(parts_end(&frame->parts, needed + 1), needed + frame->parts.parts[2].bytes);
     engine_event_destroy(event);
-    end(&fixture);
 }
 
 /* What cannot be cut comes as it ever did. */
 TEST(a_frame_of_one_part_is_in_no_parts)
 {
-    struct fixture fixture;
-    begin(&fixture, 2);
     struct engine_frame *made = new_frame(ENCODING_RAW, 7);
     made->in_parts = true;
-    uint64_t position = job_output_reserve(fixture.output);
-    assert_true(encode_pool_submit(fixture.pool, fixture.output, NULL, position, made));
-    struct engine_event *event = next(&fixture);
+    submit_to(NULL, made);
+    struct engine_event *event = next();
     assert_int_equal(event->frame->parts.count, 0);
     assert_int_equal(event->frame->bytes[5], 40 + 4 * 7);
     engine_event_destroy(event);
-    end(&fixture);
 }

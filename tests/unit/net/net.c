@@ -426,6 +426,13 @@ static void queue_end(struct queue_scene *scene)
     assert_int_equal(released, 1);
 }
 
+static void expect_nothing_queued(const struct out_queue *queue)
+{
+    assert_int_equal(queue->queued_bytes, 0);
+    assert_int_equal(queue->queued_bulk_bytes, 0);
+    assert_int_equal(queue->sending_bytes, 0);
+}
+
 static void push(struct out_queue *queue, const char *head, uint32_t request, struct out_chunk *body, bool bulk)
 {
     struct out_message *message = out_message_create(strlen(head));
@@ -498,9 +505,7 @@ TEST(what_is_dropped_is_not_sent_but_what_was_begun_is_finished)
     drain(&scene.queue, 100, text);
     assert_string_equal(text, "cd..B3bcd..C1");
     assert_int_equal(sent_calls, 1);
-    assert_int_equal(scene.queue.queued_bytes, 0);
-    assert_int_equal(scene.queue.queued_bulk_bytes, 0);
-    assert_int_equal(scene.queue.sending_bytes, 0);
+    expect_nothing_queued(&scene.queue);
     push(&scene.queue, "B4", 8, &scene.body, true);
     queue_end(&scene);
 }
@@ -523,9 +528,7 @@ TEST(a_begun_item_is_sent_and_reported_when_the_rest_is_dropped)
     drain(&scene.queue, 100, text);
     assert_string_equal(text, "cd..O1bcd..C1");
     assert_int_equal(sent_calls, 2); /* B1 and O1 */
-    assert_int_equal(scene.queue.queued_bytes, 0);
-    assert_int_equal(scene.queue.sending_bytes, 0);
-    assert_int_equal(scene.queue.queued_bulk_bytes, 0);
+    expect_nothing_queued(&scene.queue);
     queue_end(&scene);
 }
 
@@ -557,9 +560,7 @@ TEST(copied_bytes_count_as_begun_and_not_as_sent)
     drain(&scene.queue, 100, text);
     assert_string_equal(text, "bcd..C1");
     assert_int_equal(sent_calls, 0); /* of a request that was dropped */
-    assert_int_equal(scene.queue.queued_bytes, 0);
-    assert_int_equal(scene.queue.sending_bytes, 0);
-    assert_int_equal(scene.queue.queued_bulk_bytes, 0);
+    expect_nothing_queued(&scene.queue);
     queue_end(&scene);
 }
 

@@ -32,10 +32,12 @@ static inline void *run(void *context)
     return NULL;
 }
 
-/* What a test may change before it starts the daemon. */
-static inline struct hub_options usual_options(void)
+static struct hub_options options; /* which a test may change before it starts the daemon */
+
+static inline int set_options(void **state)
 {
-    return (struct hub_options){
+    (void)state;
+    options = (struct hub_options){
         .limits = {.clients = 16,
                    .unauthenticated = 16,
                    .unauthenticated_per_address = 16,
@@ -67,11 +69,12 @@ static inline struct hub_options usual_options(void)
                               .queued_hard_bytes = 64 << 20},
         .engine_limits = {.scene_linger_ms = 600000},
     };
+    daemon_block_signals();
+    return 0;
 }
 
-static inline void start_daemon(const struct hub_options *wanted)
+static inline void start_daemon(void)
 {
-    struct hub_options options = *wanted;
     struct error error = {0};
     start((struct engine_options){.limits = options.engine_limits});
     options.engine = engine_port(engine);
@@ -82,13 +85,6 @@ static inline void start_daemon(const struct hub_options *wanted)
     assert_true(daemon_listen(&served.daemon, served.address, false, &error));
     assert_true(daemon_start(&served.daemon, &options, &error));
     assert_int_equal(pthread_create(&served.thread, NULL, run, NULL), 0);
-}
-
-static inline int block_signals(void **state)
-{
-    (void)state;
-    daemon_block_signals();
-    return 0;
 }
 
 /* ---- clients ----------------------------------------------------------------------------------------- */

@@ -60,12 +60,11 @@ static void expect_picture(struct client *client, uint32_t request)
 
 /* ---- what is told ------------------------------------------------------------------------------------ */
 
-ALL_TESTS(block_signals, NULL)
-EACH_TEST(NULL, tear_down)
+EACH_TEST(set_options, tear_down)
 
 TEST(every_limit_is_stated_in_the_handshake)
 {
-    struct hub_options options = {
+    options = (struct hub_options){
         .limits = {.clients = 101,
                    .unauthenticated = 102,
                    .unauthenticated_per_address = 103,
@@ -138,7 +137,7 @@ TEST(every_limit_is_stated_in_the_handshake)
         .scenes_lingering = 134,
         .ldc_layers_max = 116,
     };
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false);
     struct handshake_limit told, wanted;
     for (size_t i = 0; handshake_limit_at(&expected, i, &wanted); i++) {
@@ -150,10 +149,9 @@ TEST(every_limit_is_stated_in_the_handshake)
 
 TEST(times_below_a_second_are_not_stated_as_none)
 {
-    struct hub_options options = usual_options();
     options.connection_limits.idle_ms = 900;
     options.engine_limits.scene_linger_ms = 0;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false);
     assert_int_equal(client->limits.idle_seconds, 1);
     assert_int_equal(client->limits.scene_linger_seconds, 0);
@@ -174,9 +172,8 @@ static void expect_refused(struct client *client, const char *why)
 
 TEST(one_client_too_many_is_refused_and_may_connect_later)
 {
-    struct hub_options options = usual_options();
     options.limits.clients = 2;
-    start_daemon(&options);
+    start_daemon();
     struct client *one = come(true), *other = come(true);
     expect_refused(knock(true), "2 clients are connected");
     expect_alive(one, 900);
@@ -188,9 +185,8 @@ TEST(one_client_too_many_is_refused_and_may_connect_later)
 
 TEST(the_daemons_own_user_finds_a_place_where_others_do_not)
 {
-    struct hub_options options = usual_options();
     options.limits.clients = 1;
-    start_daemon(&options);
+    start_daemon();
     struct client *stranger = come(true);
     for (int i = 0; i < 4; i++)
         come(false); /* by the Unix socket, which tells the user */
@@ -201,10 +197,9 @@ TEST(the_daemons_own_user_finds_a_place_where_others_do_not)
 
 TEST(one_user_leaves_places_for_others)
 {
-    struct hub_options options = usual_options();
     options.limits.clients = 8;
     options.limits.share_percent = 50;
-    start_daemon(&options);
+    start_daemon();
     for (int i = 0; i < 4; i++)
         come(true);
     expect_refused(knock(true), "4 of 8 places");
@@ -217,10 +212,9 @@ TEST(one_user_leaves_places_for_others)
  * come again, and none of another. */
 TEST(silent_connections_keep_no_one_out)
 {
-    struct hub_options options = usual_options();
     options.limits.unauthenticated = 8;
     options.limits.unauthenticated_per_address = 64;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *silent[32];
     for (int i = 0; i < 32; i++)
         silent[i] = knock(true);
@@ -250,10 +244,9 @@ static void begin_with_node(struct client *client, uint32_t request)
 
 TEST(edits_of_one_user_leave_memory_for_those_of_others)
 {
-    struct hub_options options = usual_options();
     options.limits.transaction_bytes = 3 * 32 * sizeof(struct scene_edit);
     options.limits.share_percent = 70; /* two of the three */
-    start_daemon(&options);
+    start_daemon();
     struct client *one = come(true), *two = come(true), *other = come(false);
     open_scene_as(one, 1, "", PROTOCOL_SHARING_PRIVATE);
     open_scene_as(two, 1, "", PROTOCOL_SHARING_PRIVATE);
@@ -278,10 +271,9 @@ TEST(edits_of_one_user_leave_memory_for_those_of_others)
 
 TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
 {
-    struct hub_options options = usual_options();
     options.connection_limits.progress_grace_ms = 200;
     options.connection_limits.progress_bytes_per_s = 300;
-    start_daemon(&options);
+    start_daemon();
     static uint8_t data[SLOW_BYTES], bytes[FRAMING_MESSAGE_MAX_BYTES];
     struct record_blob_ref reference = reference_to(data, sizeof(data));
     struct client *within = come(false), *slower = come(false);
@@ -315,11 +307,10 @@ TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
 
 TEST(a_client_with_too_much_unread_output_is_disconnected_at_once)
 {
-    struct hub_options options = usual_options();
     options.connection_limits.queued_hard_bytes = 64 << 10;
     options.connection_limits.queued_soft_bytes = 1 << 30; /* which would have it wait to read more */
     options.connection_limits.queued_soft_ms = 600000;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *within = come(false);
     struct message message = made(MESSAGE_PING);
     for (uint32_t request = 1; request <= 500; request++)
@@ -344,9 +335,8 @@ TEST(a_client_with_too_much_unread_output_is_disconnected_at_once)
 
 TEST(nodes_of_a_scene_are_limited)
 {
-    struct hub_options options = usual_options();
     options.engine_limits.scene.nodes = 3;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
     begin_edit(client, 1, 1);
@@ -365,9 +355,8 @@ TEST(nodes_of_a_scene_are_limited)
 
 TEST(the_depth_of_a_hierarchy_is_limited)
 {
-    struct hub_options options = usual_options();
     options.engine_limits.scene.depth = options.limits.depth = 3;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     assert_int_equal(client->limits.depth_max, 3);
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
@@ -392,9 +381,8 @@ TEST(the_depth_of_a_hierarchy_is_limited)
 
 TEST(memory_of_a_scene_is_limited)
 {
-    struct hub_options options = usual_options();
     options.engine_limits.scene.host_bytes = 20000; /* one set of 16,000 bytes, not two */
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     static float spheres[4 * SPHERES];
     for (size_t i = 0; i < sizeof(spheres) / sizeof(spheres[0]); i++)
@@ -435,8 +423,7 @@ static void send_texture(struct client *client, uint32_t request, uint32_t width
 
 TEST(edges_of_images_are_limited)
 {
-    struct hub_options options = usual_options();
-    start_daemon(&options); /* 64 */
+    start_daemon(); /* 64 */
     struct client *client = come(false), *other = come(true);
     static uint8_t texels[64 * 64 * 4];
     struct record_blob_ref reference = reference_to(texels, sizeof(texels));
@@ -464,9 +451,8 @@ TEST(edges_of_images_are_limited)
 
 TEST(blobs_of_a_connection_are_limited)
 {
-    struct hub_options options = usual_options();
     options.limits.blobs_per_client = 3;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     uint8_t data[4] = {0};
     for (uint8_t i = 1; i <= 3; i++) {
@@ -488,9 +474,8 @@ TEST(blobs_of_a_connection_are_limited)
 
 TEST(upload_credit_limits_what_is_sent_ahead)
 {
-    struct hub_options options = usual_options();
     options.limits.upload_window_bytes = 1000; /* less than one message may have */
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(true);
     static uint8_t data[2500];
     struct record_blob_ref all = reference_to(data, 1000), more = reference_to(data, 1001);
@@ -511,11 +496,10 @@ TEST(upload_credit_limits_what_is_sent_ahead)
 
 TEST(pixels_and_samples_of_a_picture_are_limited)
 {
-    struct hub_options options = usual_options();
     options.limits.width_pixels = 100;
     options.limits.height_pixels = 50;
     options.limits.samples = 16;
-    start_daemon(&options);
+    start_daemon();
     static const struct {
         uint32_t width, height, samples;
         const char *field;
@@ -538,9 +522,8 @@ TEST(pixels_and_samples_of_a_picture_are_limited)
 
 TEST(frames_that_wait_for_a_slow_reader_are_limited)
 {
-    struct hub_options options = usual_options();
     options.limits.frame_window_bytes = 2 << 20;
-    start_daemon(&options);
+    start_daemon();
     struct client *client = come(false), *other = come(false);
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
     struct message message = render_message(512, 512, 1); /* 1 MiB, more than the socket takes */

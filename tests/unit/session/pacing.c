@@ -95,48 +95,33 @@ static struct tally run(struct pacing *pacing, struct link *link, uint64_t begin
 
 /* ---- when frames go -------------------------------------------------------------------------------- */
 
-TEST(waits_for_nothing_on_a_link_that_carries_all)
+/* 7 Mbit/s on 100 wait for nothing but one round trip with the first, which nothing is known for; 6.2 on 10, of
+ * which a frame takes 21 ms and 50 of the way, have three in flight; and twice what a link carries keeps the line
+ * as short as the rule says, after five minutes as at first: in flight are at most the bytes of a frame time and a
+ * round trip, and a fifth of a frame, as sizes are known only when they are sent. */
+TEST(a_link_is_used_and_its_line_kept_short)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
-    struct link link = link_of(100, 10 * MS);
-    uint32_t frame = 0;
-    struct tally tally = run(&pacing, &link, 0, 10 * S, 30000, &frame);
-    /* 7 Mbit/s on 100: all but the first, which nothing is known for and which one round trip is waited for. */
-    assert_in_range(tally.frames, 298, 300);
-}
-
-TEST(keeps_the_line_as_short_as_the_rule_says)
-{
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
-    struct link link = link_of(10, 50 * MS);
-    uint32_t frame = 0;
-    /* Twice what the link carries, for five minutes. */
-    run(&pacing, &link, 0, 2 * S, 83000, &frame);
-    struct tally first = run(&pacing, &link, 2 * S, 32 * S, 83000, &frame);
-    run(&pacing, &link, 32 * S, 272 * S, 83000, &frame);
-    struct tally last = run(&pacing, &link, 272 * S, 302 * S, 83000, &frame);
-    /* In flight are at most the bytes of a frame time and a round trip; those in the line are fewer by what is on
-     * the way there and back. A fifth above: sizes of frames are known only when they are sent. */
-    double max_ns = (double)FRAME_NS + 50.0 * MS + 0.2 * 83000 / link.bytes_per_ns;
-    assert_true(first.longest_line_ns < max_ns);
-    assert_true(last.longest_line_ns < max_ns);
-    /* The link is not left idle: a frame of this size takes 66 ms, and the next goes before it is acknowledged. */
-    assert_true((double)last.bytes > 0.5 * 30e9 * link.bytes_per_ns);
-    assert_true(last.frames >= first.frames - 2);
-}
-
-TEST(uses_the_link_where_frames_are_small_beside_it)
-{
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
-    struct link link = link_of(10, 50 * MS);
-    uint32_t frame = 0;
-    /* 6.2 Mbit/s at 30 frames a second. A frame takes 21 ms of the link and 50 of the way: three are in flight. */
-    run(&pacing, &link, 0, 2 * S, 26000, &frame);
-    struct tally tally = run(&pacing, &link, 2 * S, 32 * S, 26000, &frame);
-    assert_in_range(tally.frames, 30 * 30 * 95 / 100, 30 * 30);
+    static const struct {
+        double megabits;
+        uint64_t round_trip_ms, bytes;
+        uint32_t frames_min, frames_max; /* of 30 seconds at 30 a second */
+    } rows[] = {{100, 10, 30000, 897, 900}, {10, 50, 26000, 900 * 95 / 100, 900}, {10, 50, 83000, 230, 460}};
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct pacing pacing;
+        pacing_init(&pacing, FRAME_NS);
+        struct link link = link_of(rows[i].megabits, rows[i].round_trip_ms * MS);
+        uint32_t frame = 0;
+        run(&pacing, &link, 0, 2 * S, rows[i].bytes, &frame);
+        const struct tally first = run(&pacing, &link, 2 * S, 32 * S, rows[i].bytes, &frame);
+        run(&pacing, &link, 32 * S, 272 * S, rows[i].bytes, &frame);
+        const struct tally last = run(&pacing, &link, 272 * S, 302 * S, rows[i].bytes, &frame);
+        const double max_ns = (double)FRAME_NS + (double)(rows[i].round_trip_ms * MS) +
+                              0.2 * (double)rows[i].bytes / link.bytes_per_ns;
+        assert_true(first.longest_line_ns < max_ns && last.longest_line_ns < max_ns);
+        assert_in_range(first.frames, rows[i].frames_min, rows[i].frames_max);
+        assert_in_range(last.frames, rows[i].frames_min, rows[i].frames_max);
+        assert_true(last.frames + 2 >= first.frames);
+    }
 }
 
 static uint64_t rate_learned(bool tells_begin, struct pacing *pacing, uint64_t *true_rate)

@@ -10,27 +10,24 @@ static const float sphere[SPHERE_FLOATS] = {1, 2, 3, 0.5f};
 
 static int set_up(void **state)
 {
-    (void)state;
-    struct hub_options options = usual_options();
-    start_daemon(&options);
+    set_options(state);
+    start_daemon();
     return 0;
 }
 
 static int set_up_for_readers(void **state)
 {
-    (void)state;
-    struct hub_options options = usual_options();
+    set_options(state);
     options.readers = (struct readers){{(uint32_t)getuid()}, 1};
-    start_daemon(&options);
+    start_daemon();
     return 0;
 }
 
 static int set_up_with_few_blobs(void **state)
 {
-    (void)state;
-    struct hub_options options = usual_options();
+    set_options(state);
     options.limits.blob_bytes = 300000;
-    start_daemon(&options);
+    start_daemon();
     return 0;
 }
 
@@ -85,7 +82,6 @@ static void commit_sphere(struct client *client, uint32_t scene)
 
 /* ---- sharing ----------------------------------------------------------------------------------------- */
 
-ALL_TESTS(block_signals, NULL)
 EACH_TEST(set_up, tear_down)
 
 TEST(an_edit_by_one_appears_to_the_other)

@@ -17,6 +17,23 @@
 #define PATH_BYTES 512
 
 static char folder[PATH_BYTES], store_folder[PATH_BYTES + 8];
+static struct store *store; /* open, with LIMIT_BYTES */
+
+static void close_store(void)
+{
+    store_close(store);
+    store = NULL;
+}
+
+/* Again, as the next process does. */
+static void open_store(uint64_t limit_bytes)
+{
+    struct error error = {0};
+    close_store();
+    store = store_open(store_folder, limit_bytes, &error);
+    if (!store)
+        fail_msg("%s: %s", error.field, error.text);
+}
 
 static int make_folder(void **state)
 {
@@ -25,6 +42,7 @@ static int make_folder(void **state)
     snprintf(folder, sizeof(folder), "/tmp/farlight-store-XXXXXX");
     assert_non_null(mkdtemp(folder));
     snprintf(store_folder, sizeof(store_folder), "%s/store", folder);
+    open_store(LIMIT_BYTES);
     return 0;
 }
 
@@ -32,20 +50,12 @@ static int remove_folder(void **state)
 {
     (void)state;
     char command[PATH_BYTES + 16];
+    close_store();
     snprintf(command, sizeof(command), "rm -r %s", folder);
     assert_int_equal(system(command), 0);
     return 0;
 }
 EACH_TEST(make_folder, remove_folder)
-
-static struct store *open_store(uint64_t limit_bytes)
-{
-    struct error error = {0};
-    struct store *store = store_open(store_folder, limit_bytes, &error);
-    if (!store)
-        fail_msg("%s: %s", error.field, error.text);
-    return store;
-}
 
 static struct blob *blob_of(uint8_t fill, size_t size_bytes)
 {
@@ -57,8 +67,7 @@ static struct blob *blob_of(uint8_t fill, size_t size_bytes)
 }
 
 /* A record that consists of its name and names one blob, or none where `fill` is 0. */
-static bool put(struct store *store, uint8_t name, uint64_t owner, uint8_t fill, size_t size_bytes,
-                struct error *error)
+static bool put(uint8_t name, uint64_t owner, uint8_t fill, size_t size_bytes, struct error *error)
 {
     uint8_t content[] = {name, 1, 2, 3};
     struct blob *blobs[2];
@@ -75,15 +84,15 @@ static bool put(struct store *store, uint8_t name, uint64_t owner, uint8_t fill,
     return done;
 }
 
-static void expect_put(struct store *store, uint8_t name, uint64_t owner, uint8_t fill, size_t size_bytes)
+static void expect_put(uint8_t name, uint64_t owner, uint8_t fill, size_t size_bytes)
 {
     struct error error = {0};
-    if (!put(store, name, owner, fill, size_bytes, &error))
+    if (!put(name, owner, fill, size_bytes, &error))
         fail_msg("%s", error.text);
 }
 
 /* The names of the records, each as its first byte, in order. */
-static void expect_names(struct store *store, const char *expected)
+static void expect_names(const char *expected)
 {
     size_t count;
     uint8_t(*names)[STORE_NAME_BYTES] = store_names(store, &count);
@@ -134,7 +143,7 @@ static void change_byte(const char *path, int at)
     assert_int_equal(fclose(file), 0);
 }
 
-static bool try_record(struct store *store, uint8_t name, struct store_record *record)
+static bool try_record(uint8_t name, struct store_record *record)
 {
     uint8_t bytes[STORE_NAME_BYTES];
     struct error error = {0};
@@ -144,13 +153,11 @@ static bool try_record(struct store *store, uint8_t name, struct store_record *r
 
 TEST(a_record_and_its_blobs_come_back_in_another_process)
 {
-    struct store *store = open_store(LIMIT_BYTES);
-    expect_put(store, 'a', 7, 1, 1000);
-    store_close(store);
-    store = open_store(LIMIT_BYTES);
-    expect_names(store, "a");
+    expect_put('a', 7, 1, 1000);
+    open_store(LIMIT_BYTES);
+    expect_names("a");
     struct store_record record;
-    assert_true(try_record(store, 'a', &record));
+    assert_true(try_record('a', &record));
     assert_int_equal(record.owner, 7);
     assert_int_equal(record.content_bytes, 4);
     assert_memory_equal(record.content, "a\1\2\3", 4);
@@ -163,46 +170,41 @@ TEST(a_record_and_its_blobs_come_back_in_another_process)
     blob_unref(read);
     assert_null(store_read_blob(store, expected->hash, 999, &error));
     blob_unref(expected);
-    store_close(store);
 }
 
 TEST(blobs_go_with_the_last_record_that_names_them)
 {
-    struct store *store = open_store(LIMIT_BYTES);
     const uint8_t a[STORE_NAME_BYTES] = "aaaaaaaaaaaaaaaa", b[STORE_NAME_BYTES] = "bbbbbbbbbbbbbbbb";
-    expect_put(store, 'a', 1, 1, 1000);
-    expect_put(store, 'b', 1, 1, 1000);
+    expect_put('a', 1, 1, 1000);
+    expect_put('b', 1, 1, 1000);
     assert_int_equal(count_files("blobs"), 1);
     store_remove(store, a);
     assert_int_equal(count_files("blobs"), 1);
-    expect_put(store, 'b', 1, 2, 2000); /* replaced, and with it the blob */
+    expect_put('b', 1, 2, 2000); /* replaced, and with it the blob */
     assert_int_equal(count_files("blobs"), 1);
     assert_int_equal(count_files("scenes"), 1);
     store_remove(store, b);
     assert_int_equal(count_files("blobs"), 0);
     assert_int_equal(count_files("scenes"), 0);
-    store_close(store);
 }
 
 TEST(who_has_most_gives_way_with_what_was_written_first)
 {
-    struct store *store = open_store(100000);
-    expect_put(store, 'a', 1, 1, 20000);
-    expect_put(store, 'b', 2, 2, 20000);
-    expect_put(store, 'c', 2, 3, 20000);
-    expect_put(store, 'd', 2, 4, 20000);
-    expect_put(store, 'e', 1, 5, 30000);
-    expect_names(store, "acde");
+    open_store(100000);
+    expect_put('a', 1, 1, 20000);
+    expect_put('b', 2, 2, 20000);
+    expect_put('c', 2, 3, 20000);
+    expect_put('d', 2, 4, 20000);
+    expect_put('e', 1, 5, 30000);
+    expect_names("acde");
     /* What alone is too much evicts nobody; its predecessor is not true any more. */
     struct error error = {0};
-    assert_false(put(store, 'c', 2, 6, 100000, &error));
+    assert_false(put('c', 2, 6, 100000, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
-    expect_names(store, "ade");
+    expect_names("ade");
     assert_int_equal(count_files("blobs"), 3);
-    store_close(store);
-    store = open_store(60000); /* less from now on */
-    expect_names(store, "de");
-    store_close(store);
+    open_store(60000); /* less from now on */
+    expect_names("de");
 }
 
 TEST(what_was_tampered_with_is_removed)
@@ -210,36 +212,32 @@ TEST(what_was_tampered_with_is_removed)
     static const int places[] = {3, 20, 60, -1, -30};
     for (size_t i = 0; i < sizeof(places) / sizeof(places[0]); i++) {
         char path[PATH_BYTES * 2];
-        struct store *store = open_store(LIMIT_BYTES);
-        expect_put(store, 'a', 1, 1, 1000);
-        store_close(store);
+        expect_put('a', 1, 1, 1000);
+        close_store();
         path_of_first("scenes", path);
         change_byte(path, places[i]);
-        store = open_store(LIMIT_BYTES);
-        expect_names(store, "");
+        open_store(LIMIT_BYTES);
+        expect_names("");
         assert_int_equal(count_files("scenes"), 0);
         assert_int_equal(count_files("blobs"), 0);
-        store_close(store);
     }
 }
 
 TEST(a_blob_that_was_tampered_with_is_not_read)
 {
     char path[PATH_BYTES * 2];
-    struct store *store = open_store(LIMIT_BYTES);
-    expect_put(store, 'a', 1, 1, 1000);
+    expect_put('a', 1, 1, 1000);
     path_of_first("blobs", path);
     change_byte(path, 0);
     struct blob *blob = blob_of(1, 1000);
     struct error error = {0};
     assert_null(store_read_blob(store, blob->hash, 1000, &error));
     assert_int_equal(error.kind, ERROR_HASH_MISMATCH);
-    store_close(store);
+    close_store();
     assert_int_equal(truncate(path, 500), 0); /* nor is its record found */
-    store = open_store(LIMIT_BYTES);
-    expect_names(store, "");
+    open_store(LIMIT_BYTES);
+    expect_names("");
     blob_unref(blob);
-    store_close(store);
 }
 
 static void write_file(const char *name)
@@ -255,9 +253,8 @@ static void write_file(const char *name)
 TEST(files_that_are_no_records_are_removed_and_links_not_followed)
 {
     char path[PATH_BYTES * 2], link_path[PATH_BYTES * 2];
-    struct store *store = open_store(LIMIT_BYTES);
-    expect_put(store, 'a', 1, 1, 1000);
-    store_close(store);
+    expect_put('a', 1, 1, 1000);
+    close_store();
     path_of_first("scenes", path); /* which would be valid under another name, too */
     snprintf(link_path, sizeof(link_path), "%s/scenes/ffffffffffffffffffffffffffffffff", store_folder);
     assert_int_equal(symlink(path, link_path), 0);
@@ -265,38 +262,33 @@ TEST(files_that_are_no_records_are_removed_and_links_not_followed)
     write_file("scenes/0123456789abcdef0123456789abcdef.new");
     write_file("scenes/-");
     write_file("blobs/x");
-    store = open_store(LIMIT_BYTES);
-    expect_names(store, "a");
+    open_store(LIMIT_BYTES);
+    expect_names("a");
     assert_int_equal(count_files("scenes"), 1);
     assert_int_equal(count_files("blobs"), 1);
-    store_close(store);
 }
 
 TEST(a_record_on_which_the_process_ended_is_left_out)
 {
-    struct store *store = open_store(LIMIT_BYTES);
     const uint8_t b[STORE_NAME_BYTES] = "bbbbbbbbbbbbbbbb";
     struct store_record record;
-    expect_put(store, 'a', 1, 1, 1000);
-    expect_put(store, 'b', 1, 2, 1000);
-    assert_true(try_record(store, 'b', &record));
+    expect_put('a', 1, 1, 1000);
+    expect_put('b', 1, 2, 1000);
+    assert_true(try_record('b', &record));
     store_record_finish(&record);
     store_tried(store, b);
-    assert_true(try_record(store, 'a', &record));
+    assert_true(try_record('a', &record));
     store_record_finish(&record);
-    store_close(store);
-    store = open_store(LIMIT_BYTES);
-    expect_names(store, "b");
-    store_close(store);
+    open_store(LIMIT_BYTES);
+    expect_names("b");
 }
 
 TEST(a_folder_belongs_to_one_daemon_and_one_user)
 {
     struct error error = {0};
-    struct store *store = open_store(LIMIT_BYTES);
     assert_null(store_open(store_folder, LIMIT_BYTES, &error));
     assert_string_equal(error.text, "another daemon uses the folder");
-    store_close(store);
+    close_store();
     error = (struct error){0};
     assert_int_equal(chmod(store_folder, 0750), 0);
     assert_null(store_open(store_folder, LIMIT_BYTES, &error));
@@ -308,8 +300,7 @@ TEST(a_folder_belongs_to_one_daemon_and_one_user)
 
 TEST(an_abandoned_record_leaves_nothing_and_its_predecessor_stays)
 {
-    struct store *store = open_store(LIMIT_BYTES);
-    expect_put(store, 'a', 1, 1, 1000);
+    expect_put('a', 1, 1, 1000);
     atomic_bool abandoned = true;
     struct blob *blob = blob_of(2, 1000);
     uint8_t content = 0;
@@ -319,8 +310,7 @@ TEST(an_abandoned_record_leaves_nothing_and_its_predecessor_stays)
     assert_false(store_put(store, &record, &abandoned, &error));
     assert_int_equal(error.kind, ERROR_CANCELLED);
     blob_unref(blob);
-    expect_names(store, "a");
+    expect_names("a");
     assert_int_equal(count_files("blobs"), 1);
     assert_int_equal(count_files("scenes"), 1);
-    store_close(store);
 }

@@ -36,6 +36,12 @@ static void add(uint32_t number, uint64_t command, uint64_t sent_ns)
     metrics_add(&metrics, &frame, sent_ns + 8 * MS);
 }
 
+static void add_frames(uint32_t count, uint64_t pause_ms)
+{
+    for (uint32_t i = 0; i < count; i++)
+        add(i, i + 1, (1000 + i * pause_ms) * MS);
+}
+
 static int begin(void **state)
 {
     (void)state;
@@ -110,8 +116,7 @@ TEST(frames_that_refine_have_no_latency)
 TEST(the_daemons_clock_is_found)
 {
     assert_true(metrics_clock_offset_ns(&metrics) == 0);
-    for (uint32_t i = 0; i < 5; i++)
-        add(i, i + 1, (1000 + i * 100) * MS);
+    add_frames(5, 100);
     assert_int_equal(metrics_clock_offset_ns(&metrics), -(int64_t)DAEMON_AHEAD);
     const struct metrics_frame *frame = metrics_frame(&metrics, 0);
     struct span span;
@@ -246,75 +251,70 @@ static void check_within(const struct hud_state *state)
     }
 }
 
+static void lay_out(const struct hud_state *shown)
+{
+    hud_layout(&hud, shown, measure, NULL);
+    check_within(shown);
+}
+
 TEST(the_overlay_shows_its_figures_within_the_window)
 {
-    for (uint32_t i = 0; i < 20; i++)
-        add(i, i + 1, (1000 + i * 20) * MS);
+    add_frames(20, 20);
     struct hud_state shown = some_state(1280, 720);
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("teapot.glb") && tells("bvh, whitted") && tells("refining: 3 of 16 samples"));
     assert_true(tells("8.0 ms") && tells("640x360") && tells("trace") && !tells("errors"));
     assert_false(tells("views made here") || tells("depth"));
     shown.local = (struct hud_local){.on = true};
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_true(tells("none: the newest picture") && !tells("not seen yet"));
     shown.local = (struct hud_local){
         .on = true, .shown = true, .age_s = 0.25, .bound_pixels = 0.75, .unseen = 0.031, .depth_bytes = 12000};
     shown.wire_bytes = 46000;
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("0.25 s old, off by 0.75 pixels") && tells("3.1 %") && tells("34 kB, raw; depth 12 kB"));
     shown.local.bound_pixels = INFINITY;
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_true(tells("0.25 s old, no bound"));
     shown.local = (struct hud_local){0};
     shown.structure[0] = "nodes 10806";
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("structure") && tells("nodes 10806"));
     shown.structure[1] =
         "shadow: cone tests 69.4 a ray, triangle tests 28.1 a ray, waves 12, sorted 0, turned 12, "
         "pairs max 16777216, passes 1234, halvings 0";
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("shadow: cone tests 69.4 a ray") && tells("halvings 0") && !tells("apart"));
     settings.stereo = true;
     settings.views = PROTOCOL_VIEW_SOURCE_LAYERS;
     shown.stereo_m = 0.065;
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("65 mm apart, from layers"));
     settings.views = PROTOCOL_VIEW_SOURCE_RAYS;
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_true(tells("65 mm apart, rendered"));
     settings.help = settings.error_map = true;
     shown.heat = HUD_HEAT_SHOWN;
     shown.heat_figures.mean = 0.125;
     shown.notice = "a notice";
     shown.moving = true;
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("mean 0.12") && tells("a notice") && tells("moving") && tells("Shift+T"));
 }
 
 /* What does not fit is left out; nothing lies over something else but help and status. */
 TEST(a_small_window_shows_less)
 {
-    for (uint32_t i = 0; i < 20; i++)
-        add(i, i + 1, (1000 + i * 20) * MS);
+    add_frames(20, 20);
     struct hud_state shown = some_state(360, 180); /* the widest line has 27 letters */
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("refining") && !tells("input to picture") && !tells("resolve"));
     shown = some_state(700, 180);
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("input to picture") && !tells("resolve"));
     shown = some_state(700, 420);
     settings.help = true;
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("resolve") && tells("full screen"));
     for (double height = 60; height < 480; height += 60) {
         shown = some_state(300, height);
@@ -327,25 +327,22 @@ TEST(a_small_window_shows_less)
 
 TEST(it_begins_with_one_line_and_the_rest_is_a_key_away)
 {
-    for (uint32_t i = 0; i < 20; i++)
-        add(i, i + 1, (1000 + i * 40) * MS);
+    add_frames(20, 40);
     struct hud_state shown = some_state(1280, 720);
     settings = (struct settings){0};
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("20 fps") && tells("teapot.glb") && tells("bvh, whitted") && tells("3 of 16 samples") &&
                 tells("F1"));
     assert_false(tells("input to picture") || tells("trace"));
     for (size_t i = 1; i < hud.count; i++) /* behind its panel */
         assert_true(hud.marks[i].y >= hud.marks[0].y && hud.marks[i].y + hud.marks[i].height < 50);
     shown.local.shown = true; /* what is seen then are views that are made here: none yet */
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_true(tells("0 fps") && !tells("20 fps"));
     shown = some_state(200, 100); /* what does not fit is left out */
     settings = (struct settings){0};
     shown.notice = "a notice that is longer than the window is wide";
-    hud_layout(&hud, &shown, measure, NULL);
-    check_within(&shown);
+    lay_out(&shown);
     assert_true(tells("20 fps") && tells("teapot.glb") && !tells("F1") && tells("a notice"));
     settings_act(&settings, ACTION_OVERLAY);
     shown = (struct hud_state){0};
@@ -374,8 +371,7 @@ TEST(an_object_is_edited_beside_the_figures)
     for (int small = 0; small < 2; small++) {
         struct hud_state shown = some_state(small ? 400 : 1280, small ? 200 : 720);
         shown.edit = &edit;
-        hud_layout(&hud, &shown, measure, NULL);
-        check_within(&shown);
+        lay_out(&shown);
         assert_true(tells("material") && tells("row 20") && tells("0.25_") && !tells("value 20") &&
                     tells("value 19"));
         assert_int_equal(tells("input to picture"), !small);
@@ -400,7 +396,7 @@ TEST(the_line_of_figures_ends_before_the_panel_whose_swatches_are_as_the_picture
         struct hud_state shown = some_state(width, 480);
         settings = (struct settings){0};
         shown.edit = &edit;
-        hud_layout(&hud, &shown, measure, NULL);
+        lay_out(&shown);
         assert_true(tells("teapot.glb") || width < 700);
         const double right = width - hud_edit_width(&edit, width, shown.scale);
         for (size_t i = 0; i < hud.count; i++) /* what begins beside the panel ends there */
@@ -411,7 +407,7 @@ TEST(the_line_of_figures_ends_before_the_panel_whose_swatches_are_as_the_picture
     edit.rows[0].is_shown_as_it_is = true;
     struct hud_state shown = some_state(1280, 480);
     shown.edit = &edit;
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_true(has_box_of(128) && !has_box_of(188));
 }
 
@@ -420,16 +416,15 @@ TEST(what_is_not_wanted_is_not_drawn_but_a_loss_is)
     add(0, 1, 1000 * MS);
     struct hud_state shown = some_state(700, 480);
     settings.overlay = OVERLAY_FIGURES;
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_true(tells("input to picture") && !tells("resolve"));
     settings.overlay = OVERLAY_NONE;
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_int_equal(hud.count, 0);
     shown.status = HUD_LOST;
     shown.status_text = "the daemon closed the connection; trying again in 1.0 s";
-    hud_layout(&hud, &shown, measure, NULL);
+    lay_out(&shown);
     assert_true(tells("The connection is lost") && tells("trying again in 1.0 s"));
-    check_within(&shown);
 }
 
 TEST(the_timeline_has_times_on_its_axis_that_do_not_overlap)
@@ -437,12 +432,11 @@ TEST(the_timeline_has_times_on_its_axis_that_do_not_overlap)
     static const uint64_t pauses_ms[] = {1, 3, 7, 15, 33, 70, 78};
     for (size_t p = 0; p < sizeof(pauses_ms) / sizeof(pauses_ms[0]); p++) {
         begin(NULL);
-        for (uint32_t i = 0; i < 20; i++)
-            add(i, i + 1, (1000 + i * pauses_ms[p]) * MS);
+        add_frames(20, pauses_ms[p]);
         struct hud_state shown = some_state(900, 600);
         double end = 0;
         unsigned labels = 0;
-        hud_layout(&hud, &shown, measure, NULL);
+        lay_out(&shown);
         for (size_t i = 0; i < hud.count; i++) {
             const struct hud_mark *mark = &hud.marks[i];
             const size_t length = strlen(mark->text);

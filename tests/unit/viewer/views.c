@@ -31,66 +31,82 @@ static struct views_key some_key(uint8_t grey)
     return key;
 }
 
-static struct views *begin(void)
+static struct views *views;
+static struct pixmap picture; /* and what is said of it: those that came last */
+static struct views_made made;
+
+static int begin(void **state)
 {
+    (void)state;
     struct fl_error error;
-    struct views *views = views_create(&error);
-    assert_non_null(views);
-    return views;
+    made = (struct views_made){0};
+    views = views_create(&error);
+    return views ? 0 : -1;
 }
 
-static uint64_t want(struct views *views, float x)
+static int end(void **state)
+{
+    (void)state;
+    pixmap_finish(&picture);
+    views_destroy(views);
+    return 0;
+}
+
+EACH_TEST(begin, end)
+
+static uint64_t want(float x)
 {
     const struct views_wish wish = {.width = EDGE, .height = EDGE, .camera = camera_at(x), .frame_ns = 1000000};
     return views_want(views, &wish);
 }
 
-static void wait_for(struct views *views, struct pixmap *picture, struct views_made *made)
+static void wait_for_one(void)
 {
     const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
-    while (!views_take(views, picture, made)) {
+    while (!views_take(views, &picture, &made)) {
         assert_true(monotonic_now_ns() < end_ns);
         poll(NULL, 0, 1);
     }
 }
 
-static int grey_of(const struct pixmap *picture)
+static int grey(void)
 {
-    return picture->pixels[(EDGE / 2 * EDGE + EDGE / 2) * 4];
+    return picture.pixels[(EDGE / 2 * EDGE + EDGE / 2) * 4];
+}
+
+/* What comes may make the last view the best without another one. */
+static void wait_for_best(uint64_t wish)
+{
+    const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
+    while (views_take(views, &picture, &made) || !views_is_best(views, &made, wish)) {
+        assert_true(monotonic_now_ns() < end_ns);
+        poll(NULL, 0, 1);
+    }
 }
 
 TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
 {
-    struct views *views = begin();
-    struct pixmap picture = {0};
-    struct views_made made = {0};
     struct views_key key = some_key(100);
-    const uint64_t first = want(views, 0);
+    const uint64_t first = want(0);
     assert_false(views_take(views, &picture, &made)); /* of what? */
     key.sticking = malloc(EDGE * EDGE);
     assert_non_null(key.sticking);
     memset(key.sticking, 51, EDGE * EDGE); /* a fifth */
     views_give_key(views, &key);
     assert_true(!key.depth && !key.sticking && !key.picture.pixels); /* taken over */
-    do
-        wait_for(views, &picture, &made);
-    while (!views_is_best(views, &made, first));
+    wait_for_best(first);
     assert_true(made.wish == first && made.quality == FL_WARP_TREE);
-    assert_true(picture.width == EDGE && picture.height == EDGE && grey_of(&picture) == 100);
+    assert_true(picture.width == EDGE && picture.height == EDGE && grey() == 100);
     assert_true(made.counts.known > 0.99f);
     assert_float_equal(made.counts.sticking, 0.2f, 0.01f);
     /* A newer camera, a newer picture: each makes another view, at last of both. */
-    const uint64_t second = want(views, 0.1f);
+    const uint64_t second = want(0.1f);
     key = some_key(50);
     views_give_key(views, &key);
     assert_false(views_is_best(views, &made, first));
-    do
-        wait_for(views, &picture, &made);
-    while (!views_is_best(views, &made, second));
-    assert_int_equal(grey_of(&picture), 50);
+    wait_for_best(second);
+    assert_int_equal(grey(), 50);
     assert_true(made.counts.outside > 0.01f); /* the wall's right edge was not seen */
-    pixmap_finish(&picture);
-    views_destroy(views);
 }
 
 /* Nearer than the wall, in the middle of it. */
@@ -99,28 +115,14 @@ static bool is_post(int i)
     return i % EDGE >= EDGE * 3 / 8 && i % EDGE < EDGE * 5 / 8;
 }
 
-/* What comes may make the last view the best without another one. */
-static void wait_for_best(struct views *views, struct views_made *made, uint64_t wish)
-{
-    const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
-    struct pixmap picture = {0};
-    while (views_take(views, &picture, made) || !views_is_best(views, made, wish)) {
-        assert_true(monotonic_now_ns() < end_ns);
-        poll(NULL, 0, 1);
-    }
-    pixmap_finish(&picture);
-}
-
 TEST(what_a_picture_hides_is_seen_once_it_has_come)
 {
-    struct views *views = begin();
-    struct views_made made = {0};
     struct views_key key = some_key(100);
     for (int i = 0; i < EDGE * EDGE; i++)
         key.depth[i] = is_post(i) ? 0.5f : 2;
     views_give_key(views, &key);
-    const uint64_t wish = want(views, 0.05f);
-    wait_for_best(views, &made, wish);
+    const uint64_t wish = want(0.05f);
+    wait_for_best(wish);
     assert_true(made.layers == 1 && made.counts.behind > 0.01f);
     /* The wall behind the post. */
     struct views_key like = some_key(200);
@@ -130,7 +132,7 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     views_give_layer(views, &layer);
     assert_true(!layer.depth && !layer.picture.pixels);
     assert_false(views_is_best(views, &made, wish));
-    wait_for_best(views, &made, wish);
+    wait_for_best(wish);
     assert_true(made.layers == 2 && made.counts.behind == 0 && made.counts.deeper > 0.01f);
     /* A second one, of half the size: one of its pixels for two by two. */
     like = some_key(200);
@@ -139,7 +141,7 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     for (int i = 0; i < EDGE / 2 * (EDGE / 2); i++)
         layer.depth[i] = 3;
     views_give_layer(views, &layer);
-    wait_for_best(views, &made, wish);
+    wait_for_best(wish);
     assert_int_equal(made.layers, 3);
     /* A new key has none; one of another size is not of it. */
     key = some_key(100);
@@ -148,9 +150,8 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     layer = (struct views_layer){like.picture, like.depth};
     layer.picture.width /= 2;
     views_give_layer(views, &layer);
-    wait_for_best(views, &made, wish);
+    wait_for_best(wish);
     assert_int_equal(made.layers, 1);
-    views_destroy(views);
 }
 
 /* A post before a wall, of colours that tell each texel. */
@@ -167,8 +168,7 @@ static struct views_key varied_key(void)
 
 /* The part of `picture` from this column and row on is what is seen from there. Returns the share that is behind.
  */
-static float expect_eye(struct fl_warp *warp, const struct pixmap *picture, int column, int row, uint32_t width,
-                        uint32_t height, float x)
+static float expect_eye(struct fl_warp *warp, int column, int row, uint32_t width, uint32_t height, float x)
 {
     static uint32_t colours[EDGE * EDGE];
     static uint8_t mask[EDGE * EDGE];
@@ -178,8 +178,7 @@ static float expect_eye(struct fl_warp *warp, const struct pixmap *picture, int 
     struct fl_warp_picture alone = {.colours = colours, .mask = mask};
     assert_true(fl_warp_make(warp, &view, &alone, &error));
     for (int y = 0; y < (int)height; y++)
-        assert_memory_equal(picture->pixels + ((row + y) * EDGE + column) * 4, colours + y * (int)width,
-                            4 * width);
+        assert_memory_equal(picture.pixels + ((row + y) * EDGE + column) * 4, colours + y * (int)width, 4 * width);
     return alone.counts.behind;
 }
 
@@ -189,12 +188,9 @@ TEST(both_eyes_are_those_of_views_half_the_distance_aside)
     struct warped_key alike = {.warp = fl_warp_create(1, &error)};
     struct views_key key = varied_key();
     assert_true(alike.warp && warped_key_set(&alike, &key, &error));
-    struct views *views = begin();
     key = varied_key();
     views_give_key(views, &key);
     for (int over = 0; over < 2; over++) {
-        struct pixmap picture = {0};
-        struct views_made made = {0};
         const struct views_wish wish = {.width = EDGE,
                                         .height = EDGE,
                                         .camera = camera_at(0.01f),
@@ -202,55 +198,43 @@ TEST(both_eyes_are_those_of_views_half_the_distance_aside)
                                         .over = over,
                                         .frame_ns = 1000000};
         const uint64_t number = views_want(views, &wish);
-        do
-            wait_for(views, &picture, &made);
-        while (!views_is_best(views, &made, number));
+        wait_for_best(number);
         const uint32_t width = over ? EDGE : EDGE / 2, height = over ? EDGE / 2 : EDGE;
-        const float left = expect_eye(alike.warp, &picture, 0, 0, width, height, 0.01f - 0.05f);
-        const float right = expect_eye(alike.warp, &picture, over ? 0 : EDGE / 2, over ? EDGE / 2 : 0, width,
-                                       height, 0.01f + 0.05f);
+        const float left = expect_eye(alike.warp, 0, 0, width, height, 0.01f - 0.05f);
+        const float right =
+            expect_eye(alike.warp, over ? 0 : EDGE / 2, over ? EDGE / 2 : 0, width, height, 0.01f + 0.05f);
         assert_true(left > 0 && right > 0);
         assert_float_equal(made.counts.behind, (left + right) / 2, 1e-6); /* of both: rounding alone */
-        pixmap_finish(&picture);
     }
-    views_destroy(views);
     fl_warp_destroy(alike.warp);
 }
 
 TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
 {
-    struct views *views = begin();
-    struct pixmap picture = {0};
-    struct views_made made = {0};
     struct views_key key = some_key(100);
     views_give_key(views, &key);
     for (int motion = 0; motion < 20; motion++) {
-        want(views, 0.05f);
+        want(0.05f);
         poll(NULL, 0, motion % 4); /* it is made, or it is not */
         views_want_none(views);
         assert_false(views_take(views, &picture, &made));
-        const uint64_t wish = want(views, -0.05f);
-        wait_for(views, &picture, &made);
+        const uint64_t wish = want(-0.05f);
+        wait_for_one();
         assert_true(made.wish == wish);
         views_want_none(views);
     }
     views_forget_keys(views);
-    want(views, 0);
+    want(0);
     poll(NULL, 0, 5);
     assert_false(views_take(views, &picture, &made));
-    pixmap_finish(&picture);
-    views_destroy(views);
 }
 
 TEST(a_picture_of_which_no_view_can_be_made_is_reported_and_the_next_one_helps)
 {
     struct fl_warp_error why = {0};
-    struct views *views = begin();
-    struct pixmap picture = {0};
-    struct views_made made = {0};
     struct views_key key = some_key(100);
     key.camera.world_from_view[0] = NAN;
-    want(views, 0);
+    want(0);
     views_give_key(views, &key);
     const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
     while (!views_take_error(views, &why) && monotonic_now_ns() < end_ns)
@@ -260,10 +244,8 @@ TEST(a_picture_of_which_no_view_can_be_made_is_reported_and_the_next_one_helps)
     key = some_key(100);
     key.depth[0] = NAN; /* nothing is known there */
     views_give_key(views, &key);
-    wait_for(views, &picture, &made);
-    assert_int_equal(grey_of(&picture), 100);
-    pixmap_finish(&picture);
-    views_destroy(views);
+    wait_for_one();
+    assert_int_equal(grey(), 100);
 }
 
 static float fitted_depth(int width, int height, int x, int y)
