@@ -390,6 +390,7 @@ class Sealed(Case):
 
 
 class Ends(Case):
+    @long_test
     def test_a_daemon_of_ones_own_that_is_killed_is_said_to_have_been(self):
         os.environ.pop("FARLIGHT_SERVER", None)
 
