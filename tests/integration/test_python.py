@@ -312,7 +312,7 @@ class WithDaemon(OneDaemon):
     def test_pictures_are_the_command_lines_to_the_byte(self):
         self.default_samples()
         client = self.connect()
-        for model, size in (("teapot.glb", (64, 48)), ("sphereflake-2.nff", (48, 32))):
+        for model, size in (("teapot.glb", (64, 48)),) + ((("sphereflake-2.nff", (48, 32)),) if farlight_test.LONG else ()):
             path = bundled_scenes() / model
             shape = f"{size[0]}x{size[1]}"
             self.expect(farlight_test.farlight("render", path, "--size", shape, "-o", self.folder / "c.png"), 0)
@@ -474,6 +474,7 @@ esac
             farlight.load(bundled_scenes() / "teapot.glb", max_bytes=1000)
         self.assertEqual(raised.exception.field, "max_bytes")
 
+    @long_test
     def test_the_man_page_has_every_option_of_the_command_line(self):
         page = (farlight_test.ROOT / "conf/man/farlight-python.1").read_text()
         done = python("-m", "farlight", "render", "--help")
