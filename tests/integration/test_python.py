@@ -7,6 +7,7 @@ import importlib.util
 import os
 import random
 import re
+import select
 import socket
 import struct
 import subprocess
@@ -220,7 +221,7 @@ class Lies(Case):
     def test_changed_bytes_raise_nothing_but_errors_of_the_package(self):
         random.seed(farlight_test.ROOT.name)
         honest = frame(0) + say(messages.Blocked(2, 1, "why")) + frame(1) + say(messages.Ok(), 4)
-        for _ in range(600):
+        for _ in range(600 if farlight_test.LONG else 150):
             changed = bytearray(honest)
             for _ in range(random.randrange(1, 4)):
                 changed[random.choice((random.randrange(16), random.randrange(len(changed))))] = random.randrange(256)
@@ -311,7 +312,7 @@ class WithDaemon(OneDaemon):
     def test_pictures_are_the_command_lines_to_the_byte(self):
         self.default_samples()
         client = self.connect()
-        for model, size in (("teapot.glb", (64, 48)), ("sphereflake-2.nff", (48, 32))):
+        for model, size in (("teapot.glb", (64, 48)),) + ((("sphereflake-2.nff", (48, 32)),) if farlight_test.LONG else ()):
             path = bundled_scenes() / model
             shape = f"{size[0]}x{size[1]}"
             self.expect(farlight_test.farlight("render", path, "--size", shape, "-o", self.folder / "c.png"), 0)
@@ -473,6 +474,7 @@ esac
             farlight.load(bundled_scenes() / "teapot.glb", max_bytes=1000)
         self.assertEqual(raised.exception.field, "max_bytes")
 
+    @long_test
     def test_the_man_page_has_every_option_of_the_command_line(self):
         page = (farlight_test.ROOT / "conf/man/farlight-python.1").read_text()
         done = python("-m", "farlight", "render", "--help")
@@ -567,6 +569,7 @@ class Faults(Case):
             process = client._link.process  # pylint: disable=protected-access
         self.assertEqual(process.poll(), 0)
 
+    @long_test
     def test_a_kept_scene_outlives_the_connection_and_is_not_sent_again(self):
         with Daemon() as daemon, farlight.connect(daemon.address) as client:
             scene, material = triangle()
@@ -592,6 +595,7 @@ class Faults(Case):
             time.sleep(2.2)
             self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data, before.data)
 
+    @long_test
     def test_a_sealed_connection_makes_the_same_picture_and_wrong_keys_say_so(self):
         for name in ("key", "reader", "other"):
             self.expect(farlight_test.farlight("key", self.folder / name), 0)
@@ -641,49 +645,25 @@ class CutOf(Cut):
             left = None
 
 
-class Changed:
+class Changed(CutOf):
     """Changes a byte of the daemon's on the way."""
 
     def __init__(self, port):
-        self.port = port
+        super().__init__(("127.0.0.1", port), None, False)
 
-    def __enter__(self):
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.address = f"tcp:127.0.0.1:{self.listener.getsockname()[1]}"
-        self.thread = threading.Thread(target=self.serve)
-        self.thread.start()
-        return self
-
-    def serve(self):
-        client = self.listener.accept()[0]
-        daemon = socket.create_connection(("127.0.0.1", self.port))
-
-        def forward():
-            try:
-                while data := client.recv(65536):
-                    daemon.sendall(data)
-            except OSError:
-                pass
-            daemon.shutdown(socket.SHUT_RDWR)
-
-        there = threading.Thread(target=forward)
-        there.start()
+    @staticmethod
+    def relay(client, daemon, left):
         came = 0
-        try:
-            while data := bytearray(daemon.recv(65536)):
-                if came <= 3000 < came + len(data):
-                    data[3000 - came] ^= 1
-                came += len(data)
-                client.sendall(data)
-        except OSError:
-            pass
-        client.close()
-        there.join()
-        daemon.close()
-
-    def __exit__(self, *_):
-        self.listener.close()
-        self.thread.join()
+        while True:
+            for one in select.select([client, daemon], [], [])[0]:
+                data = bytearray(one.recv(65536))
+                if not data:
+                    return
+                if one is daemon:
+                    if came <= 3000 < came + len(data):
+                        data[3000 - came] ^= 1
+                    came += len(data)
+                (daemon if one is client else client).sendall(data)
 
 
 if __name__ == "__main__":

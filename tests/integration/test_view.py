@@ -194,56 +194,6 @@ class WithoutAWindow(Viewer):
             self.assertIn(words, self.errors)
 
     @long_test
-    def test_what_moves_gives_way_to_the_rate_and_rest_is_the_full_picture(self):
-        """No software renders a thousand frames a second: all that may be given up is, whatever else the machine does. What frames
-        while it moves have of those before them is gone at rest."""
-        moves = [{"mouse": "move", "x": 110 + step / 20, "y": 55, "after": 0.03} for step in range(40)]
-        let_go = {"mouse": "up", "button": "left", "x": 112, "y": 55}
-        states = {}
-        for rate in (1000, 0):
-            states[rate] = self.replay([rest(8), *HIDE, drag(80, 45, 0, 0)[0], *moves, {"state": "moving"}, let_go, rest(8),
-                                        {"state": "rested"}, {"screenshot": f"rested-{rate}.png"}],
-                                       "--views", "off", "--moving-rate", rate, "--integrator", "path")
-        self.assertEqual([(states[rate]["moving"]["width"], states[rate]["moving"]["depth_less"]) for rate in (1000, 0)],
-                         [(SIZE[0] * 5 // 32, 6), (SIZE[0], 0)])
-        self.assertEqual([(states[rate]["rested"]["width"], states[rate]["rested"]["depth_less"]) for rate in (1000, 0)],
-                         [(SIZE[0], 0)] * 2)
-        self.assertEqual(states[1000]["rested"]["eye"], states[0]["rested"]["eye"])
-        self.assertEqual(difference(*(self.folder / f"rested-{rate}.png" for rate in (1000, 0))), 0)
-
-    @long_test
-    def test_the_panel_changes_the_settings_of_the_tracer(self):
-        states = self.replay([{"key": "p"}, rest(), {"state": "before"}, {"screenshot": "panel.png"}, {"key": "right"}, rest(),
-                              {"state": "finer"}, {"key": "down"}, {"key": "down"}, {"key": "right"}, rest(),
-                              {"state": "peeled"}, {"key": "down"}, {"key": "up"}, {"key": "up"}, {"key": "right"}, rest(),
-                              {"state": "refused"}, {"key": "t"}, rest(), {"state": "abuffer"}],
-                             "--tracer", "ldc", "--ldc-resolution", "64", "--ldc-levels", "cells")
-        said = {name: state["settings"] for name, state in states.items()}
-        self.assertEqual([said[name]["ldc_resolution"] for name in ("before", "finer", "peeled")], ["64", "128", "128"])
-        for name, resolution in (("before", "resolution 64,"), ("finer", "resolution 128,")):
-            self.assertIn(resolution, states[name]["structure"][0])
-        self.assertEqual([said["before"]["ldc_build"], said["peeled"]["ldc_build"]], ["auto", "peel"])
-        # A tolerance needs other levels than cells.
-        self.assertEqual(said["refused"]["ldc_tolerance"], "0")
-        self.assertIn("ldc-tolerance", states["refused"]["notice"])
-        self.assertIn("abuffer_resolution", said["abuffer"])
-
-    @long_test
-    @unittest.mock.patch.dict(os.environ, COARSE)
-    def test_the_error_map_is_black_where_the_tracer_is_exact(self):
-        states = self.replay([{"key": "x"}, rest(4), {"state": "bvh"}, *HIDE, {"screenshot": "bvh.png"}, {"key": "x"},
-                              rest(4), {"state": "off"}, {"key": "x"}, {"key": "t"}, {"key": "t"}, rest(4),
-                              {"state": "ldc"}])
-        self.assertEqual(states["ldc"]["tracer"], "ldc")
-        self.assertNotIn("errors", states["off"])
-        # The bvh differs from the reference by rounding alone; samples along axes do not.
-        self.assertLess(states["bvh"]["errors"]["mean"], 1e-4)
-        self.assertGreater(states["ldc"]["errors"]["mean"], 10 * states["bvh"]["errors"]["mean"])
-        rows, channels = read_png(self.folder / "bvh.png")[2:]
-        middle = rows[len(rows) // 2]
-        self.assertLess(max(middle[0::channels]), 64)
-
-    @long_test
     def test_a_camera_that_a_clip_moves_is_followed_until_a_hand_leads(self):
         scene = self.folder / "riding.glb"
         riding_camera(bundled_scenes() / "carousel.glb", scene)
@@ -349,10 +299,10 @@ class MadeHere(Viewer):
     """Views that the viewer makes while the camera moves."""
     SAMPLES = 2  # of the pictures that they are made from, and of those that they are held against
 
-    def moved_while_lost(self, name, *options, size, before=()):
+    def moved_while_lost(self, name, *options, size):
         """A view from beside the last picture, made when the daemon is gone: nothing newer can come. Its state, the rows of the
         last picture and of the view without the middle, in which the viewer says what has happened."""
-        events = [*before, rest(self.SAMPLES), *HIDE, {"screenshot": "before.png"}, {"state": "before"}, {"wait": "lost"},
+        events = [rest(self.SAMPLES), *HIDE, {"screenshot": "before.png"}, {"state": "before"}, {"wait": "lost"},
                   *drag(160, 90, 6, 2), {"wait": "camera"}, {"state": "after"}, {"screenshot": f"{name}.png"}]
         with Daemon() as daemon:
             process = self.start(events, "--headless", "--server", daemon.address, "--views", "on", "--samples", str(self.SAMPLES),
@@ -372,19 +322,6 @@ class MadeHere(Viewer):
         self.expect(result, 0)
         rows = read_png(self.folder / "true.png")[2]
         return crop(rows, len(rows) // 2 - 60, len(rows) // 2 + 60)
-
-    @long_test
-    def test_both_eyes_are_made_from_one_picture(self):
-        """Of the middle, from before the daemon was gone: at rest it sends both eyes, which views are not made from."""
-        size = (320, 360)
-        for layout, eye in (("side", (160, 360)), ("over", (320, 180))):
-            with self.subTest(layout=layout):
-                eyes = ["--stereo", "0.1", "--stereo-layout", layout]
-                moves = drag(160, 90, 20, 0)
-                state, before, made = self.moved_while_lost("made", *eyes, size=size, before=[rest(1), *moves])
-                self.assertTrue(state["stereo"] and state["local"]["shown"])
-                true = self.rendered(state, eye, *eyes, "--views", "rays")
-                self.assertLess(error_of(made, true), error_of(before, true) / 3)
 
     def test_a_view_is_near_to_what_is_rendered_from_there(self):
         size = (240, 270)
@@ -470,38 +407,6 @@ class Relay:
         self.listener.shutdown(socket.SHUT_RDWR)
         self.listener.close()
         self.cut()
-
-
-class Watching(Viewer):
-    @long_test
-    def test_a_view_follows_the_file_of_its_model(self):
-        square, red = self.folder / "square.obj", "v -1 -1 0 1 0 0\nv 1 -1 0 1 0 0\nv 1 1 0 1 0 0\nf 1 2 3\n"
-        (self.folder / "paint.mtl").write_text("newmtl paint\n")
-        behind = "mtllib paint.mtl\nusemtl paint\nf 1 3 2\n"
-        square.write_text(red + behind)
-        looks = [event for _ in range(400) for event in ({"state": "look"}, {"screenshot": "look.png", "after": 0.25})]
-        process = self.start([rest(), *HIDE, *looks], square, "--watch", "--headless", scene=None)
-        self.addCleanup(process.communicate)
-        self.addCleanup(process.kill)
-        states = map(json.loads, process.stdout)
-        eye = next(states)["eye"]
-        square.write_text("f 1 2 3\n")
-        self.assertIn("square.obj", process.stderr.readline())
-        self.assertEqual(next(states)["status"], "live", "what cannot be read leaves the view as it is")
-        square.write_text(red.replace("1 0 0", "0 1 0") + behind)
-        while not self.is_green(self.folder / "look.png"):
-            self.assertEqual(next(states)["times_live"], 1, "the scene is kept")
-        square.write_text(red)
-        while self.is_green(self.folder / "look.png"):
-            state = next(states)
-            self.assertEqual((state["times_live"], state["eye"]), (1, eye), "a material is gone, and the scene is kept")
-        process.send_signal(signal.SIGINT)
-        self.assertEqual(process.wait(), 130)
-
-    def is_green(self, path):
-        _, _, rows, channels = read_png(path)
-        red, green, *_ = rows[SIZE[1] * 6 // 10][SIZE[0] * 6 // 10 * channels:]
-        return green > red
 
 
 class OnADaemon(Viewer):

@@ -379,7 +379,7 @@ class Edit(Case):
         self.assertNotEqual(self.gateway.path, self.gateway.edit_path)
         view = self.view(self.gateway.path)
         view.send({"undo": True})
-        self.assertEqual(view.closed_with(), POLICY)
+        self.assertIn(view.closed_with(), (0, POLICY))  # a reset may overtake the status
         with Socket(self.gateway, path=self.gateway.edit_path + "view", origin="http://elsewhere.example") as view:
             self.assertEqual(view.status, 403)
 

@@ -212,6 +212,7 @@ class Client:
                     next(operation)
                 except StopIteration as done:
                     self._flush()
+                    address.tell_end(self._core.failure, self._link)
                     result: T = done.value
                     return result
                 self._exchange(silence_s or self._options.timeout)

@@ -44,12 +44,23 @@ static void expect_rigid(const struct frame_camera *camera)
     }
 }
 
-static struct scene *empty_scene(void)
+static struct scene *scene; /* empty at first */
+
+static int begin(void **state)
 {
-    struct scene *scene = scene_create("test", NULL);
-    assert_non_null(scene);
-    return scene;
+    (void)state;
+    scene = scene_create("test", NULL);
+    return scene ? 0 : -1;
 }
+
+static int end(void **state)
+{
+    (void)state;
+    scene_destroy(scene);
+    return 0;
+}
+
+EACH_TEST(begin, end)
 
 static struct engine_job job_of(enum camera_path path, struct camera_key *keys, uint32_t key_count)
 {
@@ -66,8 +77,8 @@ static struct engine_job job_of(enum camera_path path, struct camera_key *keys, 
 }
 
 /* Without clips. */
-static bool make_camera(const struct engine_job *job, const struct scene *scene, uint32_t frame,
-                        struct frame_camera *camera, struct error *error)
+static bool make_camera(const struct engine_job *job, uint32_t frame, struct frame_camera *camera,
+                        struct error *error)
 {
     struct shot shot;
     if (!shot_make(&shot, job, scene, frame, NULL, error))
@@ -77,11 +88,11 @@ static bool make_camera(const struct engine_job *job, const struct scene *scene,
     return true;
 }
 
-static struct frame_camera camera_at(const struct engine_job *job, const struct scene *scene, uint32_t frame)
+static struct frame_camera camera_at(const struct engine_job *job, uint32_t frame)
 {
     struct frame_camera camera;
     struct error error = {0};
-    if (!make_camera(job, scene, frame, &camera, &error))
+    if (!make_camera(job, frame, &camera, &error))
         fail_msg("%s: %s", error.field, error.text);
     expect_rigid(&camera);
     return camera;
@@ -114,29 +125,26 @@ TEST(the_time_of_a_frame_counts_from_the_origin)
 
 TEST(one_key_stands_still)
 {
-    struct scene *scene = empty_scene();
     struct camera_key key = key_at(3, 1, 2, 3);
     struct engine_job job = job_of(CAMERA_KEYS, &key, 1);
     for (uint32_t frame = 0; frame < 100; frame += 33) {
-        struct frame_camera camera = camera_at(&job, scene, frame);
+        struct frame_camera camera = camera_at(&job, frame);
         float eye[3];
         eye_of(&camera, eye);
         expect_near("eye", eye, (double[]){1, 2, 3}, 3, 0);
         expect_near("fov", &camera.fov_y, (double[]){(double)key.fov_y}, 1, 0);
         assert_true(camera.near == 0.0f);
     }
-    scene_destroy(scene);
 }
 
 TEST(keys_pass_through_their_points_and_stand_still_outside)
 {
-    struct scene *scene = empty_scene();
     struct camera_key keys[] = {key_at(1, 0, 0, 0), key_at(2, 5, 1, 0), key_at(4, 6, -3, 2), key_at(5, 0, 0, 9)};
     struct engine_job job = job_of(CAMERA_KEYS, keys, 4);
     const uint32_t frames[] = {0, 10, 20, 40, 50, 500}; /* 10 a second */
     const int expected[] = {0, 0, 1, 2, 3, 3};
     for (int i = 0; i < 6; i++) {
-        struct frame_camera camera = camera_at(&job, scene, frames[i]);
+        struct frame_camera camera = camera_at(&job, frames[i]);
         float eye[3];
         double point[3];
         eye_of(&camera, eye);
@@ -145,7 +153,6 @@ TEST(keys_pass_through_their_points_and_stand_still_outside)
         expect_near("eye", eye, point, 3, 1e-5);
         expect_near("fov", &camera.fov_y, (double[]){(double)keys[expected[i]].fov_y}, 1, 1e-6);
     }
-    scene_destroy(scene);
 }
 
 TEST(keys_at_equal_distances_make_the_spline_of_catmull_and_rom)
@@ -195,7 +202,6 @@ TEST(a_spline_does_not_leave_the_range_of_fields_of_view)
 
 TEST(keys_that_span_no_view_are_errors)
 {
-    struct scene *scene = empty_scene();
     struct camera_key keys[] = {key_at(1, 0, 0, 0), key_at(1, 5, 1, 0)};
     struct engine_job job = job_of(CAMERA_KEYS, keys, 2);
     struct error error = {0};
@@ -212,14 +218,12 @@ TEST(keys_that_span_no_view_are_errors)
     error = (struct error){0};
     assert_false(shot_check(&job, scene, NULL, &error));
     assert_string_equal(error.field, "render.keys");
-    scene_destroy(scene);
 }
 
 /* ---- orbit -------------------------------------------------------------------------------------- */
 
 TEST(an_orbit_by_90_degrees_is_a_quarter_of_the_circle)
 {
-    struct scene *scene = empty_scene();
     struct camera_key key = {
         .eye_world = {10, 3, 5}, .look_at_world = {10, 1, 1}, .up_world = {0, 2, 0}, .fov_y = 0.7f};
     struct engine_job job = job_of(CAMERA_ORBIT, &key, 1);
@@ -228,7 +232,7 @@ TEST(an_orbit_by_90_degrees_is_a_quarter_of_the_circle)
     /* The eye is at (0, 2, 4) from the centre; a turn about +y takes +z to +x. */
     const double eyes[5][3] = {{10, 3, 5}, {14, 3, 1}, {10, 3, -3}, {6, 3, 1}, {10, 3, 5}};
     for (uint32_t quarter = 0; quarter < 5; quarter++) {
-        struct frame_camera camera = camera_at(&job, scene, quarter * 10);
+        struct frame_camera camera = camera_at(&job, quarter * 10);
         float eye[3];
         eye_of(&camera, eye);
         expect_near("eye", eye, eyes[quarter], 3, 1e-5);
@@ -246,18 +250,16 @@ TEST(an_orbit_by_90_degrees_is_a_quarter_of_the_circle)
         assert_true(fabsf(m[4]) < 1e-5f); /* the horizon is level */
         expect_near("fov", &camera.fov_y, (double[]){0.7}, 1, 1e-6);
     }
-    scene_destroy(scene);
 }
 
 TEST(an_orbit_turns_about_its_own_up_axis)
 {
-    struct scene *scene = empty_scene();
     struct camera_key key = {
         .eye_world = {3, 0, 1}, .look_at_world = {0, 0, 1}, .up_world = {0, 0, 1}, .fov_y = 1};
     struct engine_job job = job_of(CAMERA_ORBIT, &key, 1);
     job.orbit_turn = (float)(PI / 2);
     job.orbit_seconds = 1;
-    struct frame_camera camera = camera_at(&job, scene, 10);
+    struct frame_camera camera = camera_at(&job, 10);
     float eye[3];
     eye_of(&camera, eye);
     expect_near("eye", eye, (double[]){0, 3, 1}, 3, 1e-5);
@@ -265,12 +267,10 @@ TEST(an_orbit_turns_about_its_own_up_axis)
     struct error error = {0};
     assert_false(shot_check(&job, scene, NULL, &error));
     assert_string_equal(error.field, "render.orbit_seconds");
-    scene_destroy(scene);
 }
 
 TEST(an_orbit_without_a_key_turns_about_the_middle_of_the_scene)
 {
-    struct scene *scene = empty_scene();
     struct scene_edit disc = {.kind = EDIT_SET, .object = OBJECT_DISC};
     disc.set.disc.base.id = 1;
     disc.set.disc.centre_world[0] = 100;
@@ -281,11 +281,11 @@ TEST(an_orbit_without_a_key_turns_about_the_middle_of_the_scene)
     struct engine_job job = job_of(CAMERA_ORBIT, NULL, 0);
     job.orbit_turn = 1;
     job.orbit_seconds = 1;
-    struct frame_camera first = camera_at(&job, scene, 0), camera;
+    struct frame_camera first = camera_at(&job, 0), camera;
     float start[3], eye[3];
     eye_of(&first, start);
     for (uint32_t frame = 5; frame < 50; frame += 5) {
-        camera = camera_at(&job, scene, frame);
+        camera = camera_at(&job, frame);
         eye_of(&camera, eye);
         assert_true(fabsf(eye[1] - start[1]) < 1e-4f);
         double angle =
@@ -293,24 +293,20 @@ TEST(an_orbit_without_a_key_turns_about_the_middle_of_the_scene)
         double expected = frame / 10.0;
         assert_true(fabs(remainder(angle - expected, 2 * PI)) < 1e-4);
     }
-    scene_destroy(scene);
 }
 
 TEST(an_empty_scene_has_an_automatic_camera_too)
 {
-    struct scene *scene = empty_scene();
     struct engine_job job = job_of(CAMERA_AUTO, NULL, 0);
-    struct frame_camera camera = camera_at(&job, scene, 0);
+    struct frame_camera camera = camera_at(&job, 0);
     for (int i = 0; i < 12; i++)
         assert_true(isfinite(camera.world_from_view[i]));
-    scene_destroy(scene);
 }
 
 /* ---- a camera of the scene ---------------------------------------------------------------------- */
 
 TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
 {
-    struct scene *scene = empty_scene();
     /* Turned by 90 degrees about y, mirrored in x, scaled by 2, 3 and 4. */
     const float parent[12] = {0, 0, 4, 1, 0, 3, 0, 2, 2, 0, 0, 3},
                 child[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5};
@@ -329,7 +325,7 @@ TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
         fail_msg("%s", error.text);
     struct engine_job job = job_of(CAMERA_NODE, NULL, 0);
     job.camera_node = 2;
-    struct frame_camera camera = camera_at(&job, scene, 0);
+    struct frame_camera camera = camera_at(&job, 0);
     const float *m = camera.world_from_view;
     expect_near("eye", (float[]){m[3], m[7], m[11]}, (double[]){21, 2, 3}, 3, 1e-5);
     expect_near("back", (float[]){m[2], m[6], m[10]}, (double[]){1, 0, 0}, 3, 1e-6);
@@ -339,19 +335,17 @@ TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
     assert_false(shot_check(&job, scene, NULL, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.camera_node");
-    scene_destroy(scene);
 }
 
 /* A frame tells its camera and its time to the client, in fields that have bounds. */
 TEST(what_a_frame_could_not_tell_is_an_error_before_it_is_rendered)
 {
-    struct scene *scene = empty_scene();
     struct frame_camera camera;
     struct error error = {0};
     struct engine_job job = job_of(CAMERA_AUTO, NULL, 0);
     job.frames_per_second = 0.001f;
-    assert_true(make_camera(&job, scene, 900000, &camera, &error));
-    assert_false(make_camera(&job, scene, 10000000, &camera, &error));
+    assert_true(make_camera(&job, 900000, &camera, &error));
+    assert_false(make_camera(&job, 10000000, &camera, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.frames_per_second");
 
@@ -361,10 +355,9 @@ TEST(what_a_frame_could_not_tell_is_an_error_before_it_is_rendered)
     for (int i = 0; i < 4; i++)
         keys[i].look_at_world[2] = -1e12f;
     job = job_of(CAMERA_KEYS, keys, 4);
-    assert_true(make_camera(&job, scene, 10, &camera, &error));
-    assert_false(make_camera(&job, scene, 15, &camera, &error)); /* the spline goes beyond its keys */
+    assert_true(make_camera(&job, 10, &camera, &error));
+    assert_false(make_camera(&job, 15, &camera, &error)); /* the spline goes beyond its keys */
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.camera_path");
     assert_string_not_equal(error.remedy, "");
-    scene_destroy(scene);
 }

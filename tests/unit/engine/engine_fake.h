@@ -383,6 +383,7 @@ static inline int start_engine(void **state)
 static inline int stop_engine(void **state)
 {
     (void)state;
+    atomic_store(&fake.holds_steps, false);
     clock_go_on();
     stop();
     return 0;
@@ -412,6 +413,13 @@ static inline struct engine_event *event_within(int ms)
     struct pollfd poll_fd = {.fd = engine_event_fd(engine), .events = POLLIN};
     poll(&poll_fd, 1, ms);
     return engine_next_event(engine);
+}
+
+static inline struct engine_event *next_event(void)
+{
+    struct engine_event *event = event_within(60000);
+    assert_non_null(event);
+    return event;
 }
 
 static inline struct engine_event *expect_event(enum engine_event_kind kind, uint64_t client, uint32_t request)

@@ -87,8 +87,7 @@ TEST(a_permanently_lost_device_fails_all_jobs_and_is_reported)
     atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
     atomic_store(&fake.fail_steps, 1000);
     for (int i = 0; i < 2; i++) {
-        struct engine_event *event = event_within(60000);
-        assert_non_null(event);
+        struct engine_event *event = next_event();
         assert_int_equal(event->kind, ENGINE_FAILED);
         assert_int_equal(event->error.kind, ERROR_DEVICE_LOST);
         engine_event_destroy(event);
@@ -138,8 +137,7 @@ TEST(edits_that_waited_for_a_lost_frame_are_applied)
     atomic_store(&fake.fail_steps, 1);
     uint32_t first = 0;
     for (int i = 0; i < 2; i++) {
-        struct engine_event *event = event_within(60000);
-        assert_non_null(event);
+        struct engine_event *event = next_event();
         assert_int_equal(event->kind, ENGINE_DONE);
         assert_true(event->request == 4 || event->request == 5);
         assert_true(event->request != first);
@@ -195,8 +193,7 @@ TEST(a_frame_for_which_there_is_no_memory_waits_until_others_have_ended)
     atomic_store(&fake.fail_steps, 1); /* once more alone: what the first one has is idle by then */
     atomic_store(&fake.gate_open, true);
     for (int i = 0; i < 6; i++) { /* a frame and an answer each */
-        struct engine_event *event = event_within(60000);
-        assert_non_null(event);
+        struct engine_event *event = next_event();
         assert_true(event->kind == ENGINE_FRAME || event->kind == ENGINE_DONE);
         engine_event_destroy(event);
     }

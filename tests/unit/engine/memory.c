@@ -42,8 +42,7 @@ static void open_gate(unsigned jobs)
 {
     atomic_store(&fake.gate_open, true);
     for (unsigned i = 0; i < 2 * jobs; i++) { /* a frame and an answer each */
-        struct engine_event *event = event_within(60000);
-        assert_non_null(event);
+        struct engine_event *event = next_event();
         assert_true(event->kind == ENGINE_FRAME || event->kind == ENGINE_DONE);
         engine_event_destroy(event);
     }
@@ -117,7 +116,7 @@ TEST(views_go_on_while_batches_wait_for_memory)
     engine_event_destroy(expect_event(ENGINE_FRAME, 3, 30));
     submit_target(ENGINE_JOB_CANCEL, 3, 31, 30, 0);
     for (int i = 0; i < 2; i++)
-        engine_event_destroy(event_within(60000));
+        engine_event_destroy(next_event());
     open_gate(2);
     view_wishes_unref(wishes);
 }

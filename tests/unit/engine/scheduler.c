@@ -9,7 +9,7 @@
 #define MS ((uint64_t)1000000)
 
 /* Serves slices as the engine does, and counts the time that each job had. */
-struct simulation {
+static struct simulation {
     struct scheduler scheduler;
     struct schedule_owner owners[JOBS_MAX];
     struct schedule_client clients[JOBS_MAX];
@@ -21,65 +21,73 @@ struct simulation {
     bool keeps_turn[JOBS_MAX]; /* as it has begun something */
     size_t count, before;
     uint64_t now_ns;
-};
+} simulation;
 
-static size_t add_of(struct simulation *simulation, size_t owner, size_t client, uint32_t weight,
-                     uint64_t slice_ns)
+static int begin(void **state)
 {
-    size_t i = simulation->count++;
-    simulation->entries[i] = (struct schedule_entry){.owner = &simulation->owners[owner],
-                                                     .client = &simulation->clients[client],
-                                                     .job = &simulation->shares[i],
-                                                     .ready = true};
-    simulation->weights[i] = weight;
-    simulation->granted[i] = weight;
-    simulation->slice_ns[i] = slice_ns;
+    (void)state;
+    memset(&simulation, 0, sizeof(simulation));
+    return 0;
+}
+
+EACH_TEST(begin, NULL)
+
+static size_t add_of(size_t owner, size_t client, uint32_t weight, uint64_t slice_ns)
+{
+    size_t i = simulation.count++;
+    simulation.entries[i] = (struct schedule_entry){.owner = &simulation.owners[owner],
+                                                    .client = &simulation.clients[client],
+                                                    .job = &simulation.shares[i],
+                                                    .ready = true};
+    simulation.weights[i] = weight;
+    simulation.granted[i] = weight;
+    simulation.slice_ns[i] = slice_ns;
     return i;
 }
 
 /* All clients are one owner's. */
-static size_t add(struct simulation *simulation, size_t client, uint32_t weight, uint64_t slice_ns)
+static size_t add(size_t client, uint32_t weight, uint64_t slice_ns)
 {
-    return add_of(simulation, 0, client, weight, slice_ns);
+    return add_of(0, client, weight, slice_ns);
 }
 
-static size_t serve(struct simulation *simulation)
+static size_t serve(void)
 {
-    size_t picked = simulation->before;
-    if (!simulation->keeps_turn[picked] || !schedule_turn_lasts(&simulation->scheduler))
-        picked = schedule_pick(&simulation->scheduler, simulation->entries, simulation->count);
+    size_t picked = simulation.before;
+    if (!simulation.keeps_turn[picked] || !schedule_turn_lasts(&simulation.scheduler))
+        picked = schedule_pick(&simulation.scheduler, simulation.entries, simulation.count);
     if (picked == SCHEDULE_NONE)
         return picked;
-    uint64_t slice_ns = simulation->slice_ns[picked];
-    schedule_charge(&simulation->scheduler, &simulation->entries[picked], slice_ns, simulation->weights[picked],
-                    simulation->granted[picked]);
-    simulation->before = picked;
-    simulation->now_ns += slice_ns;
-    simulation->had_ns[picked] += slice_ns;
-    simulation->waited_ns[picked] = 0;
-    for (size_t i = 0; i < simulation->count; i++) {
-        if (i == picked || !simulation->entries[i].ready)
+    uint64_t slice_ns = simulation.slice_ns[picked];
+    schedule_charge(&simulation.scheduler, &simulation.entries[picked], slice_ns, simulation.weights[picked],
+                    simulation.granted[picked]);
+    simulation.before = picked;
+    simulation.now_ns += slice_ns;
+    simulation.had_ns[picked] += slice_ns;
+    simulation.waited_ns[picked] = 0;
+    for (size_t i = 0; i < simulation.count; i++) {
+        if (i == picked || !simulation.entries[i].ready)
             continue;
-        simulation->waited_ns[i] += slice_ns;
-        if (simulation->waited_ns[i] > simulation->longest_wait_ns[i])
-            simulation->longest_wait_ns[i] = simulation->waited_ns[i];
+        simulation.waited_ns[i] += slice_ns;
+        if (simulation.waited_ns[i] > simulation.longest_wait_ns[i])
+            simulation.longest_wait_ns[i] = simulation.waited_ns[i];
     }
     return picked;
 }
 
-static void serve_for(struct simulation *simulation, uint64_t time_ns)
+static void serve_for(uint64_t time_ns)
 {
-    for (uint64_t end_ns = simulation->now_ns + time_ns; simulation->now_ns < end_ns;)
-        assert_true(serve(simulation) != SCHEDULE_NONE);
+    for (uint64_t end_ns = simulation.now_ns + time_ns; simulation.now_ns < end_ns;)
+        assert_true(serve() != SCHEDULE_NONE);
 }
 
 /* Within one slice of whoever has the longest. */
-static void expect_had(const struct simulation *simulation, size_t job, uint64_t expected_ns)
+static void expect_had(size_t job, uint64_t expected_ns)
 {
     uint64_t longest_ns = 0;
-    for (size_t i = 0; i < simulation->count; i++)
-        longest_ns = simulation->slice_ns[i] > longest_ns ? simulation->slice_ns[i] : longest_ns;
-    uint64_t had_ns = simulation->had_ns[job];
+    for (size_t i = 0; i < simulation.count; i++)
+        longest_ns = simulation.slice_ns[i] > longest_ns ? simulation.slice_ns[i] : longest_ns;
+    uint64_t had_ns = simulation.had_ns[job];
     if (had_ns > expected_ns + longest_ns || had_ns + longest_ns < expected_ns)
         fail_msg("job %zu had %.1f ms, expected %.1f within %.1f", job, (double)had_ns / MS,
                  (double)expected_ns / MS, (double)longest_ns / MS);
@@ -87,140 +95,130 @@ static void expect_had(const struct simulation *simulation, size_t job, uint64_t
 
 TEST(no_job_is_picked_when_none_is_ready)
 {
-    struct simulation simulation = {0};
-    assert_true(serve(&simulation) == SCHEDULE_NONE);
+    assert_true(serve() == SCHEDULE_NONE);
     for (size_t client = 0; client < 2; client++)
-        simulation.entries[add(&simulation, client, 1, MS)].ready = false;
-    assert_true(serve(&simulation) == SCHEDULE_NONE);
+        simulation.entries[add(client, 1, MS)].ready = false;
+    assert_true(serve() == SCHEDULE_NONE);
 }
 
 TEST(a_client_that_is_alone_has_all_of_the_time)
 {
-    struct simulation simulation = {0};
-    add(&simulation, 0, 1, 3 * MS);
-    add(&simulation, 0, 1, 3 * MS);
-    simulation.entries[add(&simulation, 1, 1, MS)].ready = false;
-    serve_for(&simulation, 300 * MS);
-    expect_had(&simulation, 0, 150 * MS);
-    expect_had(&simulation, 1, 150 * MS);
+    add(0, 1, 3 * MS);
+    add(0, 1, 3 * MS);
+    simulation.entries[add(1, 1, MS)].ready = false;
+    serve_for(300 * MS);
+    expect_had(0, 150 * MS);
+    expect_had(1, 150 * MS);
 }
 
 TEST(clients_share_alike_however_many_jobs_they_have)
 {
-    struct simulation simulation = {0};
     for (size_t i = 0; i < 6; i++)
-        add(&simulation, i < 4 ? 0 : i, 1, (i + 1) * MS);
-    serve_for(&simulation, 1200 * MS);
+        add(i < 4 ? 0 : i, 1, (i + 1) * MS);
+    serve_for(1200 * MS);
     for (size_t i = 0; i < 4; i++)
-        expect_had(&simulation, i, 100 * MS);
+        expect_had(i, 100 * MS);
     for (size_t i = 4; i < 6; i++)
-        expect_had(&simulation, i, 400 * MS);
+        expect_had(i, 400 * MS);
 }
 
 TEST(long_slices_buy_no_more_time_and_keep_short_ones_waiting_for_one_only)
 {
-    struct simulation simulation = {0};
-    size_t heavy = add(&simulation, 0, 1, 100 * MS), light = add(&simulation, 1, 1, 2 * MS);
-    serve_for(&simulation, 10000 * MS);
-    expect_had(&simulation, heavy, 5000 * MS);
-    expect_had(&simulation, light, 5000 * MS);
+    size_t heavy = add(0, 1, 100 * MS), light = add(1, 1, 2 * MS);
+    serve_for(10000 * MS);
+    expect_had(heavy, 5000 * MS);
+    expect_had(light, 5000 * MS);
     assert_true(simulation.longest_wait_ns[light] == 100 * MS);
     assert_true(simulation.longest_wait_ns[heavy] <= 102 * MS);
 }
 
 TEST(weights_divide_the_time_between_clients)
 {
-    struct simulation simulation = {0};
-    size_t view = add(&simulation, 0, 4, 3 * MS), batch = add(&simulation, 1, 1, 7 * MS);
-    serve_for(&simulation, 5000 * MS);
-    expect_had(&simulation, view, 4000 * MS);
-    expect_had(&simulation, batch, 1000 * MS);
+    size_t view = add(0, 4, 3 * MS), batch = add(1, 1, 7 * MS);
+    serve_for(5000 * MS);
+    expect_had(view, 4000 * MS);
+    expect_had(batch, 1000 * MS);
     /* A batch that is given the same weight has the same share, and the maximum weight sixteen times that of the
      * minimum. */
-    size_t great = add(&simulation, 2, 16, 5 * MS), same = add(&simulation, 3, 4, 5 * MS);
+    size_t great = add(2, 16, 5 * MS), same = add(3, 4, 5 * MS);
     memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
-    serve_for(&simulation, 25000 * MS);
-    expect_had(&simulation, view, 4000 * MS);
-    expect_had(&simulation, batch, 1000 * MS);
-    expect_had(&simulation, great, 16000 * MS);
-    expect_had(&simulation, same, 4000 * MS);
+    serve_for(25000 * MS);
+    expect_had(view, 4000 * MS);
+    expect_had(batch, 1000 * MS);
+    expect_had(great, 16000 * MS);
+    expect_had(same, 4000 * MS);
 }
 
 TEST(weights_divide_the_time_between_the_jobs_of_a_client_too)
 {
-    struct simulation simulation = {0};
-    size_t view = add(&simulation, 0, 4, 2 * MS), batch = add(&simulation, 0, 1, 9 * MS);
-    serve_for(&simulation, 2000 * MS);
-    expect_had(&simulation, view, 1600 * MS);
-    expect_had(&simulation, batch, 400 * MS);
+    size_t view = add(0, 4, 2 * MS), batch = add(0, 1, 9 * MS);
+    serve_for(2000 * MS);
+    expect_had(view, 1600 * MS);
+    expect_had(batch, 400 * MS);
 }
 
 TEST(a_job_that_returns_after_a_pause_has_no_claim_on_missed_time)
 {
-    struct simulation simulation = {0};
-    size_t there = add(&simulation, 0, 1, 5 * MS), paused = add(&simulation, 1, 1, 5 * MS);
-    serve_for(&simulation, 100 * MS);
+    size_t there = add(0, 1, 5 * MS), paused = add(1, 1, 5 * MS);
+    serve_for(100 * MS);
     simulation.entries[paused].ready = false;
-    serve_for(&simulation, 5000 * MS);
+    serve_for(5000 * MS);
     simulation.entries[paused].ready = true;
     memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
-    assert_int_equal(serve(&simulation), paused); /* it is next at once */
-    serve_for(&simulation, 195 * MS);
-    expect_had(&simulation, there, 100 * MS);
-    expect_had(&simulation, paused, 100 * MS);
+    assert_int_equal(serve(), paused); /* it is next at once */
+    serve_for(195 * MS);
+    expect_had(there, 100 * MS);
+    expect_had(paused, 100 * MS);
     /* So it is for one that was never seen, and for a job among others of its client. */
-    size_t late = add(&simulation, 2, 1, 5 * MS), second = add(&simulation, 0, 1, 5 * MS);
+    size_t late = add(2, 1, 5 * MS), second = add(0, 1, 5 * MS);
     memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
-    serve_for(&simulation, 300 * MS);
-    expect_had(&simulation, late, 100 * MS);
-    expect_had(&simulation, paused, 100 * MS);
-    expect_had(&simulation, there, 50 * MS);
-    expect_had(&simulation, second, 50 * MS);
+    serve_for(300 * MS);
+    expect_had(late, 100 * MS);
+    expect_had(paused, 100 * MS);
+    expect_had(there, 50 * MS);
+    expect_had(second, 50 * MS);
 }
 
 TEST(a_client_whose_job_has_ended_has_no_claim_either)
 {
-    struct simulation simulation = {0};
-    add(&simulation, 0, 1, 5 * MS);
-    size_t job = add(&simulation, 1, 1, 5 * MS);
-    serve_for(&simulation, 100 * MS);
+    add(0, 1, 5 * MS);
+    size_t job = add(1, 1, 5 * MS);
+    serve_for(100 * MS);
     simulation.count--; /* it is not named any more */
-    serve_for(&simulation, 3000 * MS);
+    serve_for(3000 * MS);
     simulation.shares[job] = (struct schedule_share){0}; /* another one of that client */
     simulation.count++;
     memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
-    serve_for(&simulation, 200 * MS);
-    expect_had(&simulation, 0, 100 * MS);
-    expect_had(&simulation, job, 100 * MS);
+    serve_for(200 * MS);
+    expect_had(0, 100 * MS);
+    expect_had(job, 100 * MS);
 }
 
 TEST(pauses_of_all_do_not_make_the_first_to_come_the_owner)
 {
-    struct simulation simulation = {0};
-    size_t first = add(&simulation, 0, 1, 5 * MS);
-    serve_for(&simulation, 3000 * MS);
+    size_t first = add(0, 1, 5 * MS);
+    serve_for(3000 * MS);
     simulation.entries[first].ready = false;
-    assert_true(serve(&simulation) == SCHEDULE_NONE);
-    size_t second = add(&simulation, 1, 1, 5 * MS);
-    assert_int_equal(serve(&simulation), second);
+    assert_true(serve() == SCHEDULE_NONE);
+    size_t second = add(1, 1, 5 * MS);
+    assert_int_equal(serve(), second);
     simulation.entries[first].ready = true;
     memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
-    serve_for(&simulation, 200 * MS);
-    expect_had(&simulation, first, 100 * MS);
-    expect_had(&simulation, second, 100 * MS);
+    serve_for(200 * MS);
+    expect_had(first, 100 * MS);
+    expect_had(second, 100 * MS);
 }
 
 TEST(a_job_that_pauses_between_slices_is_served_first_and_not_more)
 {
-    struct simulation simulation = {0};
-    size_t batch = add(&simulation, 0, 1, 8 * MS), view = add(&simulation, 1, 4, 5 * MS);
+    size_t batch = add(0, 1, 8 * MS), view = add(1, 4, 5 * MS);
     simulation.entries[view].ready = false;
-    serve_for(&simulation, 40 * MS);
+    serve_for(40 * MS);
     /* A camera every fourth slice or so, as it comes. */
     for (int i = 0; i < 400; i++) {
         if (i % 4 == 0)
             simulation.entries[view].ready = true;
-        size_t picked = serve(&simulation);
+        size_t picked = serve();
         assert_int_equal(picked, i % 4 == 0 ? view : batch);
         if (picked == view)
             simulation.entries[view].ready = false;
@@ -229,21 +227,20 @@ TEST(a_job_that_pauses_between_slices_is_served_first_and_not_more)
 
 TEST(many_clients_are_all_served)
 {
-    struct simulation simulation = {0};
     uint32_t random = 1;
     for (size_t i = 0; i < JOBS_MAX; i++)
-        add(&simulation, i, 1, MS);
+        add(i, 1, MS);
     for (int round = 0; round < 20000; round++) {
         for (size_t i = 0; i < JOBS_MAX; i++) {
             random = random * 1664525u + 1013904223u;
             simulation.slice_ns[i] = (1 + (random >> 16) % (i % 2 ? 3 : 20)) * MS;
         }
-        serve(&simulation);
+        serve();
     }
     for (size_t i = 0; i < JOBS_MAX; i++)
         simulation.slice_ns[i] = 20 * MS; /* what the longest was */
     for (size_t i = 0; i < JOBS_MAX; i++) {
-        expect_had(&simulation, i, simulation.now_ns / JOBS_MAX);
+        expect_had(i, simulation.now_ns / JOBS_MAX);
         /* Nobody waits for longer than it takes to serve each of the others, and what its own slice went too far.
          */
         assert_true(simulation.longest_wait_ns[i] <= 2 * JOBS_MAX * 20 * MS);
@@ -252,55 +249,52 @@ TEST(many_clients_are_all_served)
 
 TEST(a_frame_that_is_looked_at_is_finished_before_another_is_begun)
 {
-    struct simulation simulation = {0};
     for (size_t i = 0; i < 3; i++) {
-        add(&simulation, i, 4, 2 * MS);
+        add(i, 4, 2 * MS);
         simulation.keeps_turn[i] = true;
     }
-    size_t batch = add(&simulation, 3, 1, 2 * MS);
+    size_t batch = add(3, 1, 2 * MS);
     /* Frames of four slices; of a next one nothing is begun when one is done. */
     for (size_t frame = 0, before = batch; frame < 300; frame++) {
-        size_t now = serve(&simulation);
+        size_t now = serve();
         assert_true(now != before || now == batch);
         if (before != batch)
             simulation.keeps_turn[before] = true;
         for (int slice = 1; slice < 4 && now != batch; slice++)
-            assert_int_equal(serve(&simulation), now);
+            assert_int_equal(serve(), now);
         simulation.keeps_turn[now] = false;
         before = now;
     }
     for (size_t i = 0; i < 3; i++) {
         simulation.slice_ns[i] = 8 * MS; /* a frame's */
-        expect_had(&simulation, i, simulation.now_ns * 4 / 13);
+        expect_had(i, simulation.now_ns * 4 / 13);
     }
-    expect_had(&simulation, batch, simulation.now_ns / 13);
+    expect_had(batch, simulation.now_ns / 13);
 }
 
 TEST(a_long_frame_does_not_keep_the_turn_for_ever)
 {
-    struct simulation simulation = {0};
-    size_t heavy = add(&simulation, 0, 1, 3 * MS), light = add(&simulation, 1, 1, 3 * MS);
+    size_t heavy = add(0, 1, 3 * MS), light = add(1, 1, 3 * MS);
     simulation.keeps_turn[heavy] = true;
-    serve_for(&simulation, 3000 * MS);
-    expect_had(&simulation, heavy, 1500 * MS);
-    expect_had(&simulation, light, 1500 * MS);
+    serve_for(3000 * MS);
+    expect_had(heavy, 1500 * MS);
+    expect_had(light, 1500 * MS);
     assert_true(simulation.longest_wait_ns[light] <= SCHEDULE_TURN_NS + 2 * SCHEDULE_TURN_EACH_NS + 3 * MS);
 }
 
 TEST(a_very_long_slice_is_not_paid_for_without_end)
 {
-    struct simulation simulation = {0};
     for (size_t i = 0; i < JOBS_MAX; i++)
-        add(&simulation, i, 1, 5 * MS);
-    serve_for(&simulation, 1000 * MS);
+        add(i, 1, 5 * MS);
+    serve_for(1000 * MS);
     size_t first = 3;
     simulation.slice_ns[first] = 5000 * MS; /* programs are compiled, a large scene is built */
-    while (serve(&simulation) != first)
+    while (serve() != first)
         continue;
     simulation.slice_ns[first] = 5 * MS;
     memset(simulation.longest_wait_ns, 0, sizeof(simulation.longest_wait_ns));
     memset(simulation.waited_ns, 0, sizeof(simulation.waited_ns));
-    serve_for(&simulation, 10000 * MS);
+    serve_for(10000 * MS);
     /* Of so many, two turns of each; and one round, as the others were not alike far either. */
     uint64_t turn_ns = SCHEDULE_TURN_NS + JOBS_MAX * (uint64_t)SCHEDULE_TURN_EACH_NS;
     assert_true(simulation.longest_wait_ns[first] <= JOBS_MAX * (2 * turn_ns + 5 * MS));
@@ -309,56 +303,52 @@ TEST(a_very_long_slice_is_not_paid_for_without_end)
 
 TEST(a_slice_that_the_machine_interrupts_costs_no_turns)
 {
-    struct simulation simulation = {0};
     for (size_t i = 0; i < JOBS_MAX; i++)
-        add(&simulation, i, 1, MS / 4);
-    serve_for(&simulation, 200 * MS);
+        add(i, 1, MS / 4);
+    serve_for(200 * MS);
     simulation.slice_ns[7] = 40 * MS;
-    while (serve(&simulation) != 7)
+    while (serve() != 7)
         continue;
     simulation.slice_ns[7] = MS / 4;
     memset(simulation.longest_wait_ns, 0, sizeof(simulation.longest_wait_ns));
     memset(simulation.waited_ns, 0, sizeof(simulation.waited_ns));
-    serve_for(&simulation, 1000 * MS);
+    serve_for(1000 * MS);
     assert_true(simulation.longest_wait_ns[7] <= JOBS_MAX * (SCHEDULE_OUTLIER_MIN_NS + MS / 4));
 }
 
 TEST(short_frames_come_as_often_as_they_are_due_beside_many_long_ones)
 {
-    struct simulation simulation = {0};
-    size_t light = add(&simulation, 0, 1, 2 * MS);
+    size_t light = add(0, 1, 2 * MS);
     for (size_t i = 1; i < JOBS_MAX; i++)
-        simulation.keeps_turn[add(&simulation, i, 1, 3 * MS)] = true;
+        simulation.keeps_turn[add(i, 1, 3 * MS)] = true;
     uint32_t frames = 0;
     while (simulation.now_ns < 20000 * MS)
-        frames += serve(&simulation) == light;
+        frames += serve() == light;
     /* A 64th of the time, in frames of 2 ms. */
     assert_true(frames >= 20000 / 64 / 2 * 9 / 10);
-    expect_had(&simulation, light, frames * 2 * MS);
+    expect_had(light, frames * 2 * MS);
 }
 
 TEST(owners_share_alike_however_many_clients_they_have)
 {
-    struct simulation simulation = {0};
     for (size_t client = 0; client < 20; client++)
-        add_of(&simulation, 0, client, 1, 3 * MS);
-    add_of(&simulation, 1, 20, 1, MS);
-    serve_for(&simulation, 4000 * MS);
-    expect_had(&simulation, 20, 2000 * MS);
+        add_of(0, client, 1, 3 * MS);
+    add_of(1, 20, 1, MS);
+    serve_for(4000 * MS);
+    expect_had(20, 2000 * MS);
     for (size_t client = 0; client < 20; client++)
-        expect_had(&simulation, client, 100 * MS);
+        expect_had(client, 100 * MS);
     assert_true(simulation.longest_wait_ns[20] <= 6 * MS); /* two slices of the other owner */
 }
 
 TEST(a_weight_that_is_not_granted_divides_an_owners_own_share_only)
 {
-    struct simulation simulation = {0};
-    add_of(&simulation, 0, 0, 16, MS);
-    add_of(&simulation, 0, 0, 4, MS);
-    add_of(&simulation, 1, 1, 1, MS);
+    add_of(0, 0, 16, MS);
+    add_of(0, 0, 4, MS);
+    add_of(1, 1, 1, MS);
     simulation.granted[0] = simulation.granted[1] = 1;
-    serve_for(&simulation, 2000 * MS);
-    expect_had(&simulation, 0, 800 * MS);
-    expect_had(&simulation, 1, 200 * MS);
-    expect_had(&simulation, 2, 1000 * MS);
+    serve_for(2000 * MS);
+    expect_had(0, 800 * MS);
+    expect_had(1, 200 * MS);
+    expect_had(2, 1000 * MS);
 }

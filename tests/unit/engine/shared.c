@@ -28,8 +28,7 @@ static void expect_answers(const uint32_t *requests, size_t count)
 {
     bool seen[16] = {false};
     for (size_t left = count; left > 0;) {
-        struct engine_event *event = event_within(60000);
-        assert_non_null(event);
+        struct engine_event *event = next_event();
         size_t i = 0;
         while (i < count && requests[i] != event->request)
             i++;
@@ -46,12 +45,14 @@ static void expect_answers(const uint32_t *requests, size_t count)
 TEST(frames_of_one_scene_take_turns_by_slices)
 {
     clock_stop();
+    atomic_store(&fake.holds_steps, true); /* until all are there */
     open_scene(1, 1);
     for (uint32_t request = 2; request <= 4; request++) {
         struct engine_command *made = still(request, 100, 0);
         made->job.frame.ao_rays = 1000;
         submit(made);
     }
+    atomic_store(&fake.holds_steps, false);
     wait_until(&fake.frames_begun, 3);
     assert_int_equal(atomic_load(&fake.scenes), 1); /* they share it */
     expect_answers((const uint32_t[]){2, 3, 4}, 3);
@@ -87,8 +88,7 @@ TEST(an_edit_waits_for_all_frames_and_lets_none_begin)
     atomic_store(&fake.gate_open, true);
     bool applied = false, rendered = false;
     while (!applied || !rendered) {
-        struct engine_event *event = event_within(60000);
-        assert_non_null(event);
+        struct engine_event *event = next_event();
         if (event->request == 6)
             applied = true;
         else

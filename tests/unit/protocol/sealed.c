@@ -94,9 +94,24 @@ static size_t hear(struct end *end, const uint8_t *bytes, size_t count, struct t
     return consumed;
 }
 
+static void end_both(void)
+{
+    sealed_destroy(client.sealed);
+    sealed_destroy(server.sealed);
+    client.sealed = server.sealed = NULL;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    end_both();
+    return 0;
+}
+
 static void begin(const struct sealed_key *client_key, const struct sealed_key *server_keys, size_t key_count)
 {
     uint8_t out[SEALED_MESSAGE_MAX_BYTES];
+    end_both();
     up.count = down.count = 0;
     client = (struct end){.sealed = sealed_client(client_key)};
     server = (struct end){.sealed = sealed_server(server_keys, key_count)};
@@ -130,12 +145,6 @@ static void open_both(void)
     shake_hands(0, 0);
     assert_true(sealed_is_open(client.sealed) && sealed_is_open(server.sealed));
     up.count = down.count = 0;
-}
-
-static void end_both(void)
-{
-    sealed_destroy(client.sealed);
-    sealed_destroy(server.sealed);
 }
 
 static void say(struct end *end, struct traffic *traffic, const void *plain, size_t count)
@@ -188,7 +197,6 @@ TEST(both_ends_open_and_understand_each_other)
     offset = 0;
     assert_int_equal(unseal(&client, down.bytes, down.count, &offset), SEALED_CONSUMED);
     assert_memory_equal(opened, "from the server", 15);
-    end_both();
 }
 
 TEST(the_server_knows_which_key_the_client_has)
@@ -199,7 +207,6 @@ TEST(the_server_knows_which_key_the_client_has)
         shake_hands(0, 0);
         assert_true(sealed_is_open(client.sealed) && sealed_is_open(server.sealed));
         assert_int_equal(sealed_key_index(server.sealed), i);
-        end_both();
     }
     assert_int_not_equal(sealed_key_number(&keys[0]), sealed_key_number(&keys[1]));
     assert_null(sealed_server(keys, 0));
@@ -241,7 +248,6 @@ TEST(the_same_is_heard_byte_by_byte)
                      SEALED_NEED_ROOM);
     assert_int_equal(unseal(&client, whole_down.bytes, whole_down.count, &offset), SEALED_CONSUMED);
     assert_memory_equal(opened, "seven!!", 7);
-    end_both();
 }
 
 /* ---- golden bytes -------------------------------------------------------------------------------------- */
@@ -308,7 +314,6 @@ static void print_session(FILE *file)
     down.count = 0;
     say(&server, &down, NULL, 0);
     print_hex(file, "server_last_record", down.bytes, down.count);
-    end_both();
 }
 
 TEST(the_bytes_are_the_stored_ones)
@@ -349,6 +354,7 @@ static int prepare(void **state)
     return getenv("FARLIGHT_UPDATE_GOLDEN") ? update_golden() : 0;
 }
 ALL_TESTS(prepare, NULL)
+EACH_TEST(NULL, end)
 
 /* ---- who has no business there ------------------------------------------------------------------------- */
 
@@ -365,7 +371,6 @@ TEST(a_wrong_key_is_refused_without_a_reason)
     /* Nor can the right proof be tried after it. */
     hear(&server, up.bytes + 72, 64, &down);
     assert_int_equal(server.last, SEALED_FATAL);
-    end_both();
 }
 
 TEST(a_server_without_the_key_is_found_out)
@@ -385,7 +390,6 @@ TEST(a_server_without_the_key_is_found_out)
     assert_false(sealed_is_open(victim));
     sealed_destroy(impostor);
     sealed_destroy(victim);
-    end_both();
 }
 
 TEST(refusals_are_reported_with_their_reason)
@@ -399,7 +403,6 @@ TEST(refusals_are_reported_with_their_reason)
         assert_int_equal(client.last, SEALED_REFUSED);
         assert_int_equal(sealed_status(client.sealed), at_once[i]);
         assert_string_equal(client.error.text, sealed_status_text(at_once[i]));
-        end_both();
     }
     begin(&full_key, &other_key, 1);
     shake_hands(0, 0);
@@ -407,13 +410,11 @@ TEST(refusals_are_reported_with_their_reason)
     hear(&client, refusal, sizeof(refusal), &up);
     assert_int_equal(client.last, SEALED_REFUSED);
     assert_int_equal(sealed_status(client.sealed), SEALED_WRONG_KEY);
-    end_both();
     begin(&full_key, &full_key, 1);
     up.bytes[5] = 2;
     hear(&server, up.bytes, up.count, &down);
     assert_int_equal(server.last, SEALED_REFUSED);
     assert_int_equal(sealed_status(server.sealed), SEALED_OTHER_VERSION);
-    end_both();
 }
 
 /* ---- changed on the way -------------------------------------------------------------------------------- */
@@ -428,7 +429,6 @@ TEST(no_bit_of_the_handshake_can_be_changed)
             /* Only the server's own last word can be changed once it has let the client in. */
             if (sealed_is_open(client.sealed) || (message < 4 && sealed_is_open(server.sealed)))
                 fail_msg("bit %zu of message %u does not matter", bit, message);
-            end_both();
         }
     }
 }
@@ -451,7 +451,6 @@ TEST(no_bit_of_a_record_can_be_changed)
             fail_msg("bit %zu does not matter", bit);
         /* Not even the record as it was is taken after that. */
         assert_int_equal(unseal(&server, up.bytes, up.count, &offset), SEALED_FATAL);
-        end_both();
     }
 }
 
@@ -468,7 +467,6 @@ TEST(a_weak_public_key_is_refused)
         hear(&server, up.bytes, up.count, &down);
         assert_int_equal(server.last, SEALED_FATAL);
         assert_int_equal(down.count, 0);
-        end_both();
         begin(&full_key, &full_key, 1);
         hear(&server, up.bytes, up.count, &down);
         memcpy(down.bytes + 8, weak[i], 32);
@@ -476,7 +474,6 @@ TEST(a_weak_public_key_is_refused)
         hear(&client, down.bytes, down.count, &up);
         assert_int_equal(client.last, SEALED_FATAL);
         assert_int_equal(up.count, 0);
-        end_both();
     }
 }
 
@@ -490,7 +487,6 @@ TEST(lengths_tags_and_what_comes_too_late_are_refused)
         open_both();
         assert_true(sealed_has_record(head, sizeof(head)));
         assert_int_equal(unseal(&server, head, sizeof(head), &offset), SEALED_FATAL);
-        end_both();
     }
     open_both();
     size_t offset = 0;
@@ -498,7 +494,6 @@ TEST(lengths_tags_and_what_comes_too_late_are_refused)
     say(&client, &up, "more", 4);
     assert_int_equal(unseal(&server, up.bytes, up.count, &offset), SEALED_CONSUMED);
     assert_int_equal(unseal(&server, up.bytes, up.count, &offset), SEALED_FATAL);
-    end_both();
 }
 
 /* ---- said before, or to somebody else ------------------------------------------------------------------ */
@@ -512,7 +507,6 @@ TEST(a_recorded_session_cannot_be_played_again)
     say(&server, &down, "pixels", 6);
     said = up;
     answered = down;
-    end_both();
     /* To another connection of the server: the same bytes, whatever it answers. */
     begin(&full_key, &full_key, 1);
     assert_int_equal(hear(&server, said.bytes, 72, &down), 72);
@@ -522,7 +516,6 @@ TEST(a_recorded_session_cannot_be_played_again)
     assert_int_equal(hear(&client, answered.bytes, 72, &up), 72);
     hear(&client, answered.bytes + 72, 64, &up);
     assert_int_equal(client.last, SEALED_FATAL);
-    end_both();
 }
 
 TEST(a_record_cannot_be_repeated_left_out_or_moved)
@@ -541,7 +534,6 @@ TEST(a_record_cannot_be_repeated_left_out_or_moved)
             offset = starts[1];
         }
         assert_int_equal(unseal(&server, up.bytes, up.count, &offset), SEALED_FATAL);
-        end_both();
     }
 }
 
@@ -553,14 +545,12 @@ TEST(a_message_cannot_be_reflected_to_its_sender)
     /* As it is, and as what the client waits for. */
     hear(&client, first, sizeof(first), &up);
     assert_int_equal(client.last, SEALED_FATAL);
-    end_both();
     begin(&full_key, &full_key, 1);
     memcpy(first, up.bytes, sizeof(first));
     first[4] = 2;
     first[5] = SEALED_WELCOME;
     hear(&client, first, sizeof(first), &up);
     assert_int_equal(client.last, SEALED_FATAL);
-    end_both();
     /* Message 2 to the server in place of message 3; and 3 to the client in place of 4. */
     begin(&full_key, &full_key, 1);
     hear(&server, up.bytes, 72, &down);
@@ -572,20 +562,17 @@ TEST(a_message_cannot_be_reflected_to_its_sender)
     proof[4] = 4;
     hear(&client, proof, sizeof(proof), &up);
     assert_int_equal(client.last, SEALED_FATAL);
-    end_both();
     /* Message 4 after it was said, and records of either. */
     begin(&full_key, &full_key, 1);
     shake_hands(0, 0);
     hear(&server, down.bytes + 72, 64, &down);
     assert_int_equal(server.last, SEALED_FATAL);
-    end_both();
     open_both();
     size_t offset = 0;
     say(&client, &up, "mine", 4);
     say(&server, &down, "yours", 5);
     assert_int_equal(unseal(&client, up.bytes, up.count, &offset), SEALED_FATAL);
     assert_int_equal(unseal(&server, down.bytes, down.count, &offset), SEALED_FATAL);
-    end_both();
 }
 
 /* Of two connections at once, each message of one given to the other: a server in the middle without the key. */
@@ -628,7 +615,6 @@ static size_t record_session(const uint8_t *client_randomness, struct traffic *t
     say(&server, &down, "i", 1);
     say(&server, &down, NULL, 0);
     *told = down;
-    end_both();
     return down.count;
 }
 
@@ -646,6 +632,7 @@ TEST(a_session_that_is_cut_anywhere_is_seen_to_be)
         chosen = (const uint8_t *)&given;
         chosen_left = sizeof(given);
         up.count = 0;
+        sealed_destroy(client.sealed);
         client = (struct end){.sealed = sealed_client(&full_key)};
         sealed_begin(client.sealed, out);
         chosen = given.client_header;
@@ -663,7 +650,6 @@ TEST(a_session_that_is_cut_anywhere_is_seen_to_be)
         assert_int_equal(sealed_has_opened_last(client.sealed), count == whole);
         assert_memory_equal(text, "abcdefghi", text_bytes);
         assert_true(count < whole || text_bytes == 9);
-        sealed_destroy(client.sealed);
     }
 }
 

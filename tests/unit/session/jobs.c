@@ -66,12 +66,10 @@ SESSION_TEST(a_cancelled_job_has_one_answer_and_nothing_follows_it)
     atomic_store(&engine.keep_jobs, true);
     struct message message = render_message(5, 10);
     send_message(2, 0, &message);
-    message = made(MESSAGE_CANCEL);
-    message.cancel.target_request = 2;
-    send_message(3, 0, &message);
+    cancel(3, 2);
     expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 3);
-    send_message(4, 0, &message); /* it is gone already */
+    cancel(4, 2); /* it is gone already */
     expect(MESSAGE_OK, 4);
     expect_alive(5);
 }
@@ -106,9 +104,7 @@ SESSION_TEST(a_job_cancelled_while_it_sends_ends_at_its_answer)
     struct message message = render_message(50, 51);
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
-    message = made(MESSAGE_CANCEL);
-    message.cancel.target_request = 2;
-    send_message(3, 0, &message);
+    cancel(3, 2);
     bool answered = false;
     for (;;) {
         const struct message *got = receive();
@@ -536,9 +532,7 @@ SESSION_TEST(a_job_whose_frames_do_not_fit_in_memory_waits_for_others_to_end)
     expect_error(3, PROTOCOL_ERROR_BUSY);
     assert_int_equal(client.message.error.retryable, 1);
     assert_non_null(strstr(client.message.error.remedy, "memory.frames"));
-    message = made(MESSAGE_CANCEL);
-    message.cancel.target_request = 2;
-    send_message(4, 0, &message);
+    cancel(4, 2);
     expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 4);
     message = render_message(0, 1);
@@ -546,9 +540,7 @@ SESSION_TEST(a_job_whose_frames_do_not_fit_in_memory_waits_for_others_to_end)
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F; /* more than there is, but it is the only one */
     message.render.layers = 127;
     send_message(5, 0, &message);
-    message = made(MESSAGE_CANCEL);
-    message.cancel.target_request = 5;
-    send_message(6, 0, &message);
+    cancel(6, 5);
     expect_error(5, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 6);
     assert_int_equal(served.hub.frame_bytes, 0);

@@ -13,6 +13,17 @@
 #define FRAME_NS (S / 30)
 #define BEGIN_BYTES 300 /* of the first message */
 
+static struct pacing pacing;
+
+static int begin(void **state)
+{
+    (void)state;
+    pacing_init(&pacing, FRAME_NS);
+    return 0;
+}
+
+EACH_TEST(begin, NULL)
+
 /* ---- a link --------------------------------------------------------------------------------------- */
 
 struct acknowledgement {
@@ -54,12 +65,12 @@ static double line_ns(const struct link *link, uint64_t now_ns)
     return link->free_ns > (double)now_ns ? link->free_ns - (double)now_ns : 0.0;
 }
 
-static void link_deliver(struct link *link, struct pacing *pacing, uint64_t now_ns)
+static void link_deliver(struct link *link, uint64_t now_ns)
 {
     size_t count = 0;
     while (count < link->coming_count && link->coming[count].at_ns <= now_ns) {
         const struct acknowledgement *next = &link->coming[count++];
-        pacing_acknowledged(pacing, next->frame, next->whole, next->at_ns);
+        pacing_acknowledged(&pacing, next->frame, next->whole, next->at_ns);
     }
     link->coming_count -= count;
     memmove(link->coming, link->coming + count, link->coming_count * sizeof(link->coming[0]));
@@ -72,17 +83,16 @@ struct tally {
 };
 
 /* Frames of about `bytes`, one each FRAME_NS as far as the pacing allows; a tick is a millisecond. */
-static struct tally run(struct pacing *pacing, struct link *link, uint64_t begin_ns, uint64_t end_ns,
-                        uint64_t bytes, uint32_t *frame)
+static struct tally run(struct link *link, uint64_t begin_ns, uint64_t end_ns, uint64_t bytes, uint32_t *frame)
 {
     struct tally tally = {0};
     uint64_t next_ns = begin_ns;
     for (uint64_t now_ns = begin_ns; now_ns < end_ns; now_ns += MS) {
-        link_deliver(link, pacing, now_ns);
-        if (now_ns < next_ns || !pacing_may_send(pacing))
+        link_deliver(link, now_ns);
+        if (now_ns < next_ns || !pacing_may_send(&pacing))
             continue;
         uint64_t size = bytes * 4 / 5 + bytes * 2 / 5 * (*frame * 2654435761u >> 16) / 65536; /* 0.8 to 1.2 */
-        pacing_sent(pacing, *frame, size, now_ns);
+        pacing_sent(&pacing, *frame, size, now_ns);
         link_send(link, (*frame)++, size, now_ns);
         double line = line_ns(link, now_ns);
         tally.longest_line_ns = line > tally.longest_line_ns ? line : tally.longest_line_ns;
@@ -107,14 +117,13 @@ TEST(a_link_is_used_and_its_line_kept_short)
         uint32_t frames_min, frames_max; /* of 30 seconds at 30 a second */
     } rows[] = {{100, 10, 30000, 897, 900}, {10, 50, 26000, 900 * 95 / 100, 900}, {10, 50, 83000, 230, 460}};
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
-        struct pacing pacing;
         pacing_init(&pacing, FRAME_NS);
         struct link link = link_of(rows[i].megabits, rows[i].round_trip_ms * MS);
         uint32_t frame = 0;
-        run(&pacing, &link, 0, 2 * S, rows[i].bytes, &frame);
-        const struct tally first = run(&pacing, &link, 2 * S, 32 * S, rows[i].bytes, &frame);
-        run(&pacing, &link, 32 * S, 272 * S, rows[i].bytes, &frame);
-        const struct tally last = run(&pacing, &link, 272 * S, 302 * S, rows[i].bytes, &frame);
+        run(&link, 0, 2 * S, rows[i].bytes, &frame);
+        const struct tally first = run(&link, 2 * S, 32 * S, rows[i].bytes, &frame);
+        run(&link, 32 * S, 272 * S, rows[i].bytes, &frame);
+        const struct tally last = run(&link, 272 * S, 302 * S, rows[i].bytes, &frame);
         const double max_ns = (double)FRAME_NS + (double)(rows[i].round_trip_ms * MS) +
                               0.2 * (double)rows[i].bytes / link.bytes_per_ns;
         assert_true(first.longest_line_ns < max_ns && last.longest_line_ns < max_ns);
@@ -124,38 +133,35 @@ TEST(a_link_is_used_and_its_line_kept_short)
     }
 }
 
-static uint64_t rate_learned(bool tells_begin, struct pacing *pacing, uint64_t *true_rate)
+static uint64_t rate_learned(bool tells_begin, uint64_t *true_rate)
 {
-    pacing_init(pacing, FRAME_NS);
+    pacing_init(&pacing, FRAME_NS);
     struct link link = link_of(20, 30 * MS);
     link.tells_begin = tells_begin;
     uint32_t frame = 0;
-    run(pacing, &link, 0, 5 * S, 100000, &frame); /* more than it carries, so that frames stand in line */
+    run(&link, 0, 5 * S, 100000, &frame); /* more than it carries, so that frames stand in line */
     *true_rate = (uint64_t)(link.bytes_per_ns * 1e9);
-    return pacing_bytes_per_second(pacing);
+    return pacing_bytes_per_second(&pacing);
 }
 
 TEST(learns_the_link)
 {
-    struct pacing pacing;
-    uint64_t true_rate, rate = rate_learned(true, &pacing, &true_rate);
+    uint64_t true_rate, rate = rate_learned(true, &true_rate);
     assert_in_range(rate, true_rate * 95 / 100, true_rate * 105 / 100); /* the first message is not counted */
     assert_in_range(pacing_round_trip_ns(&pacing), 30 * MS, 31 * MS);   /* its 300 bytes take 0.1 ms */
     /* Of a client that does not tell of the first bytes a frame of 40 ms has taken 70 with the way. */
-    rate = rate_learned(false, &pacing, &true_rate);
+    rate = rate_learned(false, &true_rate);
     assert_in_range(rate, true_rate * 40 / 75, true_rate * 105 / 100);
 }
 
 TEST(follows_a_link_that_becomes_worse)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     struct link link = link_of(40, 20 * MS);
     uint32_t frame = 0;
-    run(&pacing, &link, 0, 5 * S, 60000, &frame);
+    run(&link, 0, 5 * S, 60000, &frame);
     link.bytes_per_ns /= 8;
-    run(&pacing, &link, 5 * S, 8 * S, 60000, &frame);
-    struct tally after = run(&pacing, &link, 8 * S, 18 * S, 60000, &frame);
+    run(&link, 5 * S, 8 * S, 60000, &frame);
+    struct tally after = run(&link, 8 * S, 18 * S, 60000, &frame);
     /* 60 kB take 96 ms now: one is on its way, and one may stand behind it. */
     assert_true(after.longest_line_ns < 2.5 * 96.0 * MS);
     assert_in_range(pacing_bytes_per_second(&pacing), 550000, 700000);
@@ -163,8 +169,6 @@ TEST(follows_a_link_that_becomes_worse)
 
 TEST(sends_one_at_a_time_to_a_client_that_is_silent)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     assert_true(pacing_may_send(&pacing));
     pacing_sent(&pacing, 0, 1000, 0);
     assert_false(pacing_may_send(&pacing));
@@ -181,8 +185,6 @@ TEST(sends_one_at_a_time_to_a_client_that_is_silent)
 /* 1 MB takes a second, longer than a client has to acknowledge. */
 TEST(learns_a_slow_link_from_an_acknowledgement_that_comes_late)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     pacing_sent(&pacing, 0, 1000000, 0);
     pacing_note_silence(&pacing);
     for (uint32_t frame = 1; frame <= PACING_IN_FLIGHT_MAX / 2; frame++) {
@@ -196,8 +198,6 @@ TEST(learns_a_slow_link_from_an_acknowledgement_that_comes_late)
 
 TEST(goes_on_for_ever_with_a_client_that_acknowledges_nothing)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     pacing_sent(&pacing, 0, 1000, 0);
     pacing_note_silence(&pacing);
     for (uint32_t frame = 1; frame <= 3 * PACING_IN_FLIGHT_MAX; frame++) {
@@ -209,8 +209,6 @@ TEST(goes_on_for_ever_with_a_client_that_acknowledges_nothing)
 
 TEST(ignores_acknowledgements_of_what_is_not_in_flight)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     pacing_acknowledged(&pacing, 7, true, MS);
     pacing_sent(&pacing, 3, 50000, MS);
     pacing_acknowledged(&pacing, 4, true, 2 * MS);
@@ -224,8 +222,6 @@ TEST(ignores_acknowledgements_of_what_is_not_in_flight)
 
 TEST(never_has_more_in_flight_than_it_can_note)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     pacing_sent(&pacing, 0, 1, 0);
     pacing_acknowledged(&pacing, 0, true, 1000); /* 1 byte in 1 us, and .. */
     uint32_t frame = 1;
@@ -237,13 +233,13 @@ TEST(never_has_more_in_flight_than_it_can_note)
 /* ---- size and quality ------------------------------------------------------------------------------- */
 
 /* Says for how many frames advice is followed, of a picture that costs that much at full size and quality 75. */
-static struct pacing_advice follow(struct pacing *pacing, struct link *link, uint64_t *now_ns, uint64_t render_ns,
-                                   double bytes, unsigned frames)
+static struct pacing_advice follow(struct link *link, uint64_t *now_ns, uint64_t render_ns, double bytes,
+                                   unsigned frames)
 {
     struct pacing_advice advice = {0};
     static uint32_t frame;
     for (unsigned i = 0; i < frames; i++) {
-        advice = pacing_advise(pacing, 90);
+        advice = pacing_advise(&pacing, 90);
         double area = advice.scale_32nds * advice.scale_32nds / 1024.0;
         double quality = (advice.quality - 75.0) / 12.0, size = bytes * area;
         for (; quality > 1e-3; quality -= 1.0 / 12)
@@ -252,50 +248,44 @@ static struct pacing_advice follow(struct pacing *pacing, struct link *link, uin
             size /= 1.0253;
         uint64_t render_now_ns = (uint64_t)((double)render_ns * area);
         *now_ns += render_now_ns > FRAME_NS ? render_now_ns : FRAME_NS;
-        for (; link_deliver(link, pacing, *now_ns), !pacing_may_send(pacing);)
+        for (; link_deliver(link, *now_ns), !pacing_may_send(&pacing);)
             *now_ns += MS;
-        pacing_sent(pacing, frame, (uint64_t)size, *now_ns);
+        pacing_sent(&pacing, frame, (uint64_t)size, *now_ns);
         link_send(link, frame++, (uint64_t)size, *now_ns);
-        pacing_learn(pacing, advice.scale_32nds, advice.quality, render_now_ns, (uint64_t)size);
+        pacing_learn(&pacing, advice.scale_32nds, advice.quality, render_now_ns, (uint64_t)size);
     }
     return advice;
 }
 
 TEST(asks_for_everything_where_all_is_fast)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     struct link link = link_of(1000, MS);
     uint64_t now_ns = 0;
-    struct pacing_advice advice = follow(&pacing, &link, &now_ns, 5 * MS, 100000, 30);
+    struct pacing_advice advice = follow(&link, &now_ns, 5 * MS, 100000, 30);
     assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
     assert_int_equal(advice.quality, 90);
 }
 
 TEST(makes_frames_smaller_that_take_long_to_render)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     struct link link = link_of(1000, MS);
     uint64_t now_ns = 0;
-    struct pacing_advice advice = follow(&pacing, &link, &now_ns, 100 * MS, 100000, 60);
+    struct pacing_advice advice = follow(&link, &now_ns, 100 * MS, 100000, 60);
     /* 33 ms a frame: half of each side is 25 ms, three quarters would be 56. */
     assert_int_equal(advice.scale_32nds, 16);
     /* The scene becomes simple: back to full. */
-    advice = follow(&pacing, &link, &now_ns, 10 * MS, 100000, 60);
+    advice = follow(&link, &now_ns, 10 * MS, 100000, 60);
     assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
 }
 
 TEST(makes_frames_fit_the_link)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     struct link link = link_of(10, 50 * MS);
     uint64_t now_ns = 0;
     /* 150 kB at 75 and 30 frames a second are 36 Mbit/s. */
-    follow(&pacing, &link, &now_ns, 5 * MS, 150000, 60);
+    follow(&link, &now_ns, 5 * MS, 150000, 60);
     uint64_t before_ns = now_ns;
-    struct pacing_advice advice = follow(&pacing, &link, &now_ns, 5 * MS, 150000, 300);
+    struct pacing_advice advice = follow(&link, &now_ns, 5 * MS, 150000, 300);
     double frames_per_second = 300e9 / (double)(now_ns - before_ns);
     assert_true(frames_per_second > 27.0); /* of 30 */
     assert_true(advice.scale_32nds < PACING_SCALE_FULL);
@@ -303,24 +293,23 @@ TEST(makes_frames_fit_the_link)
     assert_true((double)advice.bytes <= 10e6 / 8 / 30);
     /* A better link: better frames, and not more than were asked for. */
     link.bytes_per_ns *= 20;
-    advice = follow(&pacing, &link, &now_ns, 5 * MS, 150000, 600);
+    advice = follow(&link, &now_ns, 5 * MS, 150000, 600);
     assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
     assert_int_equal(advice.quality, 90);
 }
 
 /* As follow(), but rendering takes `fixed_ns` whatever the size, and `area_ns` for all of the picture; either is
  * up to a fifth more or less. */
-static struct pacing_advice follow_renderer(struct pacing *pacing, uint64_t fixed_ns, uint64_t area_ns,
-                                            unsigned frames)
+static struct pacing_advice follow_renderer(uint64_t fixed_ns, uint64_t area_ns, unsigned frames)
 {
     struct pacing_advice advice = {0};
     static uint32_t chance;
     for (unsigned i = 0; i < frames; i++) {
-        advice = pacing_advise(pacing, 90);
+        advice = pacing_advise(&pacing, 90);
         double area = advice.scale_32nds * advice.scale_32nds / 1024.0;
         chance = chance * 1664525u + 1013904223u;
         double more = 0.8 + 0.4 * (chance >> 8) / (1 << 24);
-        pacing_learn(pacing, advice.scale_32nds, advice.quality,
+        pacing_learn(&pacing, advice.scale_32nds, advice.quality,
                      (uint64_t)(more * ((double)fixed_ns + (double)area_ns * area)), 1000);
     }
     return advice;
@@ -328,27 +317,23 @@ static struct pacing_advice follow_renderer(struct pacing *pacing, uint64_t fixe
 
 TEST(does_not_shrink_what_takes_long_at_any_size)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     /* 33 ms a frame: 60 ms at least, 70 in full; hardly worth the picture. */
-    assert_int_equal(follow_renderer(&pacing, 60 * MS, 10 * MS, 100).scale_32nds, PACING_SCALE_FULL);
+    assert_int_equal(follow_renderer(60 * MS, 10 * MS, 100).scale_32nds, PACING_SCALE_FULL);
     /* Size is what it costs: the same renderer with a slow light transport. */
-    struct pacing_advice advice = follow_renderer(&pacing, 2 * MS, 200 * MS, 100);
+    struct pacing_advice advice = follow_renderer(2 * MS, 200 * MS, 100);
     assert_in_range(advice.scale_32nds, 8, 12); /* 14.5 and 30 ms */
     /* And back. */
-    assert_int_equal(follow_renderer(&pacing, 2 * MS, 10 * MS, 300).scale_32nds, PACING_SCALE_FULL);
+    assert_int_equal(follow_renderer(2 * MS, 10 * MS, 300).scale_32nds, PACING_SCALE_FULL);
 }
 
 TEST(does_not_flicker)
 {
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     struct link link = link_of(1000, MS);
     uint64_t now_ns = 0;
-    follow(&pacing, &link, &now_ns, 33 * MS, 50000, 60); /* just at the edge between two sizes */
+    follow(&link, &now_ns, 33 * MS, 50000, 60); /* just at the edge between two sizes */
     unsigned changes = 0, scale = 0;
     for (int i = 0; i < 300; i++) {
-        struct pacing_advice advice = follow(&pacing, &link, &now_ns, (uint64_t)(i % 2 ? 31 : 36) * MS, 50000, 1);
+        struct pacing_advice advice = follow(&link, &now_ns, (uint64_t)(i % 2 ? 31 : 36) * MS, 50000, 1);
         changes += i > 0 && advice.scale_32nds != scale;
         scale = advice.scale_32nds;
     }
@@ -358,7 +343,6 @@ TEST(does_not_flicker)
 /* 1 MB a second and a round trip of 20 ms; a frame of 10 KB takes 10 ms. Room for one frame time and the way. */
 TEST(the_wait_for_the_next_frame_is_what_has_to_drain)
 {
-    struct pacing pacing;
     pacing_init(&pacing, 10 * MS);
     assert_int_equal(pacing_wait_ns(&pacing, 0), 0);
     assert_true(pacing_wait_ns(&pacing, 1) == UINT64_MAX); /* nothing is known of the link */
@@ -383,13 +367,11 @@ TEST(the_wait_for_the_next_frame_is_what_has_to_drain)
 /* 10 Mbit/s, 100 ms there and back, and a picture at rest of a megabyte when motion goes on. */
 TEST(motion_does_not_wait_for_what_was_abandoned)
 {
-    struct pacing pacing;
     struct link link = link_of(10, 100 * MS);
     uint32_t frame = 0;
-    pacing_init(&pacing, FRAME_NS);
     assert_true(pacing_is_long(&pacing, 1)); /* nothing is known */
-    run(&pacing, &link, 0, 2 * S, 30000, &frame);
-    link_deliver(&link, &pacing, 3 * S);
+    run(&link, 0, 2 * S, 30000, &frame);
+    link_deliver(&link, 3 * S);
     assert_int_equal(pacing.in_flight_count, 0);
     assert_true(pacing_is_long(&pacing, 60000));
     assert_false(pacing_is_long(&pacing, 20000));
@@ -432,8 +414,6 @@ TEST(bytes_that_are_cut_are_neither_waited_for_nor_learned)
 TEST(a_wait_beyond_all_measure_is_still_one)
 {
     const uint64_t month_ns = 30 * 86400 * S;
-    struct pacing pacing;
-    pacing_init(&pacing, FRAME_NS);
     pacing_sent(&pacing, 0, 1, 0);
     pacing_acknowledged(&pacing, 0, true, month_ns); /* one byte in a month */
     pacing_sent(&pacing, 1, UINT32_MAX, month_ns);
@@ -449,7 +429,6 @@ static const struct pacing_terms for_views = {.margin = 0.1f, .hidden_layers = 1
 
 /* A link of that rate, and a renderer that takes `sample_ns` for each sample of a picture without a margin. */
 struct key_views {
-    struct pacing pacing;
     double bytes_per_second, sample_ns, bytes_full; /* at the quality of 90 */
     uint32_t frame;
     uint64_t now_ns;
@@ -459,8 +438,8 @@ static struct key_views key_views_of(double bytes_per_second, double sample_ns, 
 {
     struct key_views views = {
         .bytes_per_second = bytes_per_second, .sample_ns = sample_ns, .bytes_full = bytes_full, .now_ns = S};
-    pacing_init(&views.pacing, KEY_NS);
-    pacing_set_terms(&views.pacing, KEY_NS, &for_views);
+    pacing_init(&pacing, KEY_NS);
+    pacing_set_terms(&pacing, KEY_NS, &for_views);
     return views;
 }
 
@@ -483,17 +462,16 @@ static double key_render_ns(const struct key_views *views, const struct pacing_a
 /* After so many pictures as it advises, each of which the link carries before the next one. */
 static struct pacing_advice settle(struct key_views *views, unsigned frames)
 {
-    struct pacing *pacing = &views->pacing;
     struct pacing_advice advice = {0};
     for (unsigned i = 0; i < frames; i++) {
-        advice = pacing_advise(pacing, 90);
+        advice = pacing_advise(&pacing, 90);
         const double bytes = key_bytes(views, &advice);
-        pacing_sent(pacing, views->frame, (uint64_t)bytes, views->now_ns);
-        pacing_acknowledged(pacing, views->frame, false, views->now_ns + MS);
+        pacing_sent(&pacing, views->frame, (uint64_t)bytes, views->now_ns);
+        pacing_acknowledged(&pacing, views->frame, false, views->now_ns + MS);
         views->now_ns += MS + (uint64_t)(bytes / views->bytes_per_second * 1e9);
-        pacing_acknowledged(pacing, views->frame++, true, views->now_ns);
-        pacing_learn_picture(pacing, &advice, (uint64_t)key_render_ns(views, &advice), (uint64_t)bytes);
-        pacing_learn_hidden(pacing, (uint64_t)HIDDEN_BYTES);
+        pacing_acknowledged(&pacing, views->frame++, true, views->now_ns);
+        pacing_learn_picture(&pacing, &advice, (uint64_t)key_render_ns(views, &advice), (uint64_t)bytes);
+        pacing_learn_hidden(&pacing, (uint64_t)HIDDEN_BYTES);
     }
     return advice;
 }

@@ -228,9 +228,7 @@ TEST(a_silent_client_is_disconnected_unless_it_waits)
     send_message(2, 0, &message);
     usleep(1300000); /* past the idle time, and past the second in between two looks */
     expect_alive(3);
-    message = made(MESSAGE_CANCEL);
-    message.cancel.target_request = 2;
-    send_message(4, 0, &message);
+    cancel(4, 2);
     expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 4);
     expect_error(0, PROTOCOL_ERROR_TIMEOUT);

@@ -233,6 +233,13 @@ static inline int tear_down(void **state)
 
 /* ---- steps ------------------------------------------------------------------------------------------- */
 
+static inline void cancel(uint32_t request, uint32_t target)
+{
+    struct message message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = target;
+    send_message(request, 0, &message);
+}
+
 static inline void open_scene(uint32_t request, uint32_t scene)
 {
     struct message message = made(MESSAGE_SCENE_OPEN);
