@@ -383,7 +383,7 @@ TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
         struct fl_job *job = fl_render_start(&scene, &options, &error);
         assert_non_null(job);
         struct fl_frame *frame = NULL;
-        for (unsigned tries = 0; !frame && tries < 1000; tries++) {
+        for (unsigned tries = 0; !frame && tries < 6000; tries++) {
             frame = fl_render_poll(job, 10, &done, &error);
             assert_int_equal(error.code, FL_ERROR_NONE);
         }

@@ -65,7 +65,7 @@ static inline void receive_some(struct client *client)
     if (client->link && open_records(client))
         return;
     struct pollfd fd = {.fd = client->fd, .events = POLLIN};
-    if (poll(&fd, 1, 20000) != 1)
+    if (poll(&fd, 1, 60000) != 1)
         fail_msg("nothing came for 20 s");
     if (client->link) {
         if (!receive_sealed(client))
@@ -170,7 +170,7 @@ static inline const struct message *receive(struct client *client)
     const struct message *message;
     while (!(message = receive_now(client))) {
         struct pollfd fd = {.fd = client->fd, .events = POLLIN};
-        if (poll(&fd, 1, 20000) != 1)
+        if (poll(&fd, 1, 60000) != 1)
             fail_msg("nothing came for 20 s");
     }
     return message;
@@ -199,7 +199,7 @@ static inline void expect_end(struct client *client)
     while (client->link && receive_sealed(client))
         assert_int_equal(open_records(client), 0);
     assert_true(!client->link || sealed_has_opened_last(client->link->sealed));
-    assert_int_equal(poll(&fd, 1, 20000), 1);
+    assert_int_equal(poll(&fd, 1, 60000), 1);
     assert_int_equal(recv(client->fd, client->in, 1, 0), 0);
 }
 
