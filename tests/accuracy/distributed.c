@@ -241,7 +241,7 @@ TEST(a_moving_surface_covers_a_pixel_for_the_share_of_time_it_is_in_it)
     }
 }
 
-TEST(motion_of_other_content_begins_an_accumulated_picture_from_new)
+TEST_LONG(motion_of_other_content_begins_an_accumulated_picture_from_new)
 {
     struct fixture *fixture = *state;
     begin(fixture, in_motion);
