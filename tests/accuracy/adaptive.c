@@ -169,7 +169,7 @@ TEST_LONG(a_picture_that_stops_by_its_noise_is_nearer_to_the_truth_denoised)
     frame_result_finish(&cut);
 }
 
-TEST(a_picture_stops_alike_however_it_is_cut)
+TEST_LONG(a_picture_stops_alike_however_it_is_cut)
 {
     struct fixture *fixture = *state;
     half_noisy(fixture);

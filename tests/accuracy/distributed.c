@@ -241,7 +241,7 @@ TEST(a_moving_surface_covers_a_pixel_for_the_share_of_time_it_is_in_it)
     }
 }
 
-TEST(motion_of_other_content_begins_an_accumulated_picture_from_new)
+TEST_LONG(motion_of_other_content_begins_an_accumulated_picture_from_new)
 {
     struct fixture *fixture = *state;
     begin(fixture, in_motion);
@@ -259,7 +259,7 @@ TEST(motion_of_other_content_begins_an_accumulated_picture_from_new)
 
 /* ---- counts ---- */
 
-TEST(coverage_is_1_where_translucent_panes_stand_before_a_wall)
+TEST_LONG(coverage_is_1_where_translucent_panes_stand_before_a_wall)
 {
     struct fixture *fixture = *state;
     begin(fixture, smooth_things);
@@ -270,7 +270,7 @@ TEST(coverage_is_1_where_translucent_panes_stand_before_a_wall)
     frame_result_finish(&result);
 }
 
-TEST(a_sample_has_one_shadow_ray_a_hit_and_one_child_at_most)
+TEST_LONG(a_sample_has_one_shadow_ray_a_hit_and_one_child_at_most)
 {
     struct fixture *fixture = *state;
     begin(fixture, smooth_things);

@@ -132,7 +132,7 @@ static void expect_few_calls(struct fixture *fixture, unsigned tracer, unsigned 
 TEST(passes_look_no_uniform_up_and_wait_for_kinds_of_access)
 {
     fixture_mixture(*state);
-    expect_few_calls(*state, TRACER_BVH, INTEGRATOR_PATH, 3, PRIMARY_RASTER);
+    expect_few_calls(*state, TRACER_BVH, INTEGRATOR_WHITTED, 1, PRIMARY_RASTER);
 }
 
 TEST_LONG(so_do_those_of_other_tracers_integrators_and_layers)
@@ -152,7 +152,7 @@ TEST(the_driver_is_not_asked_for_a_reset_in_every_pass)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.integrator = INTEGRATOR_PATH;
+    fixture->request.integrator = INTEGRATOR_WHITTED;
     fixture->request.depth = 4;
     fixture->request.tracer = TRACER_BVH;
     for (unsigned ahead = 0; ahead < 2; ahead++) {

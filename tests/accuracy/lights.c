@@ -511,7 +511,7 @@ static void a_box(struct fixture *fixture, enum inside inside, bool sampled)
     }
 }
 
-/* Of rays that meet the lamp alone, three times as many samples. `cells`: what stored samples may be off. */
+/* Rays that meet the lamp alone get three times as many samples. `off`: the share that both may differ by. */
 static void expect_as_met(struct fixture *fixture, enum inside inside, unsigned tracer, double off)
 {
     struct mean means[2];

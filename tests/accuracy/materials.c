@@ -212,7 +212,7 @@ TEST_LONG(all_integrators_show_all_materials_alike_at_other_roughnesses)
 }
 
 /* The integrator ao sees no neighbour of a ball. */
-TEST(the_integrator_ao_sees_balls_that_stand_alone_as_open)
+TEST_LONG(the_integrator_ao_sees_balls_that_stand_alone_as_open)
 {
     struct fixture *fixture = *state;
     const struct way ao = {"ao", INTEGRATOR_AO, BRDF_GGX};

@@ -24,7 +24,7 @@ struct fixture {
     struct scene_edit edits[FIXTURE_EDITS_MAX];
     size_t edit_count;
     uint32_t next_id;
-    struct frame_request request; /* 32x32, one sample, naive, raster, linear floats; from (0,0,5) to the origin */
+    struct frame_request request; /* 32x32, one sample, bvh, raster, linear floats; from (0,0,5) to the origin */
 };
 
 static inline struct scene_edit *fixture_edit(struct fixture *fixture, enum object_kind object)
@@ -88,7 +88,8 @@ static inline int fixture_clear(void **state)
                                               .height = 32,
                                               .samples = 1,
                                               .depth = 4,
-                                              .tracer = TRACER_NAIVE,
+                                              .tracer = TRACER_BVH,
+                                              .tracer_options.bvh.rays = 1, /* else it follows the slices */
                                               .format = PIXEL_FORMAT_RGBA32F};
     fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.6f);
     return 0;

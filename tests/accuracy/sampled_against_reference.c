@@ -65,7 +65,7 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
     struct frame_result expected = render(fixture, exact_tracer(), &rows[0], name);
     for (const struct row *row = rows; row < rows + ROWS; row++) {
         const double asked = row->psnr_min[kind];
-        if (asked == 0)
+        if (asked == 0 || (row > rows && !getenv("FARLIGHT_TEST_LONG"))) /* else the first alone */
             continue;
         struct frame_result got = render(fixture, row->tracer, row, name);
         double reached = psnr(&got, &expected);

@@ -253,8 +253,9 @@ TEST(slices_that_overflow_are_counted_once)
     frame_result_finish(&split);
 }
 
-/* What a wrong tracer does and where it is found. Least and most shares: of the reference's misses that are hits,
- * of its hits that are lost, and of what both hit that is far apart or another surface; -1: not asked. */
+/* Wrong tracers, and the wave and class where each is found. Least and most shares: of the reference's misses that
+ * are hits, of its hits that are lost, and of what both hit that is far apart or another surface; -1: not asked.
+ */
 static const struct {
     const char *name;
     enum wrong_way way;
