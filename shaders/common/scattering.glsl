@@ -7,7 +7,7 @@
 // enters. A rough surface has no one mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is
 // faded out and what it carried is replaced by the irradiance about that direction. What is reflected, refracted and
 // scattered adds up to what arrives and never to more, be it from all around (struct split) or from a light (brdf);
-// tests/accuracy/shading_energy.c holds both to it.
+// tests/accuracy/bsdf.c holds both to it.
 //
 // Defines: those of common/material.glsl.
 
