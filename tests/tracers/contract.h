@@ -76,6 +76,9 @@ struct scene_row {
     void (*move)(struct scene_motion *motion, uint32_t pose_count);
     uint32_t pose_count;      /* of the open shutter; 0: it is closed, and the pose comes as a later edit */
     bool is_finer_than_cells; /* of textures: for exact tracers alone */
+    /* Phases of edits (conformance.c) after which answers are judged without FARLIGHT_TEST_LONG, a bit each. Each
+     * set of features is another program of every tracer. */
+    unsigned phases, phases_sampled; /* of exact tracers, and of those that sample; 0: the scene is left out */
 };
 extern const struct scene_row scene_rows[];
 extern const size_t scene_row_count;

@@ -167,7 +167,8 @@ enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t s
     return progress;
 }
 
-/* Mostly at the scene from around it and from within, of any length of direction; some dead, some short. */
+/* Mostly at the scene from around it and from within, of any length of direction; some dead, some short, some
+ * along an axis or across one. */
 static void make_rays(struct fixture *fixture)
 {
     const float *low = fixture->gpu.lower_world, *high = fixture->gpu.upper_world;
@@ -183,6 +184,9 @@ static void make_rays(struct fixture *fixture)
         }
         for (int k = 0; k < 3; k++)
             ray->direction_t_max[k] *= length / sqrtf(squared);
+        for (uint32_t k = 0; k < 3; k++)
+            if (i % 13 == 5 && (i / 13 % 3 == k) == (i % 2 == 0))
+                ray->direction_t_max[k] = k == 1 ? -0.0f : 0.0f;
         ray->origin_t_min[3] = 1e-3f;
         ray->direction_t_max[3] = i % 5 ? 1e6f : test_uniform(&seed, 0.5f, 3.0f);
         if (i % 17 == 0)

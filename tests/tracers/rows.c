@@ -52,15 +52,16 @@ static const struct tracer_row rows[] = {
     LDC(" by blocks of 2, packets of four", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 2, .ldc.rays = 4),
     LDC(" by blocks of 32, layers one by one", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 32,
         .bench.ldc_layers_together = 1),
-#define ABUFFER(form, searched)                                                                                   \
+#define ABUFFER(form, ...)                                                                                        \
     {                                                                                                             \
         .name = "abuffer" form, .number = 4, .is_form = sizeof(form) > 1,                                         \
-        .options = {.abuffer.resolution = 256, .abuffer.search = searched},                                       \
-        .sampled = {256, 0.25, 0.01, BORDERS}, .refuses_motion = STILL                                            \
+        .options.abuffer = {.resolution = 256, __VA_ARGS__}, .sampled = {256, 0.25, 0.01, BORDERS},               \
+        .refuses_motion = STILL                                                                                   \
     }
-    ABUFFER("", ABUFFER_SEARCH_DDA),
-    ABUFFER(", three columns a step", ABUFFER_SEARCH_LINEAR3),
-    ABUFFER(", one column a step", ABUFFER_SEARCH_LINEAR1),
+    ABUFFER("", .search = ABUFFER_SEARCH_DDA),
+    ABUFFER(", three columns a step", .search = ABUFFER_SEARCH_LINEAR3),
+    ABUFFER(", one column a step", .search = ABUFFER_SEARCH_LINEAR1),
+    ABUFFER(", in voxels of 16 cells", .voxels = 16),
 #define RAYSPACE(form, ...)                                                                                       \
     {                                                                                                             \
         .name = "rayspace" form, .number = 5, .is_form = sizeof(form) > 1, .options = { __VA_ARGS__ }             \

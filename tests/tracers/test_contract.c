@@ -91,8 +91,10 @@ static void add_tests_of(const struct tracer_row *row)
             add_test(row->name, check->name, NULL, check->run, (struct contract_case){row, NULL});
         for (size_t s = 0; (check->scope & CHECK_EACH_SCENE) && s < scene_row_count; s++) {
             const struct scene_row *scene = &scene_rows[s];
+            const unsigned phases = row->sampled.resolution ? scene->phases_sampled : scene->phases;
             if ((scene->pose_count > 1 && row->refuses_motion) ||
-                (scene->is_finer_than_cells && row->sampled.resolution))
+                (scene->is_finer_than_cells && row->sampled.resolution) ||
+                (phases == 0 && !getenv("FARLIGHT_TEST_LONG")))
                 continue;
             add_test(row->name, check->name, scene->name, check->run, (struct contract_case){row, scene});
         }

@@ -105,11 +105,10 @@ CHECK(at_a_limit_of_memory_an_update_fails_alone, CHECK_FORMS)
 {
     const struct contract_case *of = *state;
     enum { PARTS = 6 };
-    static const struct tracer_row naive = {.name = "naive", .number = 1};
     const uint64_t limit = device->memory_limit_bytes;
     struct fixture fixture, other;
     struct error error = {0};
-    fixture_init(&other, &naive, test_scene_spheres());
+    fixture_init(&other, of->tracer, test_scene_spheres());
     struct answers of_other = trace_both(&other);
     fixture_init(&fixture, of->tracer, test_scene_spheres());
     struct answers expected = trace_both(&fixture);

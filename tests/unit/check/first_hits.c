@@ -79,8 +79,10 @@ TEST(what_is_decided_for_a_gpu_holds_at_its_next_start)
 
 TEST(software_gl_is_not_measured_for_it)
 {
-    if (!device->info.software)
+    if (!device->info.software) {
+        printf("skipped: a GPU is measured for it\n");
         skip();
+    }
     first_hits_decide(device);
     assert_false(device->measured.known);
 }

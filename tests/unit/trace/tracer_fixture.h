@@ -15,7 +15,8 @@ struct fixture {
     struct gpu_scene gpu;
     struct test_edits edits;
     struct tracer *tracer;
-    struct stage_times times; /* of the last update */
+    struct scene_changes changes; /* of the last update */
+    struct stage_times times;     /* likewise */
     struct scene_motion motion;
     uint64_t memory_before_bytes; /* of the device */
 };
@@ -23,14 +24,14 @@ struct fixture {
 /* Commits the edits and brings the tracer to them, and to the motion if there is one. */
 static inline bool try_update(struct fixture *fixture, struct error *error)
 {
-    struct scene_changes changes;
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
     const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
-    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, error), error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion, &fixture->changes, NULL, error), error);
     stage_times_begin(&fixture->times);
     return tracer_update(fixture->tracer, &fixture->gpu,
-                         &(struct tracer_update){.changed = changes.bits, .times = &fixture->times}, error);
+                         &(struct tracer_update){.changed = fixture->changes.bits, .times = &fixture->times},
+                         error);
 }
 
 static inline void update(struct fixture *fixture)
@@ -52,7 +53,7 @@ static inline void fixture_init_by(struct fixture *fixture, unsigned number, str
     update(fixture);
 }
 
-/* Nothing of it is left on the device. */
+/* Nothing of it is left on the device: of several, the one that was made last goes first. */
 static inline void fixture_finish(struct fixture *fixture)
 {
     tracer_destroy(fixture->tracer);

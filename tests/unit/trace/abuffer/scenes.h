@@ -4,6 +4,7 @@
 #define FARLIGHT_TESTS_ABUFFER_SCENES_H
 
 #include "tests/accuracy/motion_scenes.h"
+#include "tests/unit/trace/stack_scene.h"
 
 /* A ball (or a torus) of steps x steps quadrilaterals, vertices shared, the outside out; no attributes. */
 static inline struct scene_mesh *add_round_mesh(struct test_edits *edits, uint32_t id, uint32_t steps, bool torus)
@@ -39,27 +40,6 @@ static inline struct scene_mesh *add_round_mesh(struct test_edits *edits, uint32
     mesh->closed = true;
     free(positions);
     free(triangles);
-    return mesh;
-}
-
-/* -1..1 on each side. */
-static inline struct scene_mesh *add_box_mesh(struct test_edits *edits, uint32_t id)
-{
-    static const uint32_t quads[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                                         {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-    float positions[8][3];
-    uint32_t triangles[12][3];
-    for (uint32_t i = 0; i < 8; i++)
-        for (uint32_t k = 0; k < 3; k++)
-            positions[i][k] = i >> k & 1 ? 1.0f : -1.0f;
-    for (uint32_t i = 0; i < 6; i++) {
-        const uint32_t *q = quads[i];
-        memcpy(triangles[2 * i], (uint32_t[3]){q[0], q[1], q[2]}, sizeof(triangles[0]));
-        memcpy(triangles[2 * i + 1], (uint32_t[3]){q[0], q[2], q[3]}, sizeof(triangles[0]));
-    }
-    struct scene_mesh *mesh =
-        test_mesh(edits, id, (const float(*)[3])positions, 8, (const uint32_t *)triangles, 12);
-    mesh->closed = true;
     return mesh;
 }
 
@@ -104,17 +84,6 @@ static inline struct scene *scene_of_bodies_and_others(void)
     test_node(&edits, 30, 0, NODE_SPHERES, 30, NULL);
     test_commit(&edits);
     return scene;
-}
-
-/* A ball whose vertices go where they like: its surface passes through itself, but is closed as it was. */
-static inline struct scene *scene_of_a_crumpled_body(void)
-{
-    struct test_edits edits = {.scene = test_scene_create()};
-    struct scene_mesh *mesh = add_round_mesh(&edits, 10, 16, false);
-    test_add_targets(mesh, 5);
-    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
-    test_commit(&edits);
-    return edits.scene;
 }
 
 /* Closed meshes, and spheres, of which something is cut out: they are bodies no more. */

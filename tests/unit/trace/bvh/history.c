@@ -1,61 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /* That the tracer `bvh` answers the same to the bit however its scene came about: frames of an animation must not
  * depend on which frames were rendered before. And what instances that all move cost. */
-#include "tests/accuracy/test_scenes.h"
+#include "tests/unit/trace/tracer_fixture.h"
 
-#include "shared/hit.h"
-#include "shared/ray.h"
 #include "trace/bvh/tracer.h"
-#include "gpu_scene/scene.h"
-#include "tests/fixtures/device.h"
-#include "tests/harness/test.h"
 
-#include <stddef.h>
-
-#define RAY_COUNT 32768u
+#define RAY_COUNT 8192u
 #define INSTANCES 60u
 #define MOVING 1000u
 
-struct fixture {
-    struct scene *scene;
-    struct gpu_scene gpu;
-    struct test_edits edits;
-    struct tracer *tracer;
-    struct scene_changes changes; /* of the last update */
-};
-
-static void expect_ok(bool ok, const struct error *error)
-{
-    if (!ok)
-        fail_msg("%s: %s", error->field, error->text);
-}
-
-static void update(struct fixture *fixture)
-{
-    struct error error = {0};
-    if (fixture->edits.count > 0)
-        test_commit(&fixture->edits);
-    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error), &error);
-    expect_ok(tracer_update(fixture->tracer, &fixture->gpu,
-                            &(struct tracer_update){.changed = fixture->changes.bits}, &error),
-              &error);
-}
-
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
 {
-    struct error error = {0};
-    *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
-    gpu_scene_init(&fixture->gpu, device);
-    fixture->tracer = tracer_create(&tracer_bvh_impl, device, options, &error);
-    expect_ok(fixture->tracer != NULL, &error);
-    update(fixture);
-}
-
-static void fixture_finish(struct fixture *fixture)
-{
-    tracer_destroy(fixture->tracer);
-    gpu_scene_finish(&fixture->gpu);
-    scene_destroy(fixture->scene);
+    fixture_init_by(fixture, TRACER_BVH, scene, options);
 }
 
 static const struct bvh *bvh_of(const struct fixture *fixture)
@@ -65,7 +21,7 @@ static const struct bvh *bvh_of(const struct fixture *fixture)
 
 /* ---- histories ---- */
 
-enum look { LOOK_PLAIN, LOOK_CUTOUT, LOOK_TINTED, LOOKS };
+enum look { LOOK_CUTOUT, LOOK_TINTED };
 
 /* Materials, two soups, and a slab of two coincident squares on the plane z = 0. */
 static struct scene *scene_of_shapes(enum look look)
@@ -129,96 +85,66 @@ static struct ray *make_rays(void)
     return rays;
 }
 
-static void *trace(struct fixture *fixture, const struct ray *rays, enum wave_kind kind)
-{
-    struct error error = {0};
-    struct gpu_buffer ray_buffer = {0}, answers = {0};
-    size_t bytes = RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit));
-    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error) &&
-                  gpu_buffer_reserve(device, &answers, bytes, &error),
-              &error);
-    gpu_scene_bind(&fixture->gpu);
-    const struct wave wave = {
-        .kind = kind, .ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &answers, .visibility = &answers};
-    expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);
-    void *read = malloc(bytes);
-    gpu_buffer_read(device, &answers, 0, read, bytes);
-    gpu_buffer_finish(device, &ray_buffer);
-    gpu_buffer_finish(device, &answers);
-    return read;
-}
-
-/* As it is built, and refitted from places all over, in two steps. */
-static void make_histories(struct fixture *built, struct fixture *moved, enum look look,
-                           const struct tracer_options *options)
+/* Closest hits and visibilities of a tree as it is built, or, `moved`, refitted from places all over, in two
+ * steps. */
+static void trace_history(struct fixture *fixture, enum look look, const struct tracer_options *options,
+                          bool moved, struct hit *hits, uint32_t *light)
 {
     struct test_edits edits = {.scene = scene_of_shapes(look)};
-    place(&edits, 5);
+    struct ray *rays = make_rays();
+    place(&edits, moved ? 6 : 5);
     test_commit(&edits);
-    fixture_init(built, edits.scene, options);
-    edits = (struct test_edits){.scene = scene_of_shapes(look)};
-    place(&edits, 6);
-    test_commit(&edits);
-    fixture_init(moved, edits.scene, options);
-    for (uint64_t seed = 7; seed-- > 5;) {
-        place(&moved->edits, seed);
-        update(moved);
-        assert_int_equal(moved->tracer->stats.nodes_rebuilt, 0);
+    fixture_init(fixture, edits.scene, options);
+    for (uint64_t seed = 7; moved && seed-- > 5;) {
+        place(&fixture->edits, seed);
+        update(fixture);
+        assert_int_equal(fixture->tracer->stats.nodes_rebuilt, 0);
     }
-    const struct bvh_top *a = &bvh_of(built)->tree.top, *b = &bvh_of(moved)->tree.top;
-    assert_true(a->element_count != b->element_count ||
-                memcmp(a->leaves, b->leaves, a->element_count * sizeof(*a->leaves)) != 0); /* other trees */
+    trace_rays(trace_by_tracer, fixture, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+    trace_rays(trace_by_tracer, fixture, WAVE_ANY, rays, RAY_COUNT, NULL, light);
+    free(rays);
 }
 
 static void expect_same_answers(enum look look, const struct tracer_options *options)
 {
     struct fixture built, moved;
-    make_histories(&built, &moved, look, options);
-    struct ray *rays = make_rays();
-    struct hit *expected = trace(&built, rays, WAVE_CLOSEST), *hits = trace(&moved, rays, WAVE_CLOSEST);
-    uint32_t hit_count = 0;
+    struct hit *hits[2];
+    uint32_t *light[2], hit_count = 0, tinted = 0;
+    for (int i = 0; i < 2; i++) {
+        hits[i] = malloc(RAY_COUNT * sizeof(*hits[i]));
+        light[i] = malloc(RAY_COUNT * sizeof(*light[i]));
+        trace_history(i == 0 ? &built : &moved, look, options, i > 0, hits[i], light[i]);
+    }
+    const struct bvh_top *top = &bvh_of(&built)->tree.top, *other = &bvh_of(&moved)->tree.top;
+    assert_true(top->element_count != other->element_count ||
+                memcmp(top->leaves, other->leaves, top->element_count * sizeof(*top->leaves)) != 0);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        hit_count += expected[i].distance >= 0;
-        if (memcmp(&expected[i], &hits[i], sizeof(*hits)) != 0)
-            fail_msg("ray %u, packets of %u: distance %.9g, primitive %u, instance %u; %.9g, %u, %u in the tree "
-                     "that was refitted",
-                     i, options->bvh.rays, (double)expected[i].distance, expected[i].primitive,
-                     expected[i].instance, (double)hits[i].distance, hits[i].primitive, hits[i].instance);
-        assert_true(expected[i].distance < 0 || expected[i].instance % 2 == 0); /* of two the first */
+        const struct hit *a = &hits[0][i], *b = &hits[1][i];
+        hit_count += a->distance >= 0;
+        tinted += (light[0][i] & 0xff) != 0 && (light[0][i] & 0xff) != 0xff;
+        if (memcmp(a, b, sizeof(*a)) != 0 || light[0][i] != light[1][i])
+            fail_msg("ray %u, packets of %u: distance %.9g, primitive %u, instance %u, visibility %08x; %.9g, %u, "
+                     "%u, %08x in the tree that was refitted",
+                     i, options->bvh.rays, (double)a->distance, a->primitive, a->instance, light[0][i],
+                     (double)b->distance, b->primitive, b->instance, light[1][i]);
+        assert_true(a->distance < 0 || a->instance % 2 == 0); /* of two the first */
     }
     assert_in_range(hit_count, RAY_COUNT / 4, RAY_COUNT);
-    uint32_t *light = trace(&built, rays, WAVE_ANY), *other = trace(&moved, rays, WAVE_ANY), tinted = 0;
-    for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        tinted += (light[i] & 0xff) != 0 && (light[i] & 0xff) != 0xff;
-        if (light[i] != other[i])
-            fail_msg("ray %u, packets of %u: visibility %08x, %08x in the tree that was refitted", i,
-                     options->bvh.rays, light[i], other[i]);
-    }
     assert_in_range(tinted, look == LOOK_TINTED ? RAY_COUNT / 8 : 0, RAY_COUNT);
-    free(rays);
-    free(expected);
-    free(hits);
-    free(light);
-    free(other);
-    fixture_finish(&built);
+    for (int i = 0; i < 2; i++) {
+        free(hits[i]);
+        free(light[i]);
+    }
     fixture_finish(&moved);
+    fixture_finish(&built);
 }
 
 ALL_TESTS(open_device, close_device)
 
 TEST(answers_do_not_depend_on_how_instances_came_to_where_they_are)
 {
-    static const struct tracer_options forms[] = {
-        {.bvh = {.rays = 1}},
-        {.bvh = {.rays = 8}},
-        {.bvh = {.rays = 3}},
-        {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 2}},
-    };
-    for (size_t form = 0; form < sizeof(forms) / sizeof(forms[0]); form++)
-        expect_same_answers(LOOK_PLAIN, &forms[form]);
-    for (enum look look = LOOK_CUTOUT; look < LOOKS; look++)
-        for (size_t form = 0; form < 2; form++)
-            expect_same_answers(look, &forms[form]);
+    expect_same_answers(LOOK_CUTOUT, &(struct tracer_options){.bvh.rays = 8});
+    expect_same_answers(LOOK_TINTED, &(struct tracer_options){.bvh.rays = 1});
 }
 
 /* ---- a thousand instances ---- */

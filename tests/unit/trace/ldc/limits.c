@@ -18,42 +18,25 @@ static void build_and_read(struct fixture *fixture, struct contents *contents, u
     expect_consistent(contents);
 }
 
-/* And what the host packs (software GL) is what shaders pack. */
-static void expect_both_builds_alike(struct fixture *fixture, uint32_t resolution)
-{
-    struct contents peeled, listed;
-    fixture->options.ldc.build = LDC_BUILD_PEEL;
-    build_and_read(fixture, &peeled, resolution);
-    fixture->options.ldc.build = LDC_BUILD_LISTS;
-    for (uint32_t on_device = 2; on_device-- > 0;) {
-        fixture->options.bench.ldc_on_device = on_device;
-        build_and_read(fixture, &listed, resolution);
-        expect_same(&peeled, &listed);
-        contents_free(&listed);
-    }
-    contents_free(&peeled);
-}
-
 ALL_TESTS(open_device, close_device)
 
-/* In whatever order they come: few for which there are slots, more, many that are sorted apart; the most, of which
- * peeling makes a pass each over all, in one order. */
+/* Few for which there are slots, more that are sorted apart, and the most. */
 TEST(many_layers_are_sorted)
 {
-    static const uint32_t counts[] = {3, 9, 30, 120, 251};
-    for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++)
-        for (int order = counts[i] > 120 ? SHUFFLED : FRONT_TO_BACK; order <= SHUFFLED; order++) {
-            struct fixture fixture;
-            fixture_init(&fixture, stack_scene(counts[i], (enum stack_order)order, false));
-            expect_both_builds_alike(&fixture, RESOLUTION);
-            const struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
-            assert_int_equal(cube->layers_needed, counts[i]);
-            assert_int_equal(cube->layers_kept, counts[i]);
-            assert_int_equal(cube->samples_lost, 0);
-            assert_in_range(cube->sample_count, counts[i] * (RESOLUTION - 1) * (RESOLUTION - 1),
-                            counts[i] * RESOLUTION * RESOLUTION);
-            fixture_finish(&fixture);
-        }
+    static const uint32_t counts[] = {3, 30, 251};
+    for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++) {
+        struct fixture fixture;
+        struct contents contents;
+        fixture_init(&fixture, stack_scene(counts[i], SHUFFLED, false));
+        build_and_read(&fixture, &contents, RESOLUTION);
+        assert_int_equal(contents.cube.layers_needed, counts[i]);
+        assert_int_equal(contents.cube.layers_kept, counts[i]);
+        assert_int_equal(contents.cube.samples_lost, 0);
+        assert_in_range(contents.cube.sample_count, counts[i] * (RESOLUTION - 1) * (RESOLUTION - 1),
+                        counts[i] * RESOLUTION * RESOLUTION);
+        contents_free(&contents);
+        fixture_finish(&fixture);
+    }
 }
 
 /* The farther of two triangles at one place is not another layer of it. */
@@ -63,7 +46,6 @@ TEST(coincident_triangles_are_one_sample)
     struct contents one, two;
     fixture_init(&single, stack_scene(20, SHUFFLED, false));
     fixture_init(&doubled, stack_scene(20, SHUFFLED, true));
-    expect_both_builds_alike(&doubled, RESOLUTION);
     build_and_read(&single, &one, RESOLUTION);
     build_and_read(&doubled, &two, RESOLUTION);
     assert_int_equal(two.cube.layers_needed, 2 * one.cube.layers_needed);
@@ -97,11 +79,10 @@ TEST(the_nearest_layers_are_kept)
     struct fixture fixture;
     struct contents all, some;
     fixture_init(&fixture, test_scene_soup());
-    build_and_read(&fixture, &all, 3 * RESOLUTION);
-    for (uint32_t layers = 1; layers <= all.cube.layers_needed; layers++) {
+    build_and_read(&fixture, &all, 2 * RESOLUTION);
+    for (uint32_t layers = 1; layers < all.cube.layers_needed; layers *= 2) {
         fixture.options.limits.ldc_layers = layers;
-        expect_both_builds_alike(&fixture, 3 * RESOLUTION);
-        build_and_read(&fixture, &some, 3 * RESOLUTION);
+        build_and_read(&fixture, &some, 2 * RESOLUTION);
         assert_int_equal(some.cube.layers_needed, all.cube.layers_needed);
         assert_int_equal(some.cube.layers_kept, layers);
         expect_nearest(&some, &all, layers);
@@ -119,7 +100,6 @@ TEST(memory_limits_the_layers)
     fixture_init(&fixture, stack_scene(60, SHUFFLED, false));
     build_and_read(&fixture, &all, 2 * RESOLUTION);
     fixture.options.limits.ldc_mebibytes = 2;
-    expect_both_builds_alike(&fixture, 2 * RESOLUTION);
     build_and_read(&fixture, &some, 2 * RESOLUTION);
     assert_int_equal(some.cube.layers_needed, 60);
     assert_in_range(some.cube.layers_kept, 1, 59);
@@ -131,7 +111,7 @@ TEST(memory_limits_the_layers)
     contents_free(&all);
     contents_free(&some);
     /* Not even one layer. */
-    place(&fixture, LDC_CUBE_STATIC, 512);
+    place(&fixture, LDC_CUBE_STATIC, 256);
     assert_false(try_build(&fixture, LDC_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count, &error));
     assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
     assert_int_equal(fixture.store.cubes[LDC_CUBE_STATIC].resolution, 0);
@@ -145,13 +125,13 @@ TEST(the_device_limits_the_layers)
     struct fixture fixture;
     struct contents all, some;
     uint64_t limit = device->memory_limit_bytes;
-    fixture_init(&fixture, stack_scene(250, SHUFFLED, false));
+    fixture_init(&fixture, stack_scene(100, SHUFFLED, false));
     build_and_read(&fixture, &all, 2 * RESOLUTION);
     fixture_finish(&fixture);
-    fixture_init(&fixture, stack_scene(250, SHUFFLED, false));
-    device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)25 << 20);
+    fixture_init(&fixture, stack_scene(100, SHUFFLED, false));
+    device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)10 << 20);
     build_and_read(&fixture, &some, 2 * RESOLUTION);
-    assert_in_range(some.cube.layers_kept, 20, 249);
+    assert_in_range(some.cube.layers_kept, 8, 99);
     expect_nearest(&some, &all, some.cube.layers_kept);
     device->memory_limit_bytes = limit;
     contents_free(&all);
@@ -217,7 +197,7 @@ TEST(more_fragments_than_can_be_counted_are_noticed)
 /* Peeling counts with one program and draws with another. Where a driver lets them differ, a texel keeps as many
  * of its samples as were counted, the others theirs, and what is missing is told. No driver here does: every third
  * texel is said to have been counted by less. */
-TEST(a_texel_that_is_drawn_more_often_than_it_was_counted_stays_within_its_places)
+TEST_LONG(a_texel_that_is_drawn_more_often_than_it_was_counted_stays_within_its_places)
 {
     enum { LAYERS = 9, COUNTED = 4, TEXELS = 3 * RESOLUTION * RESOLUTION };
     uint32_t *counts = malloc(TEXELS * sizeof(*counts));
@@ -315,13 +295,10 @@ TEST(a_cube_may_be_empty)
     assert_int_equal(contents.cube.resolution, RESOLUTION);
     contents_free(&contents);
     /* Nor does anything come in that lies beside it. */
-    for (int form = 0; form < 2; form++) {
-        place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
-        fixture.store.cubes[LDC_CUBE_STATIC].lower_world[2] += 100;
-        fixture.options.ldc.build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
-        build(&fixture, LDC_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
-        assert_int_equal(fixture.store.cubes[LDC_CUBE_STATIC].sample_count, 0);
-    }
+    place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
+    fixture.store.cubes[LDC_CUBE_STATIC].lower_world[2] += 100;
+    build(&fixture, LDC_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
+    assert_int_equal(fixture.store.cubes[LDC_CUBE_STATIC].sample_count, 0);
     fixture_finish(&fixture);
 }
 
@@ -337,13 +314,10 @@ TEST(what_lies_on_a_side_is_there)
     test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
     test_commit(&edits);
     fixture_init(&fixture, edits.scene);
-    for (int form = 0; form < 2; form++) {
-        struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
-        *cube = (struct ldc_cube){.lower_world = {-1, -1, -1}, .cell_world = 2.0f / 30, .resolution = 30};
-        fixture.options.ldc.build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
-        build(&fixture, LDC_CUBE_STATIC, fixture.instances, 1);
-        assert_int_equal(cube->sample_count, 2 * 30 * 30);
-        assert_int_equal(cube->layers_needed, 2);
-    }
+    struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
+    *cube = (struct ldc_cube){.lower_world = {-1, -1, -1}, .cell_world = 2.0f / 30, .resolution = 30};
+    build(&fixture, LDC_CUBE_STATIC, fixture.instances, 1);
+    assert_int_equal(cube->sample_count, 2 * 30 * 30);
+    assert_int_equal(cube->layers_needed, 2);
     fixture_finish(&fixture);
 }

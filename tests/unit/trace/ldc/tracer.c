@@ -2,6 +2,7 @@
 /* What the tracer `ldc` promises beside its answers: what stands still is built once, what moves alone costs its
  * frame, and it says how large its cells are and what was lost. That its answers are right to the size of a cell
  * is shown by tests/accuracy/sampled_against_reference.c. */
+#include "tests/unit/trace/stack_scene.h"
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "render/tracer_set.h"
@@ -48,30 +49,10 @@ static void expect_built(const struct fixture *fixture, bool static_cube, bool d
 
 /* ---- scenes and rays ---- */
 
-/* Half a unit from its middle to each side. */
-static void add_box_mesh(struct test_edits *edits, uint32_t id)
-{
-    float positions[24][3];
-    uint32_t indices[36];
-    for (uint32_t side = 0; side < 6; side++) {
-        uint32_t axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3, first = 4 * side;
-        float out = side % 2 ? 0.5f : -0.5f;
-        for (uint32_t corner = 0; corner < 4; corner++) {
-            float *p = positions[first + corner];
-            p[axis] = out;
-            p[u] = (corner == 1 || corner == 2) == (side % 2 != 0) ? 0.5f : -0.5f;
-            p[v] = corner >= 2 ? 0.5f : -0.5f;
-        }
-        memcpy(&indices[6 * side], (uint32_t[6]){first, first + 1, first + 2, first, first + 2, first + 3},
-               6 * sizeof(*indices));
-    }
-    test_mesh(edits, id, (const float(*)[3])positions, 24, indices, 12);
-}
-
 static void add_box(struct test_edits *edits, uint32_t node, float size, float x, float y, float z)
 {
     float m[12];
-    test_transform(m, size, size, size, 0, 0, x, y, z);
+    test_transform(m, 0.5f * size, 0.5f * size, 0.5f * size, 0, 0, x, y, z);
     test_node(edits, node, 0, NODE_MESH, 10, m);
 }
 
@@ -211,7 +192,7 @@ TEST(new_objects_are_static_and_settle_what_stood_still)
     update(&fixture);
     expect_built(&fixture, true, true);
     add_box_mesh(&fixture.edits, 11);
-    test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){1, 0, 0, 8, 0, 1, 0, 0, 0, 0, 1, 0});
+    test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){0.5f, 0, 0, 8, 0, 0.5f, 0, 0, 0, 0, 0.5f, 0});
     update(&fixture); /* the first box has settled, the second was on the move until now */
     expect_built(&fixture, true, true);
     assert_float_equal(told_metres(fixture.tracer, "dynamic/cell"), 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
@@ -235,7 +216,7 @@ TEST(a_mesh_that_is_set_again_is_dynamic)
     struct scene *scene = scene_of_boxes(2);
     fixture_init(&fixture, scene, &small);
     add_box_mesh(&fixture.edits, 11);
-    test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1, 0});
+    test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){0.5f, 0, 0, 0, 0, 0.5f, 0, 3, 0, 0, 0.5f, 0});
     update(&fixture);
     expect_built(&fixture, true, false);
     for (int turn = 0; turn < 3; turn++) {
@@ -282,34 +263,6 @@ TEST(an_edit_of_a_texture_builds_all_and_a_factor_nothing)
     fixture_finish(&fixture);
 }
 
-/* As flat as can be, one point wide, far away and of any size: boxes stay boxes. */
-TEST(flat_and_tiny_and_huge_scenes_have_cells)
-{
-    static const struct {
-        float size[3], place[3], longest;
-    } rows[] = {
-        {{4, 4, 1e-7f}, {0, 0, 0}, 4},
-        {{1e-3f, 1e-3f, 1e-3f}, {0, 0, 0}, 1e-3f},
-        {{1e6f, 1e6f, 1}, {0, 0, 0}, 1e6f},
-        {{1e-3f, 20, 1e-3f}, {1e3f, 0, 0}, 20},
-        {{1e15f, 1e15f, 1e15f}, {0, 0, 0}, 1e15f},
-    };
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
-        struct test_edits edits = {.scene = test_scene_create()};
-        float m[12];
-        const float *size = rows[i].size, *place = rows[i].place;
-        add_box_mesh(&edits, 10);
-        test_transform(m, size[0], size[1], size[2], 0, 0, place[0], place[1], place[2]);
-        test_node(&edits, 1, 0, NODE_MESH, 10, m);
-        test_commit(&edits);
-        struct fixture fixture;
-        fixture_init(&fixture, edits.scene, &small);
-        float cell = told_metres(fixture.tracer, "static/cell");
-        assert_float_equal(cell / rows[i].longest, 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-5f);
-        fixture_finish(&fixture);
-    }
-}
-
 /* Squares without thickness, six of them one above the other. */
 static struct scene *scene_of_squares(void)
 {
@@ -328,20 +281,17 @@ static struct scene *scene_of_squares(void)
 
 TEST(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay)
 {
-    struct tracer_options options = {.ldc = {.resolution = RESOLUTION}, .limits = {.ldc_layers = 2}};
-    for (options.ldc.build = LDC_BUILD_AUTO; options.ldc.build <= LDC_BUILD_LISTS; options.ldc.build++) {
-        struct fixture fixture;
-        fixture_init(&fixture, scene_of_squares(), &options);
-        assert_int_equal(told(fixture.tracer, "static/layers_needed"), 6);
-        assert_int_equal(told(fixture.tracer, "static/layers_kept"), 2);
-        assert_int_equal(told(fixture.tracer, "static/samples_lost"), 2 * told(fixture.tracer, "static/samples"));
-        assert_non_null(strstr(told_row(fixture.tracer, "static/layers_kept").warning, "2 of 6 layers"));
-        expect_distance(distance_below(&fixture, 0, 0),
-                        9.75); /* z = 0.25, the second from below: minimum depths */
-        struct ray up = {{0.013f, 0.017f, -10, 0}, {0, 0, 1, 1e9f}};
-        expect_distance(trace_one(&fixture, up).distance, 10);
-        fixture_finish(&fixture);
-    }
+    const struct tracer_options options = {.ldc = {.resolution = RESOLUTION}, .limits = {.ldc_layers = 2}};
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_squares(), &options);
+    assert_int_equal(told(fixture.tracer, "static/layers_needed"), 6);
+    assert_int_equal(told(fixture.tracer, "static/layers_kept"), 2);
+    assert_int_equal(told(fixture.tracer, "static/samples_lost"), 2 * told(fixture.tracer, "static/samples"));
+    assert_non_null(strstr(told_row(fixture.tracer, "static/layers_kept").warning, "2 of 6 layers"));
+    expect_distance(distance_below(&fixture, 0, 0), 9.75); /* z = 0.25, the second from below: minimum depths */
+    const struct ray up = {{0.013f, 0.017f, -10, 0}, {0, 0, 1, 1e9f}};
+    expect_distance(trace_one(&fixture, up).distance, 10);
+    fixture_finish(&fixture);
 }
 
 TEST(after_a_failure_the_next_update_starts_anew)

@@ -136,7 +136,7 @@ TEST(eyes_within_the_radius_see_every_node_within_the_pixels_of_the_bound)
     expect_bound(curved_scene(), &usual, 0.15, 0.5);
 }
 
-TEST(the_bound_holds_for_a_hundredth_of_a_pixel_and_for_four)
+TEST_LONG(the_bound_holds_for_a_hundredth_of_a_pixel_and_for_four)
 {
     struct layers_view view = usual;
     view.pixels = 0.01;
@@ -146,7 +146,7 @@ TEST(the_bound_holds_for_a_hundredth_of_a_pixel_and_for_four)
 }
 
 /* From 0.4 metres on, some surfaces are hardly farther away than the eyes come. */
-TEST(the_bound_holds_for_eyes_that_come_near_to_the_surface)
+TEST_LONG(the_bound_holds_for_eyes_that_come_near_to_the_surface)
 {
     struct layers_view view = usual;
     view.radius = 0.35;
@@ -157,8 +157,8 @@ TEST(the_bound_holds_for_eyes_that_come_near_to_the_surface)
 TEST(the_bound_holds_on_all_faces_of_a_cube_and_with_another_near_distance)
 {
     struct layers_view view = usual;
-    view.width = view.height = 256;
-    view.focal = 128;
+    view.width = view.height = 128;
+    view.focal = 64;
     view.faces = 6;
     view.near = 0.001;
     view.turn = 0.4;

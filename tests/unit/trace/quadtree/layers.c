@@ -8,11 +8,11 @@
 
 ALL_TESTS(open_device, close_device)
 
-static const struct layers_view usual = {.width = 320,
-                                         .height = 200,
+static const struct layers_view usual = {.width = 160,
+                                         .height = 100,
                                          .faces = 1,
                                          .layers = 3,
-                                         .focal = 230,
+                                         .focal = 115,
                                          .near = 0.05,
                                          .far = 1000,
                                          .pixels = 0.25,
@@ -216,51 +216,33 @@ static void expect_drawn(struct scene *scene, const struct quadtree_uniforms *u,
     drawn_finish(&drawn);
 }
 
-/* Triangles, spheres, mirrored instances and a disc. */
+/* Triangles, spheres, mirrored instances and a disc; in an orthographic view; cut off by the near distance, which
+ * of spheres leaves the far sides; two layers alone; from outside of spheres and among them. */
 TEST(layers_show_the_first_surfaces_along_the_ray_in_order)
 {
-    const struct quadtree_uniforms u = uniforms_of(&usual);
-    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
-    expect_drawn(flat_scene(), &u, u.width * u.height / 10 * 9);
-}
-
-TEST(layers_of_an_orthographic_view_show_the_first_surfaces_in_order)
-{
-    struct layers_view view = usual;
-    view.orthographic = true;
-    view.focal = 60;
-    view.far = 20;
-    const struct quadtree_uniforms u = uniforms_of(&view);
-    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
-}
-
-/* Through balls, spheres and hills: of spheres it leaves the far sides. */
-TEST(what_the_near_distance_cuts_off_is_in_no_layer)
-{
-    struct layers_view view = usual;
-    view.near = 2;
-    const struct quadtree_uniforms u = uniforms_of(&view);
-    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
-}
-
-TEST(two_layers_are_the_first_two_surfaces)
-{
-    struct layers_view view = usual;
-    view.layers = 2;
-    const struct quadtree_uniforms u = uniforms_of(&view);
-    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
-    expect_drawn(test_scene_spheres(), &u, u.width * u.height / 10 * 9);
-}
-
-TEST(far_sides_of_spheres_are_layers_of_their_own)
-{
-    struct layers_view view = usual;
-    view.eye[2] = 3;
-    struct quadtree_uniforms u = uniforms_of(&view);
-    expect_drawn(test_scene_spheres(), &u, u.width * u.height / 10 * 9);
-    view.eye[2] = 0; /* among them */
-    u = uniforms_of(&view);
-    expect_drawn(test_scene_spheres(), &u, u.width * u.height / 10 * 9);
+    static const struct {
+        struct scene *(*create)(void);
+        double focal, near, far;
+        uint32_t layers;
+        float eye_z;
+        bool orthographic;
+    } rows[] = {
+        {curved_scene, 115, 0.05, 1000, 3, 0, false},       {curved_scene, 30, 0.05, 20, 3, 0, true},
+        {curved_scene, 115, 2, 1000, 3, 0, false},          {flat_scene, 115, 0.05, 1000, 2, 0, false},
+        {test_scene_spheres, 115, 0.05, 1000, 2, 3, false}, {test_scene_spheres, 115, 0.05, 1000, 3, 0, false},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct layers_view view = usual;
+        view.focal = rows[i].focal;
+        view.near = rows[i].near;
+        view.far = rows[i].far;
+        view.layers = rows[i].layers;
+        view.eye[2] = rows[i].eye_z;
+        view.orthographic = rows[i].orthographic;
+        const struct quadtree_uniforms u = uniforms_of(&view);
+        print_message("row %zu: ", i);
+        expect_drawn(rows[i].create(), &u, u.width * u.height / 10 * 9);
+    }
 }
 
 /* Faces lie as the view does: one of them sees all that is before the eye. */
@@ -336,7 +318,7 @@ static struct quadtree_uniforms cube_round_the_eye(struct scene *scene)
     const struct trace_view view = {
         .world_from_view = {1, 0, 0, 0.1f, 0, 1, 0, 0.6f, 0, 0, 1, -1.8f}, .fov_y = 1, .width = 64, .height = 64};
     const struct quadtree_settings settings = {
-        .faces = QUADTREE_FACES_CUBE, .layers = 3, .resolution = 128, .pixels = 0.5f, .radius = 0.1f};
+        .faces = QUADTREE_FACES_CUBE, .layers = 3, .resolution = 64, .pixels = 0.5f, .radius = 0.1f};
     gpu_scene_init(&gpu, device);
     expect_ok(gpu_scene_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
     expect_ok(quadtree_store_place(&store, &gpu, &view, &settings, &error), &error);
@@ -428,7 +410,7 @@ TEST(two_sides_of_a_sheet_are_two_layers)
     static const uint32_t order[3] = {2, 1, 3};
     uint32_t covered, count = texels_with(sheets(distances, 3, 0), order, &covered);
     print_message("%u of %u texels\n", count, covered);
-    assert_in_range(covered, 60000, 64000);
+    assert_in_range(covered, 15000, 16000);
     assert_int_equal(count, covered);
     count = texels_with(sheets(distances, 3, 0.3f), order, &covered);
     print_message("leaning: %u of %u texels\n", count, covered);
@@ -440,56 +422,12 @@ TEST(of_surfaces_that_coincide_one_is_kept)
     static const uint32_t one[3] = {1, 3, 0}, other[3] = {2, 3, 0};
     uint32_t covered, count = texels_with(sheets(distances, 3, 0.3f), one, &covered);
     count += texels_with(sheets(distances, 3, 0.3f), other, &covered);
-    assert_in_range(covered, 40000, 64000);
+    assert_in_range(covered, 10000, 16000);
     print_message("%u of %u texels\n", count, covered);
     assert_int_equal(count, covered);
 }
 
 /* ---- cutouts ---- */
-
-/* What is cut out altogether is not there, nor are halves of a sphere. */
-TEST(what_is_cut_out_is_in_no_layer)
-{
-    const struct quadtree_uniforms u = uniforms_of(&usual);
-    struct test_edits edits = {.scene = test_scene_create()};
-    static const float sphere[1][4] = {{0, 0, -2, 0.9f}},
-                       positions[3][3] = {{-9, -9, -1}, {9, -9, -1}, {0, 9, -1}};
-    static const float behind[3][3] = {{-9, -9, -4}, {9, -9, -4}, {0, 9, -4}};
-    static const uint32_t indices[3] = {0, 1, 2};
-    struct drawn drawn;
-    struct scene_material *cutout = test_material(&edits, 1, 0.4f, 0.5f, 0.6f);
-    cutout->alpha_mode = ALPHA_MASK;
-    cutout->base_colour[3] = 0.25f;
-    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    const struct material_range holes = {0, 1, 1};
-    struct scene_mesh *mesh = test_mesh(&edits, 10, positions, 3, indices, 1);
-    mesh->ranges = test_ranges(&holes, 1);
-    mesh->range_count = 1;
-    struct scene_spheres *spheres = test_spheres(&edits, 20, sphere, 1);
-    spheres->ranges = test_ranges(&holes, 1);
-    spheres->range_count = 1;
-    test_mesh(&edits, 11, behind, 3, indices, 1);
-    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
-    test_node(&edits, 2, 0, NODE_SPHERES, 20, NULL);
-    test_node(&edits, 3, 0, NODE_MESH, 11, NULL);
-    test_commit(&edits);
-    drawn_init(&drawn, edits.scene, &u);
-    uint32_t geometry = 0;
-    while (drawn.seen.gpu.geometries[geometry].device.flags & GEOMETRY_HAS_CUTOUT)
-        geometry++;
-    draw(&drawn);
-    const size_t slice = (size_t)u.padded_width * u.padded_height;
-    uint32_t covered = 0;
-    for (size_t i = 0; i < slice; i++) {
-        const uint32_t instance = drawn.visible[i][0];
-        covered += instance > 0;
-        if (instance > 0)
-            assert_int_equal(drawn.seen.gpu.instances[instance - 1].geometry, geometry);
-        assert_int_equal(drawn.visible[slice + i][0], 0);
-    }
-    assert_in_range(covered, 50000, 64000);
-    drawn_finish(&drawn);
-}
 
 /* A sphere two metres ahead of which one half is cut out: the one towards the eye, or the other. */
 static struct scene *half_sphere(bool far_half)
@@ -532,7 +470,7 @@ static void count_halves(struct scene *scene, uint32_t counts[2])
     drawn_finish(&drawn);
 }
 
-TEST(where_a_sphere_is_cut_out_its_far_side_is_the_first_layer_and_its_leaf)
+TEST_LONG(where_a_sphere_is_cut_out_its_far_side_is_the_first_layer_and_its_leaf)
 {
     uint32_t near_gone[2], far_gone[2];
     count_halves(half_sphere(true), far_gone);
@@ -541,10 +479,10 @@ TEST(where_a_sphere_is_cut_out_its_far_side_is_the_first_layer_and_its_leaf)
                   near_gone[0], near_gone[1]);
     const bool swapped = far_gone[0] < near_gone[0]; /* whichever half the texture's columns are */
     const uint32_t *whole = swapped ? near_gone : far_gone, *inside = swapped ? far_gone : near_gone;
-    assert_in_range(whole[0], 30000, 64000);
+    assert_in_range(whole[0], 7500, 16000);
     assert_int_equal(whole[1], 0);
     assert_int_equal(inside[0], 0);
-    assert_in_range(inside[1], 15000, 64000);
+    assert_in_range(inside[1], 3750, 16000);
 }
 
 /* ---- steps ---- */

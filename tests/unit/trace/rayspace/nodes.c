@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of the rays of a wave: what a ray hits in exact arithmetic is culled at no level, whichever way the wave
- * is taken. The device's own programs are run (rayspace/sort.comp, nodes.comp, meet.glsl, items.comp), on rays and
- * triangles as hostile as can be. */
+/* Bounds of the rays of a wave: what a ray hits in exact arithmetic is culled at no level, whether the wave is
+ * taken as it comes or turned round and sorted. The device's own programs are run (rayspace/sort.comp, nodes.comp,
+ * meet.glsl), on rays and triangles as hostile as can be. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "shared/bindings.h"
@@ -12,10 +12,9 @@
 #include <float.h>
 
 #define RAYSPACE_NUMBER 5u
-#define RAYS 1024u
+#define RAYS 256u /* a power of four */
 #define ELEMENTS 256u
 #define CASES 40u /* a multiple of FORMS and of 4 */
-#define MESH 10u
 
 ALL_TESTS(open_device, close_device)
 
@@ -65,7 +64,6 @@ static const char *const form_names[FORMS] = {"from a point", "parallel",  "mirr
                                               "incoherent",   "opposed",   "along axes", "from behind",
                                               "to a point",   "to an area"};
 
-/* In the world; exact, also where an instance has moved it. */
 struct triangle {
     double v[3][3];
 };
@@ -74,9 +72,6 @@ struct fuzz {
     enum form form;
     uint64_t seed;
     double scale, offset[3];
-    double object_offset[3];
-    float objects[ELEMENTS][3][3]; /* the triangles in the space of their mesh */
-    float world_from_object[12];
     struct triangle triangles[ELEMENTS];
     struct ray rays[RAYS];
 };
@@ -97,39 +92,6 @@ static void random_unit(struct fuzz *fuzz, double v[3])
     v[0] = r * cos(phi);
     v[1] = r * sin(phi);
     v[2] = z;
-}
-
-/* As it is in every second pair of cases; else stretched, turned, mirrored. The mesh comes to the place of the
- * rays.
- */
-static void choose_transform(struct fuzz *fuzz, bool moved)
-{
-    float *m = fuzz->world_from_object;
-    test_transform(m, 1, 1, 1, 0, 0, 0, 0, 0);
-    if (moved)
-        test_transform(m, (float)uniform(fuzz, 0.2, 5), (float)uniform(fuzz, -5, -0.2),
-                       (float)uniform(fuzz, 0.2, 5), (int)(test_random(&fuzz->seed) % 3),
-                       (float)uniform(fuzz, 0, 6), 0, 0, 0);
-    for (int row = 0; row < 3; row++) {
-        fuzz->object_offset[row] = fuzz->offset[row];
-        for (int k = 0; k < 3 && moved; k++)
-            m[4 * row + 3] -= (float)(m[4 * row + k] * fuzz->offset[k]);
-        m[4 * row + 3] += moved ? (float)fuzz->offset[row] : 0;
-    }
-}
-
-static void place(struct fuzz *fuzz, const double p[3], uint32_t number, int vertex)
-{
-    float *object = fuzz->objects[number][vertex];
-    for (int k = 0; k < 3; k++)
-        object[k] = (float)(p[k] * fuzz->scale + fuzz->object_offset[k]);
-    for (int row = 0; row < 3; row++) {
-        const float *m = &fuzz->world_from_object[(size_t)row * 4];
-        double world = m[3];
-        for (int k = 0; k < 3; k++)
-            world += (double)m[k] * object[k];
-        fuzz->triangles[number].v[vertex][row] = world;
-    }
 }
 
 /* Tiny, middling, needles, huge, flat in an axis, without an area, points. */
@@ -161,7 +123,8 @@ static void make_triangle(struct fuzz *fuzz, uint32_t number)
             corner[1][k] = corner[2][k] = corner[0][k];
     }
     for (int v = 0; v < 3; v++)
-        place(fuzz, corner[v], number, v);
+        for (int k = 0; k < 3; k++)
+            fuzz->triangles[number].v[v][k] = (float)(corner[v][k] * fuzz->scale + fuzz->offset[k]);
 }
 
 /* A point of a triangle, often a corner or on an edge. */
@@ -274,7 +237,7 @@ static void make_rays(struct fuzz *fuzz)
     random_unit(fuzz, shared[0]);
     random_unit(fuzz, shared[1]);
     for (uint32_t i = 0; i < RAYS; i++) {
-        const uint32_t group = 1u << 2 * (i / 256 + 1);
+        const uint32_t group = 1u << 2 * (i / (RAYS / 4) + 1);
         const uint32_t aimed = (i / group * 2654435761u >> 8) % ELEMENTS;
         double target[3], origin[3], way[3];
         target_on(fuzz, &fuzz->triangles[aimed], target);
@@ -306,7 +269,6 @@ static void fuzz_init(struct fuzz *fuzz, uint32_t number)
     random_unit(fuzz, away);
     for (int k = 0; k < 3 && world / 2 % 2 > 0; k++)
         fuzz->offset[k] = 1e4 * fuzz->scale * away[k];
-    choose_transform(fuzz, (number + world) % 2 > 0);
     for (uint32_t i = 0; i < ELEMENTS; i++)
         make_triangle(fuzz, i);
     make_rays(fuzz);
@@ -374,31 +336,6 @@ static void bound_by_box(const struct triangle *t, struct element *e)
     e->centre_radius[3] = sqrtf(squared) * 1.000004f;
 }
 
-/* About the longest edge, and through the third corner where that is outside; rounded outward. */
-static void bound_by_sphere(const struct triangle *t, struct element *e)
-{
-    double centre[3] = {0}, longest = -1, radius = 0;
-    for (int v = 0; v < 3; v++) {
-        double edge[3];
-        for (int k = 0; k < 3; k++)
-            edge[k] = t->v[(v + 1) % 3][k] - t->v[v][k];
-        if (length_of(edge) <= longest)
-            continue;
-        longest = length_of(edge);
-        for (int k = 0; k < 3; k++)
-            centre[k] = 0.5 * (t->v[(v + 1) % 3][k] + t->v[v][k]);
-    }
-    for (int k = 0; k < 3; k++)
-        e->centre_radius[k] = (float)centre[k];
-    for (int v = 0; v < 3; v++) {
-        double away[3];
-        for (int k = 0; k < 3; k++)
-            away[k] = t->v[v][k] - e->centre_radius[k];
-        radius = fmax(radius, length_of(away));
-    }
-    e->centre_radius[3] = nextafterf((float)radius, INFINITY);
-}
-
 /* Of each pair: bit 0 the cone meets the sphere, 1 the slabs the box, 2 it may meet, 3 a ray of it is alive. */
 static const char probe_text[] =
     "#include \"common/dispatch.glsl\"\n"
@@ -428,68 +365,36 @@ static const char probe_text[] =
     "}\n";
 
 /* How a wave is taken. */
-enum way { AS_IT_COMES, TURNED, SORTED, TURNED_AND_SORTED, WAYS };
+enum way { AS_IT_COMES, TURNED_AND_SORTED, WAYS };
 
-static const char *const way_names[WAYS] = {"as it comes", "turned", "sorted", "turned and sorted"};
-
-static bool is_turned(enum way way)
-{
-    return way == TURNED || way == TURNED_AND_SORTED;
-}
-
-static bool is_sorted(enum way way)
-{
-    return way == SORTED || way == TURNED_AND_SORTED;
-}
+static const char *const way_names[WAYS] = {"as it comes", "turned and sorted"};
 
 struct run {
-    struct fixture fixture;         /* its scene is the mesh of the case */
+    struct fixture fixture;
     struct gpu_program programs[2]; /* for closest hits, and for shadow rays, which alone are turned round */
     struct rayspace_state state;
-    struct gpu_buffer rays, elements, pairs, met;
+    struct gpu_buffer rays, elements, met;
     uint32_t places[RAYS]; /* of each ray, in level 0 */
     uint32_t node_count;   /* with the rays themselves */
-    struct rayspace_node *nodes;
     uint32_t *words;
 };
 
-static void set_mesh(struct test_edits *edits, const struct fuzz *fuzz)
-{
-    uint32_t indices[3 * ELEMENTS];
-    for (uint32_t i = 0; i < 3 * ELEMENTS; i++)
-        indices[i] = i;
-    test_mesh(edits, MESH, fuzz->objects[0], 3 * ELEMENTS, indices, ELEMENTS);
-    test_node(edits, 1, 0, NODE_MESH, MESH, fuzz->world_from_object);
-}
-
-static struct scene *scene_of(const struct fuzz *fuzz)
-{
-    struct test_edits edits = {.scene = test_scene_create()};
-    set_mesh(&edits, fuzz);
-    test_commit(&edits);
-    return edits.scene;
-}
-
-static void run_init(struct run *run, struct fuzz *fuzz)
+static void run_init(struct run *run)
 {
     struct error error = {0};
-    const struct tracer_options options = {.rayspace.mode = RAYSPACE_MODE_FLAT}; /* nothing is built */
     static const struct gpu_define any_hit[] = {{"ANY_HIT", "1"}, {0}};
     *run = (struct run){.state.levels = rayspace_levels_over(RAYS)};
-    fuzz_init(fuzz, 0);
-    fixture_init_by(&run->fixture, RAYSPACE_NUMBER, scene_of(fuzz), &options);
+    fixture_init_by(&run->fixture, RAYSPACE_NUMBER, test_scene_create(), NULL);
     run->programs[0] = shader_probe_compile(probe_text, NULL);
     run->programs[1] = shader_probe_compile(probe_text, any_hit);
     run->state.base.wave = (struct wave){.ray_count = RAYS, .rays = &run->rays};
     run->state.base.device = device;
     run->node_count = RAYS + run->state.levels.first[run->state.levels.top] + 1;
     const size_t answer_bytes = RAYS * RAYSPACE_ANSWER_BYTES, pairs = (size_t)run->node_count * ELEMENTS;
-    run->nodes = malloc(run->node_count * sizeof(*run->nodes));
     run->words = malloc(pairs * sizeof(*run->words));
     expect_ok(gpu_buffer_reserve(device, &run->state.answers, answer_bytes, &error) &&
                   gpu_buffer_reserve(device, &run->met, pairs * sizeof(*run->words), &error) &&
-                  gpu_buffer_reserve(device, &run->elements, ELEMENTS * sizeof(struct element), &error) &&
-                  gpu_buffer_reserve(device, &run->pairs, ELEMENTS * RAYSPACE_PAIR_BYTES, &error),
+                  gpu_buffer_reserve(device, &run->elements, ELEMENTS * sizeof(struct element), &error),
               &error);
     const struct rayspace_control control = {0};
     expect_ok(gpu_buffer_upload(device, &run->state.control, &control, sizeof(control), &error), &error);
@@ -504,49 +409,20 @@ static void run_finish(struct run *run)
     gpu_buffer_finish(device, &run->state.order);
     gpu_buffer_finish(device, &run->state.bins);
     gpu_buffer_finish(device, &run->elements);
-    gpu_buffer_finish(device, &run->pairs);
     gpu_buffer_finish(device, &run->met);
     shader_probe_finish(&run->programs[0]);
     shader_probe_finish(&run->programs[1]);
     fixture_finish(&run->fixture);
-    free(run->nodes);
     free(run->words);
 }
 
-/* Half of the elements have a sphere about their box, as those of a tree; half one about their triangle. */
-static void bound_as_a_tree(struct run *run, const struct fuzz *fuzz)
+static void bound_elements(struct run *run, const struct fuzz *fuzz)
 {
     struct error error = {0};
     struct element elements[ELEMENTS] = {0};
-    for (uint32_t i = 0; i < ELEMENTS; i++) {
+    for (uint32_t i = 0; i < ELEMENTS; i++)
         bound_by_box(&fuzz->triangles[i], &elements[i]);
-        if (i / 8 % 2)
-            bound_by_sphere(&fuzz->triangles[i], &elements[i]);
-    }
     expect_ok(gpu_buffer_upload(device, &run->elements, elements, sizeof(elements), &error), &error);
-}
-
-/* As the flat descent does. The mesh of the case is on the device. */
-static void bound_flat(struct run *run, const struct fuzz *fuzz)
-{
-    struct error error = {0};
-    struct gpu_scene *scene = &run->fixture.gpu;
-    struct rayspace *rayspace = (struct rayspace *)run->fixture.tracer;
-    assert_int_equal(rayspace->rank_count, ELEMENTS);
-    for (int k = 0; k < 12; k++)
-        assert_true(scene->instances[0].world_from_object[k / 4][k % 4] == fuzz->world_from_object[k]);
-    const struct gpu_program_source source = {.compute = "rayspace/items.comp"};
-    const struct gpu_program *program = gpu_program_get(device, &source, &error);
-    expect_ok(program != NULL, &error);
-    gpu_scene_bind(scene);
-    gpu_buffer_bind_texels(device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
-    gpu_buffer_bind_storage(&run->elements, BIND_RAYSPACE_ITEMS);
-    gpu_buffer_bind_storage(&run->pairs, BIND_RAYSPACE_PAIRS);
-    gpu_uniform_uint(program, "instance_count", scene->instance_count);
-    gpu_uniform_uint(program, "batch_first", 0);
-    gpu_uniform_uint(program, "batch_count", ELEMENTS);
-    gpu_uniform_uint(program, "root", 0);
-    gpu_dispatch(device, program, ELEMENTS);
 }
 
 /* The hierarchy over the rays as the tracer makes it. */
@@ -557,11 +433,10 @@ static void build_nodes(struct run *run, const struct fuzz *fuzz, enum way way)
     struct rayspace_settings *settings = &state->base.options.rayspace;
     const uint32_t no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK},
                    no_light_lost[4] = {0};
-    state->base.wave.kind = is_turned(way) ? WAVE_ANY : WAVE_CLOSEST;
-    settings->turn = is_turned(way) ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
-    settings->sort = is_sorted(way) ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
-    gpu_buffer_fill(device, &state->answers, 0, RAYS * RAYSPACE_ANSWER_BYTES,
-                    is_turned(way) ? no_light_lost : no_hit);
+    state->base.wave.kind = way == TURNED_AND_SORTED ? WAVE_ANY : WAVE_CLOSEST;
+    settings->turn = way ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
+    settings->sort = way ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
+    gpu_buffer_fill(device, &state->answers, 0, RAYS * RAYSPACE_ANSWER_BYTES, way ? no_light_lost : no_hit);
     const struct rayspace_control control = {0};
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
     expect_ok(gpu_buffer_upload(device, &run->rays, fuzz->rays, sizeof(fuzz->rays), &error) &&
@@ -569,19 +444,17 @@ static void build_nodes(struct run *run, const struct fuzz *fuzz, enum way way)
                   rayspace_order_rays(state, &run->fixture.gpu, &error) &&
                   rayspace_nodes_build(state, &run->fixture.gpu, false, &error),
               &error);
-    const size_t stored = run->node_count - RAYS;
-    gpu_buffer_read(device, &state->nodes, 0, run->nodes, stored * sizeof(*run->nodes));
     uint32_t order[RAYS];
     gpu_buffer_read(device, &state->order, 0, order, sizeof(order));
     for (uint32_t place = 0; place < RAYS; place++)
-        run->places[is_sorted(way) ? order[place] : place] = place;
+        run->places[way ? order[place] : place] = place;
 }
 
 static void run_case(struct run *run, const struct fuzz *fuzz, enum way way)
 {
     struct error error = {0};
     build_nodes(run, fuzz, way);
-    const struct gpu_program *program = &run->programs[is_turned(way)];
+    const struct gpu_program *program = &run->programs[way];
     rayspace_bind_wave(&run->fixture.gpu, &run->state, program);
     gpu_buffer_bind_texels(device, &run->state.nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
     gpu_buffer_bind_storage(&run->elements, BIND_RAYSPACE_PAIRS);
@@ -599,20 +472,6 @@ static void run_case(struct run *run, const struct fuzz *fuzz, enum way way)
 struct tally {
     uint64_t pairs, hit, culled;
 };
-
-static void tally_add(struct tally *sum, const struct tally *tally)
-{
-    sum->pairs += tally->pairs;
-    sum->hit += tally->hit;
-    sum->culled += tally->culled;
-}
-
-static void tally_print(const struct tally *tally, const char *name)
-{
-    print_message("%-18s %9llu pairs, %5.2f %% of them hits, %5.1f %% culled\n", name,
-                  (unsigned long long)tally->pairs, 100.0 * (double)tally->hit / (double)tally->pairs,
-                  100.0 * (double)tally->culled / (double)tally->pairs);
-}
 
 /* The node of a level that has the ray at a place, among all, the rays first. */
 static uint32_t node_over(const struct rayspace_levels *levels, uint32_t level, uint32_t place)
@@ -660,133 +519,30 @@ TEST(no_triangle_that_a_ray_hits_is_culled_from_its_nodes)
     struct run run;
     struct fuzz *fuzz = malloc(sizeof(*fuzz));
     bool *found = malloc((size_t)RAYS * ELEMENTS * sizeof(*found));
-    struct tally of_form[FORMS] = {0}, of_way[WAYS] = {0}, of_bounds[2] = {0};
+    struct tally sum = {0};
     const uint32_t case_count = getenv("FARLIGHT_TEST_LONG") ? 16 * CASES : CASES;
-    run_init(&run, fuzz);
+    run_init(&run);
     for (uint32_t number = 0; number < case_count; number++) {
         fuzz_init(fuzz, number);
-        set_mesh(&run.fixture.edits, fuzz);
-        update(&run.fixture);
         find_hits(fuzz, found);
+        bound_elements(&run, fuzz);
         for (enum way way = 0; way < WAYS; way++) {
-            const bool flat = (number / FORMS + way / 2) % 2;
             char what[128];
-            snprintf(what, sizeof(what), "case %u, %s, %s, scale %g, bounds %s", number, form_names[fuzz->form],
-                     way_names[way], fuzz->scale, flat ? "of the flat descent" : "as a tree's");
-            if (flat)
-                bound_flat(&run, fuzz);
-            else
-                bound_as_a_tree(&run, fuzz);
+            snprintf(what, sizeof(what), "case %u, %s, %s, scale %g", number, form_names[fuzz->form],
+                     way_names[way], fuzz->scale);
             run_case(&run, fuzz, way);
             const struct tally tally = expect_no_hit_culled(&run, found, what);
-            tally_add(&of_form[fuzz->form], &tally);
-            tally_add(&of_way[way], &tally);
-            tally_add(&of_bounds[flat], &tally);
+            sum.pairs += tally.pairs;
+            sum.hit += tally.hit;
+            sum.culled += tally.culled;
         }
     }
-    for (int form = 0; form < FORMS; form++)
-        tally_print(&of_form[form], form_names[form]);
-    for (int way = 0; way < WAYS; way++) {
-        tally_print(&of_way[way], way_names[way]);
-        assert_true(of_way[way].pairs >= 10000000);
-        /* The test has seen both. */
-        assert_true(of_way[way].hit > of_way[way].pairs / 200);
-        assert_true(of_way[way].culled > of_way[way].pairs / 4);
-    }
-    tally_print(&of_bounds[0], "as a tree's");
-    tally_print(&of_bounds[1], "flat");
+    print_message("%llu pairs, %.2f %% of them hits, %.1f %% culled\n", (unsigned long long)sum.pairs,
+                  100.0 * (double)sum.hit / (double)sum.pairs, 100.0 * (double)sum.culled / (double)sum.pairs);
+    /* The test has seen both. */
+    assert_true(sum.hit > sum.pairs / 200);
+    assert_true(sum.culled > sum.pairs / 4);
     run_finish(&run);
     free(found);
-    free(fuzz);
-}
-
-/* ---- levels bound each other ---- */
-
-static double end_of(const struct ray *ray, const double d[3])
-{
-    const double before = fmin(ray->origin_t_min[3], 0);
-    return (ray->direction_t_max[3] - before) * length_of(d);
-}
-
-/* A ray in a node, in double precision. */
-static bool node_bounds_ray(const struct rayspace_node *node, const struct ray *ray)
-{
-    double d[3], origin[3], away[3], chord[3];
-    for (int k = 0; k < 3; k++)
-        d[k] = ray->direction_t_max[k];
-    const double length = length_of(d);
-    bool in = node->origin_upper_end[3] >= fmin(end_of(ray, d), 3e38f);
-    for (int k = 0; k < 3; k++) {
-        origin[k] = ray->origin_t_min[k] + fmin(ray->origin_t_min[3], 0) * d[k];
-        away[k] = origin[k] - node->centre_radius[k];
-        chord[k] = d[k] / length - node->axis_secant[k];
-        in = in && origin[k] >= node->origin_lower_tan[k] && origin[k] <= node->origin_upper_end[k] &&
-             d[k] / length >= node->direction_lower_spread[k] && d[k] / length <= node->direction_upper[k];
-    }
-    /* The node's own spread is rounded up by more than the device's tangent and secant are by to either side. */
-    const double angle = 2 * asin(fmin(length_of(chord) / 2, 1)), rounding = 1e-6;
-    return in && length_of(away) <= node->centre_radius[3] &&
-           (node->axis_secant[3] == 0 || (angle <= node->direction_lower_spread[3] &&
-                                          node->origin_lower_tan[3] >= tan(angle) * (1 - rounding) &&
-                                          node->axis_secant[3] >= (1 - rounding) / cos(angle)));
-}
-
-static bool box_bounds(const struct rayspace_node *node, const struct rayspace_node *below)
-{
-    bool in = true;
-    for (int k = 0; k < 3; k++)
-        in = in && below->origin_lower_tan[k] >= node->origin_lower_tan[k] &&
-             below->origin_upper_end[k] <= node->origin_upper_end[k] &&
-             below->direction_lower_spread[k] >= node->direction_lower_spread[k] &&
-             below->direction_upper[k] <= node->direction_upper[k];
-    return in && below->origin_upper_end[3] <= node->origin_upper_end[3];
-}
-
-TEST(every_level_bounds_the_rays_and_the_level_below)
-{
-    struct run run;
-    struct fuzz *fuzz = malloc(sizeof(*fuzz));
-    run_init(&run, fuzz);
-    const struct rayspace_levels *levels = &run.state.levels;
-    for (uint32_t number = 0; number < CASES; number++) {
-        fuzz_init(fuzz, number);
-        build_nodes(&run, fuzz, AS_IT_COMES);
-        for (uint32_t level = 1; level <= levels->top; level++) {
-            for (uint32_t ray = 0; ray < RAYS; ray++) {
-                const struct rayspace_node *node = &run.nodes[levels->first[level] + (ray >> 2 * level)];
-                if (!is_dead(&fuzz->rays[ray]) && !node_bounds_ray(node, &fuzz->rays[ray]))
-                    fail_msg("case %u, %s, scale %g: ray %u leaves its node of level %u", number,
-                             form_names[fuzz->form], fuzz->scale, ray, level);
-            }
-            for (uint32_t i = 0; level > 1 && i < levels->count[level - 1]; i++) {
-                const struct rayspace_node *below = &run.nodes[levels->first[level - 1] + i];
-                if (below->origin_upper_end[3] >= 0 &&
-                    !box_bounds(&run.nodes[levels->first[level] + i / RAYSPACE_NODE_CHILDREN], below))
-                    fail_msg("case %u, %s: node %u of level %u leaves the one above", number,
-                             form_names[fuzz->form], i, level - 1);
-            }
-        }
-    }
-    run_finish(&run);
-    free(fuzz);
-}
-
-TEST(a_node_of_dead_rays_meets_nothing)
-{
-    struct run run;
-    struct fuzz *fuzz = malloc(sizeof(*fuzz));
-    run_init(&run, fuzz);
-    fuzz_init(fuzz, INCOHERENT);
-    for (uint32_t ray = 0; ray < RAYS; ray++)
-        if (ray != RAYS - 1)
-            fuzz->rays[ray].direction_t_max[3] = fuzz->rays[ray].origin_t_min[3];
-    bound_as_a_tree(&run, fuzz);
-    run_case(&run, fuzz, AS_IT_COMES);
-    const struct rayspace_levels *levels = &run.state.levels;
-    for (uint32_t level = 0; level <= levels->top; level++)
-        for (uint32_t ray = 0; ray < RAYS - 1; ray++)
-            for (uint32_t e = 0; e < ELEMENTS && ray >> 2 * level != (RAYS - 1) >> 2 * level; e++)
-                assert_false(run.words[(size_t)node_over(levels, level, ray) * ELEMENTS + e] >> 2 & 1);
-    run_finish(&run);
     free(fuzz);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What only the tracer `rayspace` promises: its answers are brute force's to the bit, in batches of any size, also
- * where these are halved, and in a scene of which everything moves. And what it says of its waves. */
+ * where these are halved or memory is short. And what it says of its waves. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "shared/wave.h"
@@ -63,21 +63,12 @@ static struct answers ask(struct fixture *fixture, const struct ray *rays, uint3
     return answers;
 }
 
-/* `within`: distances, as a share of them; 0: all of the answers, to the bit. */
-static bool is_alike(const struct hit *a, const struct hit *b, float within)
-{
-    if (within == 0)
-        return memcmp(a, b, sizeof(*a)) == 0;
-    return (a->distance < 0) == (b->distance < 0) &&
-           fabsf(a->distance - b->distance) <= within * fabsf(a->distance);
-}
-
 /* Frees them. */
-static void expect_alike(struct answers own, struct answers other, uint32_t count, float within, const char *what)
+static void expect_alike(struct answers own, struct answers other, uint32_t count, const char *what)
 {
     uint32_t found = 0, through = 0;
     for (uint32_t i = 0; i < count; i++) {
-        if (!is_alike(&own.hits[i], &other.hits[i], within))
+        if (memcmp(&own.hits[i], &other.hits[i], sizeof(*own.hits)) != 0)
             fail_msg("%s: the closest hit of ray %u: %.9g for %.9g", what, i, (double)own.hits[i].distance,
                      (double)other.hits[i].distance);
         if (own.visibility[i] != other.visibility[i])
@@ -97,7 +88,7 @@ static void expect_alike(struct answers own, struct answers other, uint32_t coun
 
 static void expect_same_answers(struct pair *pair, const struct ray *rays, uint32_t count, const char *what)
 {
-    expect_alike(ask(&pair->rayspace, rays, count), ask(&pair->naive, rays, count), count, 0, what);
+    expect_alike(ask(&pair->rayspace, rays, count), ask(&pair->naive, rays, count), count, what);
 }
 
 /* Of the last wave. */
@@ -109,84 +100,17 @@ static struct rayspace_control control_of(const struct fixture *fixture)
     return control;
 }
 
-static const struct {
-    const char *name;
-    struct scene *(*create)(void);
-} kinds_of_scenes[] = {{"soup", test_scene_soup},
-                       {"spheres", test_scene_spheres},
-                       {"translucent", test_scene_translucent},
-                       {"deformed", test_scene_deformed}};
-#define SCENE_KINDS (sizeof(kinds_of_scenes) / sizeof(kinds_of_scenes[0]))
-
-TEST(answers_are_those_of_brute_force_to_the_bit_in_batches_of_any_size)
+TEST(answers_are_those_of_brute_force_to_the_bit_in_small_batches)
 {
-    static const uint32_t batches[] = {0, STACK_PAIRS / 64, 61};
+    const uint32_t batch = 61;
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
-    for (size_t s = 0; s < SCENE_KINDS; s++) {
-        random_rays(rays, RAY_COUNT, 3 + s);
-        for (size_t b = 0; b < sizeof(batches) / sizeof(batches[0]); b++) {
-            struct pair pair;
-            pair_init(&pair, kinds_of_scenes[s].create, batches[b]);
-            expect_same_answers(&pair, rays, RAY_COUNT, kinds_of_scenes[s].name);
-            if (batches[b] > 0)
-                assert_in_range(control_of(&pair.rayspace).limit, 1, batches[b]);
-            pair_finish(&pair);
-        }
-    }
-    free(rays);
-}
-
-/* On software GL they do where a small tree begins; elsewhere its elements and nodes descend together. */
-TEST(rays_have_the_same_answers_wherever_they_begin_to_go_alone)
-{
-    const bool was_software = device->facts.software;
-    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
-    for (size_t s = 0; s < SCENE_KINDS; s++) {
-        struct pair pair;
-        uint32_t passes[2];
-        random_rays(rays, RAY_COUNT, 3 + s);
-        pair_init(&pair, kinds_of_scenes[s].create, 0);
-        for (unsigned i = 0; i < 2; i++) {
-            device->facts.software = i > 0;
-            const struct answers own = ask(&pair.rayspace, rays, RAY_COUNT);
-            device->facts.software = was_software;
-            passes[i] = control_of(&pair.rayspace).passes;
-            expect_alike(own, ask(&pair.naive, rays, RAY_COUNT), RAY_COUNT, 0, kinds_of_scenes[s].name);
-        }
-        print_message("%s: %u passes together, %u alone\n", kinds_of_scenes[s].name, passes[0], passes[1]);
-        assert_in_range(passes[1], 1, passes[0] - 1);
-        pair_finish(&pair);
-    }
-    free(rays);
-}
-
-/* Each primitive begins as a pair of its own. */
-TEST(more_primitives_than_a_stack_has_room_for_come_in_batches)
-{
-    const struct tracer_options options = {.rayspace.mode = RAYSPACE_MODE_FLAT, .bench.rayspace_pairs = 256};
-    struct ray rays[512];
     struct pair pair;
-    random_rays(rays, 512, 9);
-    pair_init_by(&pair, test_scene_soup, &options);
-    assert_true(((const struct rayspace *)pair.rayspace.tracer)->rank_count > options.bench.rayspace_pairs);
-    expect_same_answers(&pair, rays, 512, "flat, with little room");
+    random_rays(rays, RAY_COUNT, 3);
+    pair_init(&pair, test_scene_soup, batch);
+    expect_same_answers(&pair, rays, RAY_COUNT, "in small batches");
+    assert_in_range(control_of(&pair.rayspace).limit, 1, batch);
     pair_finish(&pair);
-}
-
-TEST(waves_of_few_rays_have_all_their_answers)
-{
-    static const uint32_t counts[] = {1, 2, 4, 5, 17, 64, 65, 256, 257};
-    struct pair pair;
-    struct ray rays[257];
-    random_rays(rays, 257, 11);
-    pair_init(&pair, test_scene_soup, 0);
-    for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++) {
-        struct hit hits[2][257];
-        trace_rays(trace_by_tracer, &pair.naive, WAVE_CLOSEST, rays, counts[i], hits[0], NULL);
-        trace_rays(trace_by_tracer, &pair.rayspace, WAVE_CLOSEST, rays, counts[i], hits[1], NULL);
-        assert_memory_equal(hits[0], hits[1], counts[i] * sizeof(hits[0][0]));
-    }
-    pair_finish(&pair);
+    free(rays);
 }
 
 /* ---- discs ---- */
@@ -236,40 +160,32 @@ TEST(rays_do_not_descend_beyond_a_disc)
     } scenes[] = {{scene_below_small_disc, "a small disc"},
                   {scene_below_disc_of_a_half, "a disc above a half"},
                   {scene_below_large_disc, "a disc above all"}};
-    static const enum wave_kind kinds[] = {WAVE_CLOSEST, WAVE_ANY};
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    struct hit *hits = calloc(RAY_COUNT, sizeof(*hits)), *expected = calloc(RAY_COUNT, sizeof(*hits));
+    uint32_t cone_tests[3], triangle_tests[3];
     uint64_t seed = 31;
     for (uint32_t i = 0; i < RAY_COUNT; i++)
         rays[i] = (struct ray){{test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1), 3, 0},
                                {test_uniform(&seed, -0.1f, 0.1f), test_uniform(&seed, -0.1f, 0.1f), -1, 1e30f}};
-    for (unsigned kind = 0; kind < 2; kind++) {
-        uint32_t cone_tests[3], triangle_tests[3];
-        for (unsigned i = 0; i < 3; i++) {
-            struct hit *hits = calloc(RAY_COUNT, sizeof(*hits)), *expected = calloc(RAY_COUNT, sizeof(*hits));
-            uint32_t *seen = calloc(RAY_COUNT, sizeof(*seen)), *expected_seen = calloc(RAY_COUNT, sizeof(*seen));
-            struct pair pair;
-            pair_init(&pair, scenes[i].create, 0);
-            trace_rays(trace_by_tracer, &pair.naive, kinds[kind], rays, RAY_COUNT, expected, expected_seen);
-            trace_rays(trace_by_tracer, &pair.rayspace, kinds[kind], rays, RAY_COUNT, hits, seen);
-            assert_memory_equal(hits, expected, RAY_COUNT * sizeof(*hits));
-            assert_memory_equal(seen, expected_seen, RAY_COUNT * sizeof(*seen));
-            cone_tests[i] = control_of(&pair.rayspace).cone_tests;
-            triangle_tests[i] = control_of(&pair.rayspace).triangle_tests;
-            print_message("%s: %u cone tests, %u triangle tests\n", scenes[i].name, cone_tests[i],
-                          triangle_tests[i]);
-            pair_finish(&pair);
-            free(hits);
-            free(expected);
-            free(seen);
-            free(expected_seen);
-        }
-        /* A half of the rays are above the disc, whose neighbours often are not: nodes of both go on. */
-        assert_true(cone_tests[1] < cone_tests[0]);
-        assert_true(triangle_tests[1] < triangle_tests[0] * 3 / 4);
-        assert_true(cone_tests[2] < cone_tests[0] / 100);
-        assert_int_equal(triangle_tests[2], 0);
+    for (unsigned i = 0; i < 3; i++) {
+        struct pair pair;
+        pair_init(&pair, scenes[i].create, 0);
+        trace_rays(trace_by_tracer, &pair.naive, WAVE_CLOSEST, rays, RAY_COUNT, expected, NULL);
+        trace_rays(trace_by_tracer, &pair.rayspace, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+        assert_memory_equal(hits, expected, RAY_COUNT * sizeof(*hits));
+        cone_tests[i] = control_of(&pair.rayspace).cone_tests;
+        triangle_tests[i] = control_of(&pair.rayspace).triangle_tests;
+        print_message("%s: %u cone tests, %u triangle tests\n", scenes[i].name, cone_tests[i], triangle_tests[i]);
+        pair_finish(&pair);
     }
+    /* A half of the rays are above the disc, whose neighbours often are not: nodes of both go on. */
+    assert_true(cone_tests[1] < cone_tests[0]);
+    assert_true(triangle_tests[1] < triangle_tests[0] * 3 / 4);
+    assert_true(cone_tests[2] < cone_tests[0] / 100);
+    assert_int_equal(triangle_tests[2], 0);
     free(rays);
+    free(hits);
+    free(expected);
 }
 
 /* ---- queued whole ---- */
@@ -308,30 +224,15 @@ static bool is_traced_ahead(struct pair *pair, const struct ray *rays, uint32_t 
 
 TEST(a_wave_that_is_queued_whole_has_its_answers_or_stops_its_slice)
 {
-    static const struct {
-        uint32_t batch, rounds;
-        bool flat, ends;
-    } cases[] = {
-        {0, 1, false, true},
-        {0, 4, false, true},
-        {0, 1, true, true},
-        /* The passes of a round take too few pairs: what is left has its turn in the rounds that follow. */
-        {96, 1, false, false},
-        {96, 4, false, true},
-        {32, 4, false, false},
-        {64, 1, true, false},
-    };
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     struct hit *expected = calloc(RAY_COUNT, sizeof(*expected));
     random_rays(rays, RAY_COUNT, 3);
-    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+    for (int little = 0; little < 2;
+         little++) { /* a round's passes may take too few pairs: then something is left */
         struct pair pair;
-        pair_init(&pair, test_scene_soup, cases[i].batch);
-        pair.rayspace.tracer->options.rayspace.rounds = cases[i].rounds;
-        pair.rayspace.tracer->options.rayspace.mode = cases[i].flat ? RAYSPACE_MODE_FLAT : RAYSPACE_MODE_JOINT;
+        pair_init(&pair, test_scene_soup, little ? 96 : 0);
         trace_rays(trace_by_tracer, &pair.naive, WAVE_CLOSEST, rays, RAY_COUNT, expected, NULL);
-        if (is_traced_ahead(&pair, rays, RAY_COUNT, expected) != cases[i].ends)
-            fail_msg("case %zu is%s traced to its end", i, cases[i].ends ? " not" : "");
+        assert_int_equal(is_traced_ahead(&pair, rays, RAY_COUNT, expected), !little);
         pair_finish(&pair);
     }
     free(expected);
@@ -413,41 +314,37 @@ TEST(waves_of_each_kind_are_told_apart_until_the_reset)
     struct hit hits[512];
     uint32_t visibility[512];
     random_rays(rays, 512, 17);
-    for (uint32_t mode = RAYSPACE_MODE_JOINT; mode <= RAYSPACE_MODE_FLAT; mode++)
-        for (uint32_t turn = RAYSPACE_CHANCE_ON; turn <= RAYSPACE_CHANCE_OFF; turn++) {
-            const struct tracer_options options = {
-                .rayspace = {.mode = mode, .turn = turn, .sort = RAYSPACE_CHANCE_OFF}};
-            struct fixture fixture;
-            fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), &options);
-            trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, 512, hits, NULL);
-            const struct rayspace_control closest = control_of(&fixture);
-            trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 512, NULL, visibility);
-            const struct rayspace_control first = control_of(&fixture);
-            trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 256, NULL, visibility);
-            const struct rayspace_control second = control_of(&fixture);
-            const struct structure_rows rows = rows_of(&fixture);
-            expect_mean(&rows, "primary/cone_tests", closest.cone_tests, 512);
-            expect_mean(&rows, "primary/triangle_tests", closest.triangle_tests, 512);
-            expect_mean(&rows, "shadow/cone_tests", first.cone_tests + second.cone_tests, 512 + 256);
-            expect_mean(&rows, "shadow/triangle_tests", first.triangle_tests + second.triangle_tests, 512 + 256);
-            assert_int_equal(structure_row(&rows, "primary/waves").number, 1);
-            assert_int_equal(structure_row(&rows, "shadow/waves").number, 2);
-            assert_int_equal(structure_row(&rows, "shadow/passes").number, first.passes + second.passes);
-            assert_int_equal(structure_row(&rows, "shadow/pairs_max").number, first.pairs_max);
-            assert_int_equal(structure_row(&rows, "shadow/turned").number, turn == RAYSPACE_CHANCE_ON ? 2 : 0);
-            assert_int_equal(structure_row(&rows, "primary/turned").number, 0); /* they have no end in common */
-            assert_int_equal(structure_row(&rows, "shadow/sorted").number, 0);
-            assert_int_equal(rows.count, 2 * 8);
-            trace_state_reset(fixture.tracer->state);
-            assert_int_equal(rows_of(&fixture).count, 0);
-            trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 256, NULL, visibility);
-            /* Not the counts of before: which rays are found stopped in time to spare others' tests varies. */
-            const struct rayspace_control third = control_of(&fixture);
-            const struct structure_rows after = rows_of(&fixture);
-            expect_mean(&after, "shadow/cone_tests", third.cone_tests, 256);
-            assert_int_equal(after.count, 8);
-            fixture_finish(&fixture);
-        }
+    const struct tracer_options options = {.rayspace = {.turn = RAYSPACE_CHANCE_ON, .sort = RAYSPACE_CHANCE_OFF}};
+    struct fixture fixture;
+    fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), &options);
+    trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, 512, hits, NULL);
+    const struct rayspace_control closest = control_of(&fixture);
+    trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 512, NULL, visibility);
+    const struct rayspace_control first = control_of(&fixture);
+    trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 256, NULL, visibility);
+    const struct rayspace_control second = control_of(&fixture);
+    const struct structure_rows rows = rows_of(&fixture);
+    expect_mean(&rows, "primary/cone_tests", closest.cone_tests, 512);
+    expect_mean(&rows, "primary/triangle_tests", closest.triangle_tests, 512);
+    expect_mean(&rows, "shadow/cone_tests", first.cone_tests + second.cone_tests, 512 + 256);
+    expect_mean(&rows, "shadow/triangle_tests", first.triangle_tests + second.triangle_tests, 512 + 256);
+    assert_int_equal(structure_row(&rows, "primary/waves").number, 1);
+    assert_int_equal(structure_row(&rows, "shadow/waves").number, 2);
+    assert_int_equal(structure_row(&rows, "shadow/passes").number, first.passes + second.passes);
+    assert_int_equal(structure_row(&rows, "shadow/pairs_max").number, first.pairs_max);
+    assert_int_equal(structure_row(&rows, "shadow/turned").number, 2);
+    assert_int_equal(structure_row(&rows, "primary/turned").number, 0); /* they have no end in common */
+    assert_int_equal(structure_row(&rows, "shadow/sorted").number, 0);
+    assert_int_equal(rows.count, 2 * 8);
+    trace_state_reset(fixture.tracer->state);
+    assert_int_equal(rows_of(&fixture).count, 0);
+    trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 256, NULL, visibility);
+    /* Not the counts of before: which rays are found stopped in time to spare others' tests varies. */
+    const struct rayspace_control third = control_of(&fixture);
+    const struct structure_rows after = rows_of(&fixture);
+    expect_mean(&after, "shadow/cone_tests", third.cone_tests, 256);
+    assert_int_equal(after.count, 8);
+    fixture_finish(&fixture);
 }
 
 TEST(a_wave_that_was_sorted_or_halved_says_so)
@@ -472,112 +369,33 @@ TEST(a_wave_that_was_sorted_or_halved_says_so)
 
 TEST(stacks_are_smaller_where_memory_is_short)
 {
-    static const enum rayspace_mode modes[] = {RAYSPACE_MODE_JOINT, RAYSPACE_MODE_FLAT};
     const uint64_t limit = device->memory_limit_bytes;
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    struct pair pair;
     random_rays(rays, RAY_COUNT, 5);
-    for (size_t i = 0; i < 2; i++) {
-        struct pair pair;
-        pair_init_by(&pair, test_scene_soup, &(struct tracer_options){.rayspace.mode = modes[i]});
-        struct answers expected = ask(&pair.naive, rays, RAY_COUNT);
-        /* Three stacks and the leaves take 4 MiB; rays, hits and nodes less than 1 MiB. */
-        device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)2 << 20);
-        const struct answers found = ask(&pair.rayspace, rays, RAY_COUNT);
-        const struct rayspace_state *own = (const struct rayspace_state *)pair.rayspace.tracer->state;
-        assert_in_range(own->capacity, 1, STACK_PAIRS / 2);
-        expect_alike(found, expected, RAY_COUNT, 0, "little memory");
-        device->memory_limit_bytes = limit;
-        pair_finish(&pair);
-    }
+    pair_init(&pair, test_scene_soup, 0);
+    struct answers expected = ask(&pair.naive, rays, RAY_COUNT);
+    /* Three stacks and the leaves take 4 MiB; rays, hits and nodes less than 1 MiB. */
+    device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)2 << 20);
+    const struct answers found = ask(&pair.rayspace, rays, RAY_COUNT);
+    const struct rayspace_state *own = (const struct rayspace_state *)pair.rayspace.tracer->state;
+    assert_in_range(own->capacity, 1, STACK_PAIRS / 2);
+    expect_alike(found, expected, RAY_COUNT, "little memory");
+    device->memory_limit_bytes = limit;
+    pair_finish(&pair);
     free(rays);
-}
-
-/* ---- everything moves ---- */
-
-#define FRAMES 3u
-
-/* A cloth that waves: `side` squares along a side, of two triangles each. */
-static void set_cloth(struct test_edits *edits, uint32_t side, float time)
-{
-    const uint32_t vertices = (side + 1) * (side + 1), triangles = 2 * side * side;
-    float(*positions)[3] = malloc(vertices * sizeof(*positions));
-    uint32_t *indices = malloc(triangles * 3 * sizeof(*indices)), *next = indices;
-    for (uint32_t i = 0; i < vertices; i++) {
-        const float x = (float)(i % (side + 1)) / (float)side, y = (float)(i / (side + 1)) / (float)side;
-        positions[i][0] = 4 * x - 2 + 0.1f * sinf(9 * y + time);
-        positions[i][1] = 4 * y - 2 + 0.1f * cosf(7 * x + 2 * time);
-        positions[i][2] = 0.5f * sinf(12 * x + 3 * time) * cosf(10 * y - time);
-    }
-    for (uint32_t i = 0; i < side * side; i++, next += 6) {
-        const uint32_t a = i / side * (side + 1) + i % side, b = a + side + 1;
-        memcpy(next, (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, 6 * sizeof(*next));
-    }
-    test_mesh(edits, 10, (const float(*)[3])positions, vertices, indices, triangles);
-    free(positions);
-    free(indices);
-}
-
-static struct scene *scene_of_cloth(uint32_t side)
-{
-    struct test_edits edits = {.scene = test_scene_create()};
-    set_cloth(&edits, side, 0);
-    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
-    test_commit(&edits);
-    return edits.scene;
-}
-
-/* From above, to all sides. */
-static void rays_at_cloth(struct ray *rays, uint32_t count, uint64_t seed)
-{
-    for (uint32_t i = 0; i < count; i++) {
-        rays[i] = (struct ray){.direction_t_max[3] = 1e30f};
-        for (int k = 0; k < 3; k++) {
-            rays[i].origin_t_min[k] = k < 2 ? test_uniform(&seed, -1, 1) : 3;
-            rays[i].direction_t_max[k] = k < 2 ? test_uniform(&seed, -1, 1) : -1;
-        }
-    }
-}
-
-/* Answers in each frame. A whole new mesh comes for each, as a simulation would send it. */
-static void trace_frames(unsigned tracer, uint32_t side, uint32_t count, struct answers frames[FRAMES])
-{
-    struct fixture fixture;
-    struct ray *rays = malloc(count * sizeof(*rays));
-    fixture_init_by(&fixture, tracer, scene_of_cloth(side), NULL);
-    for (uint32_t frame = 0; frame < FRAMES; frame++) {
-        if (frame > 0) {
-            set_cloth(&fixture.edits, side, 0.4f * (float)frame);
-            update(&fixture);
-        }
-        rays_at_cloth(rays, count, 77 + frame);
-        frames[frame] = ask(&fixture, rays, count);
-    }
-    fixture_finish(&fixture);
-    free(rays);
-}
-
-static void expect_frames_alike(unsigned other, uint32_t side, uint32_t count, float within)
-{
-    struct answers frames[2][FRAMES];
-    trace_frames(RAYSPACE_NUMBER, side, count, frames[0]);
-    trace_frames(other, side, count, frames[1]);
-    for (uint32_t frame = 0; frame < FRAMES; frame++)
-        expect_alike(frames[0][frame], frames[1][frame], count, within, "cloth");
-}
-
-TEST(a_scene_whose_every_vertex_moves_is_traced_as_it_is_in_each_frame)
-{
-    /* Few rays, as brute force tests all of 64,082 triangles for each: on software GL it refuses more than 65,000.
-     */
-    expect_frames_alike(NAIVE_NUMBER, 179, 192, 0);
-    /* 199,712 triangles, and brute force's answers from bvh: its distances may differ in the last places. */
-    expect_frames_alike(BVH_NUMBER, 316, RAY_COUNT, 1e-6f);
 }
 
 static uint64_t device_bytes_by(unsigned tracer)
 {
+    struct test_edits edits = {.scene = test_scene_create()};
     struct fixture fixture;
-    fixture_init_by(&fixture, tracer, scene_of_cloth(100), NULL);
+    test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
+    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    test_soup_mesh(&edits, 10, 20000, 0.05f, 7);
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    test_commit(&edits);
+    fixture_init_by(&fixture, tracer, edits.scene, NULL);
     const uint64_t bytes = fixture.tracer->stats.device_bytes;
     fixture_finish(&fixture);
     return bytes;
