@@ -41,7 +41,7 @@ STORED = {
 # which a mirror and glass repeat many. A wrong colour, texture or shadow is more, and everywhere.
 TRACERS = {"reference": (0.1, 1), "rayspace": (0.1, 1), "ldc": (1, 10), "abuffer": (1, 10), "quadtree": (1, 10)}
 BY_TRACER = ["--integrator", "whitted", "--primary", "trace", "--depth", "2"]
-IN_CORE = ("path", "ldc", "abuffer")
+IN_CORE = ("path", "abuffer")
 # Without a resolution one that fits a small picture is chosen by software alone.
 BY_SAMPLES = {"ldc": ["--ldc-resolution", "512"], "abuffer": ["--abuffer-resolution", "512"]}
 
