@@ -287,11 +287,12 @@ class Peer:
         self.socket = ours
         began = time.monotonic()
 
+        def limit():  # from the beginning: the importer sets limits of its own
+            resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
         process = subprocess.Popen([IMPORTER, "--fd", str(theirs.fileno())] + arguments, pass_fds=[theirs.fileno()],
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                   preexec_fn=limit if memory and SLOWER == 1 else None)
         theirs.close()
-        if memory and SLOWER == 1:
-            resource.prlimit(process.pid, resource.RLIMIT_AS, (memory, memory))
         if self.first_credit:
             self.give_credit()
         seconds *= SLOWER

@@ -6,7 +6,7 @@ import math
 import unittest
 
 import importer
-from farlight_test import SHARED_SCENES, Case, daemon_pose, needs_shared_scenes
+from farlight_test import SHARED_SCENES, Case, daemon_pose, long_test, needs_shared_scenes
 
 VIEW = "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 40\nhither 0.01\nresolution 8 8\n"
 TRIANGLE = "p 3\n0 0 0\n1 0 0\n0 1 0\n"
@@ -111,16 +111,14 @@ class Written(importer.Written):
         self.assertEqual([e["display_values"] for e in lit.of(importer.SET_ENVIRONMENT)], [1], "also without a background")
         self.assertEqual([use["texture"] for use in material["textures"]], [texture["id"], 0, 0, 0, texture["id"]])
 
-    def test_a_corner_with_another_normal_is_another_vertex(self):
-        result = self.run_text("m vertices 3 0 0 0 1 0 0 0 1 0 normals 2 0 0 1 0 1 0 triangles 2\n"
-                               "0 1 2 0 0 0\n0 1 2 1 0 0\n")
-        self.assertEqual(result.of(importer.SET_MESH)[0]["vertices"], 4)
-
-    def test_a_mesh_without_normals_is_flat(self):
-        result = self.run_text("m vertices 4 0 0 0 1 0 0 0 1 0 0 0 1 triangles 2 0 1 2 0 3 1\n")
-        mesh, = result.of(importer.SET_MESH)
-        self.assertEqual(mesh["vertices"], 6)
-        self.assert_near(result.floats(mesh["arrays"][2]), (0, 0, 1) * 3 + (0, 1, 0) * 3)
+    def test_a_corner_with_another_normal_is_another_vertex_and_a_mesh_without_normals_is_flat(self):
+        for text, vertices, normals in (
+                ("m vertices 3 0 0 0 1 0 0 0 1 0 normals 2 0 0 1 0 1 0 triangles 2\n0 1 2 0 0 0\n0 1 2 1 0 0\n", 4, None),
+                ("m vertices 4 0 0 0 1 0 0 0 1 0 0 0 1 triangles 2 0 1 2 0 3 1\n", 6, (0, 0, 1) * 3 + (0, 1, 0) * 3)):
+            mesh, = (result := self.run_text(text)).of(importer.SET_MESH)
+            self.assertEqual(mesh["vertices"], vertices)
+            if normals:
+                self.assert_near(result.floats(mesh["arrays"][2]), normals)
 
     def test_textured_triangles(self):
         self.write("a.ppm", PPM)
@@ -135,15 +133,13 @@ class Written(importer.Written):
 
     # ---- static transforms
 
-    def test_a_static_transform_scales_then_turns_then_moves(self):
-        result = self.run_text("xs 2 1 1 0 0 2 90 10 20 30 {\n" + TRIANGLE + "}\n" + TRIANGLE)
-        mesh, = result.of(importer.SET_MESH)
-        self.assertEqual(self.positions(result, mesh)[:3], [(10, 20, 30), (10, 22, 30), (9, 20, 30)])
-        self.assertEqual(self.positions(result, mesh)[3:], [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
-
-    def test_static_transforms_in_one_another_apply_from_the_inside(self):
-        result = self.run_text("xs 1 1 1 0 0 1 90 0 0 0 { xs 1 1 1 0 1 0 0 5 0 0 {\n" + TRIANGLE + "} }\n")
-        self.assertEqual(self.positions(result, result.of(importer.SET_MESH)[0]), [(0, 5, 0), (0, 6, 0), (-1, 5, 0)])
+    def test_static_transforms_scale_then_turn_then_move_from_the_inside(self):
+        for text, wanted in (
+                ("xs 2 1 1 0 0 2 90 10 20 30 {\n" + TRIANGLE + "}\n" + TRIANGLE,
+                 [(10, 20, 30), (10, 22, 30), (9, 20, 30), (0, 0, 0), (1, 0, 0), (0, 1, 0)]),
+                ("xs 1 1 1 0 0 1 90 0 0 0 { xs 1 1 1 0 1 0 0 5 0 0 {\n" + TRIANGLE + "} }\n", [(0, 5, 0), (0, 6, 0), (-1, 5, 0)])):
+            result = self.run_text(text)
+            self.assertEqual(self.positions(result, result.of(importer.SET_MESH)[0]), wanted)
 
     def test_normals_stay_across_faces_that_are_stretched(self):
         result = self.run_text("xs 1 4 1 0 0 1 0 0 0 0 {\npp 3\n1 0 0 1 1 0\n0 1 0 1 1 0\n0 1 1 1 1 0\n}\n")
@@ -204,10 +200,7 @@ class Written(importer.Written):
         self.assertEqual([v[3:6] for v in found["thing", importer.SCALE][2]], [[1, 2, 1], [3, 1, 1]])
         self.assertEqual(found["thing", importer.HIDDEN], (importer.STEP, [0, 0.5, 1.5], [[0], [1], [0]]))
         self.assertEqual(self.node(result, "thing")["hidden"], 0)
-
-    def test_visible_is_another_word_for_visibility(self):
-        result = self.run_text(self.moving("visible 1\n0 0\n"))
-        self.assertEqual(self.node(result, "thing")["hidden"], 1)
+        self.assertEqual(self.node(self.run_text(self.moving("visible 1\n0 0\n")), "thing")["hidden"], 1, "another word for it")
 
     def test_turns_go_as_squad_says(self):
         """About one axis, in degrees: tests/unit/import/spline.c has 15.3125 at a quarter and 37.5 in the middle."""
@@ -407,37 +400,26 @@ class Posed(Case):
                 self.assertAlmostEqual(a, b, 5)
 
 
+@long_test
+@needs_shared_scenes
 class Bart(unittest.TestCase):
-    def counts(self, name):
-        result = importer.import_file(str(SHARED_SCENES / "rayspace" / "bart" / name), seconds=30)
-        self.assertEqual((result.status, result.faults, importer.inconsistencies(result)), (0, [], []), result.text())
-        self.assertNotIn("image", result.text())
-        return result, sum(mesh["triangles"] for mesh in result.of(importer.SET_MESH))
-
-    @needs_shared_scenes
-    def test_the_kitchen(self):
-        """As many triangles as BART's paper states."""
-        result, triangles = self.counts("kitchen/aff/kitchen.aff")
-        self.assertEqual((triangles, len(result.of(importer.SET_LIGHT))), (110561, 6))
-        self.assertEqual(result.clips[0]["duration"], 20)
-        self.assertIn("800 frames in 20 s", result.text())
-
-    @needs_shared_scenes
-    def test_the_museum(self):
-        """Its file counts 10,143 polygons, of which 133 with more corners are 274 triangles; and 8 cones, of 64."""
-        result, triangles = self.counts("museum/aff/museum5.aff")
-        still, moving = result.of(importer.SET_MESH)
-        self.assertEqual((moving["triangles"], moving["targets"]), (1024, 4))
-        self.assertEqual(triangles - 1024 - 8 * 64, 10143 - 133 + 274)
-        self.assertEqual((result.clips[0]["duration"], len(result.of(importer.SET_TEXTURE))), (6, 5))
-        self.assertEqual(still["triangles"], triangles - 1024)
-
-    @needs_shared_scenes
-    def test_the_robots(self):
-        result, triangles = self.counts("robot/aff/Robot.aff")
-        self.assertEqual(triangles, 71708)
-        self.assertEqual(sum(node["name"].startswith("robot_rot") for node in result.of(importer.SET_NODE)), 10)
-        self.assertEqual(result.clips[0]["duration"], 50)
+    def test_published_scenes_have_what_is_stated_of_them(self):
+        """Of the kitchen as many triangles as BART's paper states. The museum's file counts 10,143 polygons, of which 133 with more
+        corners are 274 triangles; and 8 cones, of 64; 1024 move."""
+        for name, triangles, seconds, more in (
+                ("kitchen/aff/kitchen.aff", 110561, 20, {"lights": 6}),
+                ("museum/aff/museum5.aff", 10143 - 133 + 274 + 8 * 64 + 1024, 6, {"textures": 5, "moving": (1024, 4)}),
+                ("robot/aff/Robot.aff", 71708, 50, {"robots": 10})):
+            with self.subTest(name):
+                result = importer.import_file(str(SHARED_SCENES / "rayspace" / "bart" / name), seconds=30)
+                self.assertEqual((result.status, result.faults, importer.inconsistencies(result)), (0, [], []), result.text())
+                self.assertNotIn("image", result.text())
+                meshes = result.of(importer.SET_MESH)
+                self.assertEqual((sum(mesh["triangles"] for mesh in meshes), result.clips[0]["duration"]), (triangles, seconds))
+                found = {"lights": len(result.of(importer.SET_LIGHT)), "textures": len(result.of(importer.SET_TEXTURE)),
+                         "moving": (meshes[-1]["triangles"], meshes[-1]["targets"]),
+                         "robots": sum(node["name"].startswith("robot_rot") for node in result.of(importer.SET_NODE))}
+                self.assertEqual({key: found[key] for key in more}, more)
 
 
 if __name__ == "__main__":

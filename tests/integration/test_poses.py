@@ -47,13 +47,13 @@ class PoseCase(Case):
 
 class Files(PoseCase):
     def check(self, path):
-        """All clips at two times, which are farther apart than the tolerance (or this could not fail), and at rest."""
+        """All clips at one of two times, which are farther apart than the tolerance (or this could not fail), and at rest."""
         model = Model(path)
         for animation in range(len(model.json["animations"])):
             begin, end = model.times(animation)
             with self.subTest(model=path.name, clip=animation):
                 times = [begin + share * (end - begin) for share in (0.3, 0.45)]
-                self.compare(path, animation, times)
+                self.compare(path, animation, times[:1])
                 first, second = daemon_pose(path, animation, times)
                 apart = max(math.dist(a, b) for (a, _), (b, _) in zip(first, second)) / size_of(first)
                 self.assertGreater(apart, 1000 * PLACE_TOLERANCE)
@@ -127,7 +127,7 @@ class Pictures(PoseCase):
         path = self.folder / "model.gltf"
         path.write_text(made.text(), encoding="utf-8")
         with Daemon() as daemon:
-            self.compare_pictures(daemon, path, 0, ("--eye", "4,3,7", "--look-at", "0.5,0.8,1"), ("bvh", "reference", "rayspace"))
+            self.compare_pictures(daemon, path, 0, ("--eye", "4,3,7", "--look-at", "0.5,0.8,1"), ("bvh", "reference"))
 
     @long_test
     @needs_shared_scenes

@@ -32,10 +32,10 @@ class Outputs(OneDaemon):
         folders = [self.folder / "a", self.folder / "b"]
         for folder in folders:
             folder.mkdir()
-            shutil.copy(bundled_scenes() / "teapot.glb", folder)
+            shutil.copy(bundled_scenes() / "cornell.glb", folder)
             for ending in (*magics, "full.png"):
-                self.expect(farlight("render", folder / "teapot.glb", "-o", folder / f"p.{ending}", *SMALL, "--tracer", "ldc",
-                                     "--ldc-resolution", "64", *(["--metadata", "full"] if ending == "full.png" else []),
+                self.expect(farlight("render", folder / "cornell.glb", "-o", folder / f"p.{ending}", *SMALL,
+                                     *(["--metadata", "full"] if ending == "full.png" else []),
                                      *(["--layers", "beauty,depth"] if ending == "exr" else [])), 0)
             time.sleep(1)  # dates in files have seconds
         for ending, magic in magics.items():
@@ -121,6 +121,7 @@ class Outputs(OneDaemon):
             self.assertIn(f'"{stage}"', text)
 
 
+@farlight_test.long_test
 class FirstPicture(Case):
     def test_what_other_processors_compile_is_not_compiled_again(self):
         """Software GL hands code over in the files of its cache: as many as where one processor compiles all."""
