@@ -20,7 +20,7 @@ import threading
 import time
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight
+from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, long_test
 
 SIZE = ["--size", "48x32"]
 
@@ -305,6 +305,7 @@ class Lost(Animations):
         self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
         self.assertEqual(errors.count("trying again"), 1, errors)
 
+    @long_test
     def test_a_daemon_that_is_lost_while_the_scene_is_loading_is_sought_again(self):
         """It hangs up at each step of the beginning: before the handshake, after the scene was opened, and so on."""
         with Daemon() as daemon:
@@ -483,6 +484,7 @@ class MovingPictures(OneDaemon, Animations):
                     canvas[2 * y + row, 2 * x + column] = pixel
         return milliseconds, data[15] & 1 and [(2 * y + row, 2 * x + column) for row in range(height + 1) for column in range(width + 1)]
 
+    @long_test
     def test_a_lossless_webp_has_every_pixel_and_its_alpha(self):
         _, pictures = self.pictures(model=str(bundled_scenes() / "teapot.glb"), outputs=["%d.png", "around.webp"], lossless=True)
         self.assertLess(min(pictures[0][3::4]), 255)
@@ -732,6 +734,7 @@ class Progressive(OneDaemon, Animations):
     def samples(self, path):
         return float(farlight_test.exr_attributes(path)["farlight/samples"].decode(errors="replace").strip("\0") or 0)
 
+    @long_test
     def test_passes_add_up_to_the_samples(self):
         path = self.folder / "p.exr"
         for passes in ("--progressive", "--progressive=3"):

@@ -8,7 +8,7 @@ import struct
 import subprocess
 import zlib
 
-from farlight_test import BIN, Case, bundled_scenes, farlight, read_png
+from farlight_test import BIN, Case, bundled_scenes, farlight, long_test, read_png
 
 # Figures travel as 32-bit floats: 24 bits of mantissa.
 FLOAT = 1e-6
@@ -111,6 +111,7 @@ class Figures(Compare):
         self.assertEqual((got["mean"], got["rms"], got["max"], got["space"]), (2, 2, 2, "linear"))
         self.assertAlmostEqual(got["psnr"], 20 * math.log10(1 / 2), delta=1e-5)
 
+    @long_test
     def test_a_highlight_outweighs_linear_light_and_not_what_a_screen_shows(self):
         a, b = [0.5] * 768, [0.5] * 768
         a[:3], b[:3] = [400.0] * 3, [500.0] * 3
@@ -169,6 +170,7 @@ class Figures(Compare):
             got = self.compare(self.png("a.png", one, *size), self.png("b.png", other, *size))
             self.assertAlmostEqual(got["ssim"], ssim(*planes, *size[:2]), delta=2e-6, msg=name)
 
+    @long_test
     def test_small_images_have_no_similarity_rather_than_a_wrong_one(self):
         got = self.compare(self.png("a.png", [0] * 49, 7, 7, 1), self.png("b.png", [255] * 49, 7, 7, 1))
         self.assertEqual((got["ssim"], got["butteraugli"], got["visible"], got["max"]), (None, None, None, 1))
@@ -176,6 +178,7 @@ class Figures(Compare):
                            "--fail-above", "ssim=-1", status=1)
         self.assertFalse(got["within"], "what was not measured cannot be within a limit")
 
+    @long_test
     def test_the_perceptual_figure_grows_with_what_is_seen(self):
         grey = self.png("a.png", [120] * 3072, 32, 32)
         got = [self.compare(grey, self.png("b.png", [120 + d] * 3072, 32, 32))["butteraugli"] for d in (0, 1, 4, 100)]
@@ -211,6 +214,7 @@ class Figures(Compare):
         self.assertGreaterEqual(got["max"], 2.9e38)
         self.assertLess(got["psnr"], -700)
 
+    @long_test
     def test_files_of_one_render_agree_as_shown_and_each_format_can_be_compared(self):
         """Half a step of 8 bits, and half of what half floats round near white (2^-12, steeper by up to 1.2 there)."""
         rendered = ["--size", "48x36", "--integrator", "whitted", "--samples", "1", "-q"]
@@ -253,6 +257,7 @@ class Limits(Compare):
         self.assertIn("psnr", lines[0])
         self.assertIn("at least 50", lines[0])
 
+    @long_test
     def test_a_pixel_that_is_no_number_fails_any_limit_unless_it_has_its_own(self):
         values = [0.5] * 768
         values[0] = math.nan
@@ -282,6 +287,7 @@ class Pictures(Compare):
         self.assertGreater(sums.pop((20, 9)), 600)
         self.assertLess(max(sums.values()), 10)
 
+    @long_test
     def test_the_scale_can_be_fixed_and_is_reported(self):
         a, b = self.png("a.png", [100] * 768), self.png("b.png", [110] * 768)
         brightness = []
@@ -355,6 +361,7 @@ class BadFiles(Compare):
                             (self.good, other, "good.png", "16x16", "other.png", "20x10")):
             self.refused(a, b, says=says)
 
+    @long_test
     def test_of_a_file_with_layers_the_picture_is_compared(self):
         generator = random.Random(5)
         names = ("A", "B", "G", "R", "Z", "albedo.R", "normal.X", "position.Y")
@@ -375,6 +382,7 @@ class BadFiles(Compare):
         got = self.compare(self.good, other, "--ignore-alpha")
         self.assertEqual((got["max"], got["channels"]), (0, "R,G,B"))
 
+    @long_test
     def test_no_prefix_of_a_file_is_read_as_an_image(self):
         whole = {"png": self.good.read_bytes(), "exr": self.exr("e.exr", [0.5] * 768).read_bytes()}
         path = self.folder / "j.jpg"
@@ -401,6 +409,7 @@ class BadFiles(Compare):
                 self.assertIn(result.returncode, (0, 2), result.stderr)
                 self.assertNotIn("signal", result.stderr)
 
+    @long_test
     def test_channel_names_are_made_harmless_and_are_no_lists(self):
         four = write_exr(self.folder / "four.exr", 64, 64, ["R", "G", "B", "A"], [math.nan] * 4 * 4096)
         one = write_exr(self.folder / "one.exr", 64, 64, ["R,G,B,A"], [0.5] * 4096)

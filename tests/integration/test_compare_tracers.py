@@ -7,7 +7,7 @@ import os
 import pty
 import subprocess
 
-from farlight_test import BIN, TIMEOUT_S, Case, OneDaemon, bundled_scenes, farlight, frames_of, private_daemon, read_png
+from farlight_test import BIN, TIMEOUT_S, Case, OneDaemon, bundled_scenes, farlight, frames_of, long_test, private_daemon, read_png
 
 SIZE = ["--size", "48x36"]
 FLAKE, ROOM = "sphereflake-2.nff", "cornell.glb"
@@ -65,6 +65,7 @@ class Comparisons(OneDaemon):
         text = self.expect(compare("--ldc-resolution", "256", tracers=["--tracers", "ldc,bvh"], model=ROOM), 0).stdout
         self.assertIn("structure static: resolution 256, cell ", text)
 
+    @long_test
     def test_options_of_render_are_accepted_and_a_limit_decides_the_status(self):
         report = self.report("--depth", "0", "--eye", "3,3,3", "--look-at", "0,0,0", "--up", "0,0,1", "--bvh-bounds", "sphere",
                              "--fail-above", "agree=99.99%", "--fail-above", "psnr=60")
@@ -72,6 +73,7 @@ class Comparisons(OneDaemon):
         # 64 pixels are too few for SSIM, and what was not measured is within no limit.
         self.assertIn("over the limit: ssim", self.expect(compare("--size", "8x8", "--fail-above", "ssim=0.5"), 1).stdout)
 
+    @long_test
     def test_figures_of_views_are_those_of_two_pictures_that_render_makes(self):
         for name, made, rendered in (
                 ("stereo", EYES, ["--views", "rays"]),
@@ -93,6 +95,7 @@ class Comparisons(OneDaemon):
                 if channels == 3:
                     self.assertEqual(first[-1], rows[-1])
 
+    @long_test
     def test_every_frame_of_a_series_is_compared(self):
         series = ["--upsample", "4", "--orbit=12", "--frames", "1-5", "--eye", "0,1,2.2", "--look-at", "0,1,0", "--integrator", "whitted"]
         got = self.report(*series, "-o", self.folder / "%d.png", model=ROOM, tracers=[])

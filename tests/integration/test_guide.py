@@ -10,7 +10,7 @@ import subprocess
 import unittest
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, bundled_scenes
+from farlight_test import BIN, Case, Daemon, bundled_scenes, long_test
 
 ROOT = pathlib.Path(__file__).parents[2]
 # Commands within a sentence, which need a system of their own, or minutes: the test that runs them.
@@ -81,6 +81,7 @@ class Guide(Case):
         self.assertEqual(result.returncode, 0, result.stdout[-3000:])
         return result.stdout
 
+    @long_test
     def test_looking_at_models(self):
         if not shutil.which("Xvfb"):
             self.skipTest("no Xvfb")

@@ -474,6 +474,7 @@ class Written(importer.Written):
         environment, = result.of(SET_ENVIRONMENT)
         return environment["size"], list(memoryview(result.data(environment["arrays"][0])).cast("H"))
 
+    @long_test
     def test_environments_are_read_whole_or_not_at_all(self):
         """With runs, and without, as narrow ones are. The second row is 16 times as bright."""
         dim, bright = b"\x80\x40\x20\x80", b"\x80\x40\x20\x84"

@@ -77,12 +77,13 @@ class Pictures(OneDaemon):
         return sorted(abs(a - b) for x, y in zip(grid_means(one), grid_means(other)) for a, b in zip(x, y))
 
     def test_every_tracer_gives_the_picture_of_bvh(self):
-        """First hits by the tracer itself, too."""
+        """By a daemon that takes a GPU's way through the passes; first hits by the tracer itself, too."""
+        gpu = self.enterContext(Daemon(environment={**os.environ, "FARLIGHT_LIKE_GPU": "1"}))
         for model, tracers in ((ROOM, TRACERS), ("sphereflake-2.nff", {"naive": (0, 0)})):
             wanted = self.render(*by_tracer("bvh", model), name="bvh.png")[0]
             for tracer, (most, maximum) in tracers.items():
                 with self.subTest(tracer=tracer):
-                    path, frame = self.render(*by_tracer(tracer, model))
+                    path, frame = self.render(*by_tracer(tracer, model), "--server", gpu.address)
                     if path:
                         errors = self.apart(path, wanted)
                         self.assertEqual(frame["tracer"], tracer)

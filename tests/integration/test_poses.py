@@ -59,6 +59,7 @@ class Files(PoseCase):
                 self.assertGreater(apart, 1000 * PLACE_TOLERANCE)
         self.compare(path, None, [0.0])
 
+    @long_test
     def test_every_vertex_of_the_bundled_scene_is_where_glTF_says(self):
         """Its clip has every kind of motion, and ends as it began."""
         path = bundled_scenes() / "carousel.glb"

@@ -6,7 +6,7 @@ import os
 import subprocess
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, frames_of, read_exr, read_png, tracers
+from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, frames_of, long_test, read_exr, read_png, tracers
 
 SMALL = ["--size", "48x36", "--integrator", "whitted", "--samples", "1"]
 ROOM, TEAPOT, CAROUSEL = (f"{name}.glb" for name in ("cornell", "teapot", "carousel"))
@@ -136,6 +136,7 @@ class Structures(OneDaemon):
                 if tracer == "quadtree":
                     self.assertTrue(all(0 <= said[f"{kind}/{row}"] <= 1 for kind in KINDS for row in QUADTREE), said)
 
+    @long_test
     def test_figures_follow_the_options(self):
         """The box is the same; a cell or two of it may be a margin."""
         for tracer, prefix in (("ldc", "static/"), ("abuffer", "")):
@@ -152,6 +153,7 @@ class Structures(OneDaemon):
         self.frame("--tracer", "ldc", "--metadata", "stable", name="x.exr")
         self.assertIn("farlight/structure/static/cell_metres", farlight_test.exr_attributes(self.folder / "x.exr"))
 
+    @long_test
     def test_the_viewers_overlay_has_a_line_for_each_kind_of_wave(self):
         (self.folder / "replay.json").write_text(json.dumps([{"wait": "rest", "samples": 1}, {"state": "rest"}]))
         result = self.expect(farlight("view", bundled_scenes() / ROOM, "--replay", self.folder / "replay.json", "--headless",

@@ -163,6 +163,7 @@ class Editing(Viewer):
         self.assertEqual(after["edit"]["fields"]["roughness"], [0.25])
         self.assertEqual(undone["edit"]["fields"], picked["edit"]["fields"])
 
+    @long_test
     def test_two_viewers_see_what_the_other_one_changes(self):
         keys = choose(self.picked(), "base_colour")
         begin = [rest(2), *HIDE, *pick(*POT), rest(2), {"state": "picked"}]

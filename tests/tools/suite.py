@@ -26,10 +26,10 @@ WAYS = {
 ON_DEVICE = (r"accuracy/.*", r"contract/.*", r"unit/gpu/.*", r"unit/gpu_scene/.*", r"unit/render/.*", r"unit/trace/.*", r"test_stacks")
 # Compares zink with llvmpipe.
 ZINK_ALONE = (r"test_stacks",)
-# What GPUs do, in `make test`.
-LIKE_GPU = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)",)
+# What `make test` runs as GPUs do it.
+LIKE_GPU = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)", r"accuracy/(render_frame|frame_steps|frame_shared)")
 # Left to `make test-all`: breadth that costs much, beside what others see of the same kind.
-LEFT = (r"contract/\w+(,| in | with | by ).*", r"test_bench")
+LEFT = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)", r"contract/\w+(,| in | with | by ).*", r"test_bench")
 
 # With config=sanitize, `make test` runs what needs no OpenGL device: codecs, sessions, scenes, readers of files.
 WITHOUT_DEVICE = (r"unit/(base|client|edit|encode|fuzz|helper|import|net|protocol|scene|session|store|viewer|warp|web)/.*",)
