@@ -178,13 +178,13 @@ class Client:
             while self._core.failure is None and self._receive():
                 pass
             self._core.fail(address.broken(why, self._link))
+            address.tell_end(self._core.failure, self._link)
         return has_sent
 
     def _exchange(self, silence_s: float) -> None:
         """Sends, and waits until something has come or could be sent."""
         # What has been sent has left room, for which an upload may have waited: nothing need come first.
         if self._flush() or self._core.failure is not None:
-            address.tell_end(self._core.failure, self._link)
             return
         assert self._link is not None
         quiet = 0
@@ -212,7 +212,6 @@ class Client:
                     next(operation)
                 except StopIteration as done:
                     self._flush()
-                    address.tell_end(self._core.failure, self._link)
                     result: T = done.value
                     return result
                 self._exchange(silence_s or self._options.timeout)
