@@ -32,7 +32,7 @@ LIKE_GPU = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)", r"accuracy/(r
 LEFT = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)", r"contract/\w+(,| in | with | by ).*", r"test_bench")
 
 # With config=sanitize, `make test` runs what needs no OpenGL device: codecs, sessions, scenes, readers of files.
-WITHOUT_DEVICE = (r"unit/(base|client|edit|encode|fuzz|helper|import|net|protocol|scene|session|store|viewer|warp|web)/.*",)
+WITHOUT_DEVICE = (r"test_import(_\w+)?", r"unit/(base|client|edit|encode|fuzz|helper|import|net|protocol|scene|session|store|viewer|warp|web)/.*",)
 # The sanitizers see nothing of shaders, which Mesa compiles at run time, and make what rasterises large structures take
 # ten times as long: pictures against closed forms, forms of a tracer that differ in shaders, commands whose pictures are compared.
 NOT_SANITIZED = (
