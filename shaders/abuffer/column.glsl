@@ -5,7 +5,7 @@
 // A sample stands for the plane through it, within its texel: a depth alone would turn every slope into steps.
 //
 // Defines: ABUFFER_PARITY bodies are told from what is around them by parity, as in the paper, where the winding tells
-// bodies in bodies apart, too; ABUFFER_COUNT_STEPS for the benchmark, intersections hold counts and not samples: visited blocks of voxels in
+// bodies in bodies apart, too; ABUFFER_COUNT_STEPS for tests, intersections hold counts and not samples: visited blocks of voxels in
 // place of the distance, visited samples in place of the primitive, visited texels in place of the instance.
 #include "abuffer/layout.h"
 #include "raster/layout.h"

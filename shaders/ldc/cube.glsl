@@ -7,7 +7,7 @@
 // Rays in a cube are those of common/cell_ray.glsl.
 //
 // Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes this near to a sample's depth, else where it
-// intersects the sample's plane; LDC_COUNT_STEPS for the benchmark, intersections hold counts and not samples: visited
+// intersects the sample's plane; LDC_COUNT_STEPS for tests, intersections hold counts and not samples: visited
 // nodes, blocks and texels in place of the distance, tested samples in place of the primitive, texels or cells with
 // tested samples in place of the instance.
 #include "shared/bindings.h"

@@ -11,7 +11,7 @@
 /* The packet size on software GL where packets pay. On hardware a SIMD group traverses together already, and
  * several rays per invocation cost registers; not measured there. */
 #define PACKET_RAYS_SOFTWARE 8u
-/* The traversal of a packet takes as long as four single ones (bench_bvh): it pays with more rays than that. */
+/* The traversal of a packet takes as long as four single ones: it pays with more rays than that. */
 #define RAYS_PER_PACKET_MIN 5u
 /* Rays that are farther apart than so many leaves, where the scene is, have few leaves in common. Measured: with
  * 871K triangles in 70K pixels (4 leaves) packets of eight camera rays are 0.9 of one alone, with 590K in 213K (2

@@ -20,7 +20,7 @@
 static struct bvh_form settings_of(const struct gpu_device *device, const struct tracer_options *options)
 {
     bool plain = options->bench.bvh_layout == BVH_LAYOUT_PLAIN;
-    /* Boxes are twice as fast as spheres (bench_bvh), so `auto` is boxes. */
+    /* Boxes are twice as fast as spheres, so `auto` is boxes. */
     bool spheres = plain || options->bvh.bounds == BVH_BOUNDS_SPHERE;
     return (struct bvh_form){
         .bounds = spheres ? BVH_BOUNDS_SPHERE : BVH_BOUNDS_BOX,

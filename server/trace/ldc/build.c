@@ -138,7 +138,7 @@ static void place_cube(struct ldc_store *store, unsigned which)
         store->cubes[behind].resolution = 0;
 }
 
-/* In one pass, which is the faster way wherever it was measured (bench forms samples, software GL: 8.5 times at 8
+/* In one pass, which is the faster way wherever it was measured (software GL: 8.5 times at 8
  * layers, 40 times at 48); by peeling where that is asked for, or the lists of one pass have no room. */
 static bool begin(struct ldc_task *task, struct error *error)
 {
