@@ -22,8 +22,8 @@ WAYS = {
 
 # Tables of patterns, each of which must match the whole name of a test that there is.
 
-# Tests that depend on the device and its driver: they run in every way.
-ON_DEVICE = (r"accuracy/.*", r"contract/.*", r"unit/gpu/.*", r"unit/gpu_scene/.*", r"unit/render/.*", r"unit/trace/.*", r"test_stacks")
+# Tests that depend on the device and its driver run in every way; forms of a tracer, which differ in settings, in one.
+ON_DEVICE = (r"accuracy/.*", r"contract/\w+", r"unit/gpu/.*", r"unit/gpu_scene/.*", r"unit/render/.*", r"unit/trace/.*", r"test_stacks")
 # Compares zink with llvmpipe.
 ZINK_ALONE = (r"test_stacks",)
 # What `make test` runs as GPUs do it.
@@ -39,7 +39,7 @@ NOT_SANITIZED = (
     r"accuracy/(?!render_frame|tracer_owners|wave_comparison).*",
     r"contract/.*(ray alone|packets of|rays? a call)", r"contract/bvh in the plain form", r"contract/(ldc|abuffer|rayspace,|quadtree).*",
     r"unit/trace/(abuffer|ldc)/traversal", r"unit/trace/quadtree/layers",
-    r"test_(animate|bench|check_device|compare.*|denoise|guide|import_animation|layers|light|models|pictures|poses|shot|siege|view)")
+    r"test_(animate|bench|check_device|compare.*|guide|import_animation|layers|models|pictures|poses|shot|siege|tracer_commands|view)")
 
 # Targets of make that are no tests of the runner: their part of the rest, and a command that says why if they cannot run here.
 Step = collections.namedtuple("Step", "target part check")
@@ -61,7 +61,8 @@ STEPS = (
 # Names of targets that must be among them.
 STEP_NAMES = r"check-sync|farm-drill|fidelity|fuzz|siege|soak|\w+-test"
 # What takes longest where no times of an earlier run are known: it begins first.
-LONGEST = ()
+LONGEST = ("test_pictures", "like-gpu/contract/rayspace", "like-gpu/contract/quadtree", "like-gpu/contract/ldc", "test_animate",
+           "like-gpu/contract/abuffer", "test_tracer_commands", "test_compare", "test_units", "test_view", "test_siege", "accuracy/materials")
 
 Run = collections.namedtuple("Run", "name test environment")
 
@@ -105,10 +106,11 @@ def part(rest, number):
 
 
 def faults(names):
-    """What is wrong with the tables above."""
+    """What is wrong with the tables above, where all programs of tests are built."""
+    every = [prefix + name for prefix in WAYS for name in names]
     for table in (ON_DEVICE, ZINK_ALONE, LIKE_GPU, LEFT, WITHOUT_DEVICE, NOT_SANITIZED, LONGEST):
         for pattern in table:
-            if not any(re.fullmatch(pattern, name) for name in names):
+            if not any(re.fullmatch(pattern, name) for name in every):
                 yield f"tests/tools/suite.py: no test is called {pattern}"
     targets = re.findall(r"^\.PHONY:(.*)", pathlib.Path("Makefile").read_text(), re.MULTILINE)
     for target in " ".join(targets).split():
