@@ -139,7 +139,7 @@ static void begin(struct fixture *fixture, void (*build)(struct fixture *fixture
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-/* What whitted cuts off (PATH_WEIGHT_MIN) is 1/1024 of what lies there, some 0.5, a few times at most; 1e-3 of it.
+/* Whitted cuts off (PATH_WEIGHT_MIN) 1/1024 of what lies there, some 0.5, a few times at most; 1e-3 of it.
  */
 TEST_LONG(where_all_is_smooth_the_mean_is_whitteds_picture)
 {

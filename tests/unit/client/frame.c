@@ -86,7 +86,7 @@ static void expect_refused(enum protocol_encoding encoding, const uint8_t *bytes
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
 }
 
-/* As its pixels were. */
+/* The frame has the pixels that were sent. */
 static void expect_exact(struct fl_frame *frame)
 {
     assert_non_null(frame);

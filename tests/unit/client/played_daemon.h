@@ -38,7 +38,7 @@ static struct fl_error error;
 static struct framing_header header;
 static struct message asked;
 
-/* Of a test that begins with connect_to_played(). */
+/* The daemon and the connection of a test that begins with connect_to_played(). */
 static struct daemon *played;
 static struct fl_connection *connection;
 

@@ -372,7 +372,7 @@ static inline void restart(struct engine_options options)
     start(options);
 }
 
-/* What EACH_TEST takes: an engine without options. */
+/* An engine without options, for EACH_TEST. */
 static inline int start_engine(void **state)
 {
     (void)state;
@@ -477,8 +477,8 @@ static inline void expect_silence(void)
                  event->request);
 }
 
-/* That as long as both had work left each had its share of the time, by a clock that is stopped: a divided by its
- * weight as much as b, within a step of each. */
+/* Asserts that each of two jobs had its share of the time while both had work left, by a clock that is stopped:
+ * the time of a by its weight is that of b by its own, within a step of each. */
 static inline void expect_shares(uint64_t seed_a, uint32_t weight_a, uint64_t seed_b, uint32_t weight_b)
 {
     const uint64_t seeds[2] = {seed_a, seed_b};

@@ -439,8 +439,8 @@ TEST(a_cancelled_view_ends_whatever_it_does)
     expect_silence();
 }
 
-/* What a view asks for and the link carries, and the frame that comes of it: of 80x48 while it moves, 8 bounces, 2
- * samples of which each frame adds one. */
+/* Rows: a view's request, what the link carries, and the frame that is rendered then. The view has 80x48 pixels
+ * while it moves, 8 bounces, and 2 samples of which each frame adds one. */
 TEST(effort_counts_for_a_view_that_moves_and_asked_for_it)
 {
     const struct view_effort small = {.scale_32nds = 12, .quality = 55, .bytes = 1234, .sparing = true};

@@ -89,7 +89,7 @@ static inline void send_plainly(struct client *client, const uint8_t *next, size
     }
 }
 
-/* What waits in the link. */
+/* Sends the bytes that wait in the link. */
 static inline void send_sealed(struct client *client)
 {
     size_t bytes;

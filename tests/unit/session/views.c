@@ -932,7 +932,7 @@ static void expect_refused(uint32_t request, const struct message *message, enum
         fail_msg("request %u: %s is refused, not %s", request, client.message.error.field, field);
 }
 
-/* Of a view's fields those that are not 0 count, and of those of one that nobody can have one is named. */
+/* Rows have the fields of a job that are not 0; the refusal names one of them. */
 SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
 {
     static const struct {
@@ -981,7 +981,7 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
         expect_refused(request++, &message, rows[i].code, rows[i].field);
         assert_true(rows[i].code == PROTOCOL_ERROR_INVALID || client.message.error.remedy[0] != '\0');
     }
-    /* What is motion without loss has no quality for rest, of 16 bits or 8. */
+    /* Frames without loss while the view moves leave no quality to raise at rest, of 16 bits or 8. */
     struct message message = view_message(1);
     message.render.encoding = PROTOCOL_ENCODING_RAW;
     message.render.still_encoding = PROTOCOL_ENCODING_JPEG;

@@ -74,7 +74,7 @@ static int grey(void)
     return picture.pixels[(EDGE / 2 * EDGE + EDGE / 2) * 4];
 }
 
-/* What comes may make the last view the best without another one. */
+/* A picture that comes may make the last view the best without another one. */
 static void wait_for_best(uint64_t wish)
 {
     const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;

@@ -355,7 +355,7 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
     fixture_finish(&fixture);
 }
 
-/* As a GPU does it, bench.bvh_elements at a time; 0: as software GL does it, in one dispatch. */
+/* Traces bench.bvh_elements at a time, as GPUs do; 0: in one dispatch, as software GL does. */
 static void *trace_as_hardware(struct scene *scene, const struct ray *rays, enum wave_kind kind,
                                const struct tracer_options *options)
 {

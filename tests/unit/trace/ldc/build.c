@@ -144,7 +144,7 @@ static void build_by(struct fixture *fixture, struct contents *contents, unsigne
     expect_consistent(contents);
 }
 
-/* Of all layers, and of the nearest ones alone. */
+/* All layers, and the nearest ones alone. */
 TEST_LONG(peels_and_lists_of_the_host_and_of_the_device_are_the_same_samples)
 {
     struct scene *(*const scenes[])(void) = {test_scene_spheres, test_scene_translucent, test_scene_deformed,

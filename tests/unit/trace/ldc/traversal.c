@@ -11,7 +11,7 @@
 #define RAY_COUNT 4096u
 #define RESOLUTION 64u
 
-/* What lets rays skip empty space in the static cube. */
+/* Builds the levels by which rays skip empty space in the static cube. */
 static void build_levels(struct fixture *fixture)
 {
     struct error error = {0};
@@ -24,7 +24,7 @@ static void build_levels(struct fixture *fixture)
     expect_ok(progress == TRACER_DONE, &error);
 }
 
-/* That and the cube's samples. */
+/* Builds the levels and the cube's samples. */
 static void build_all(struct fixture *fixture, const struct tracer_options *options)
 {
     fixture->options = *options;
