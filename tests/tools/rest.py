@@ -6,6 +6,7 @@ Usage: rest.py BUILD_FOLDER all|PART ..
 A part is a share of the tests and some targets of make. The last lines say what ran, what could not run here and why, and
 what the other parts have. Exit status 1 if something failed. With the sanitizers' build folder there are tests alone."""
 import pathlib
+import shlex
 import subprocess
 import sys
 import time
@@ -49,7 +50,7 @@ def main():
         reason = why_not(step)
         if reason:
             left_out.append(f"make {step.target}: {reason}")
-        elif not run(f"make {step.target}", ["make", *step.target.split()]):
+        elif not run(f"make {step.target}", ["make", *shlex.split(step.target)]):
             failed.append(f"make {step.target}")
     print(f"parts that ran: {', '.join(map(str, parts))} of {suite.PARTS}, of the tests and: "
           + (", ".join(step.target for step in steps if step.part in parts) or "nothing else"))

@@ -46,16 +46,16 @@ Step = collections.namedtuple("Step", "target part check")
 NO_FIDELITY = 'test -e "${FARLIGHT_SCENES:-../shared/scenes}/fidelity" || { echo "no folder fidelity at FARLIGHT_SCENES"; false; }'
 ROOT = "tests/packages/clean_install.sh --check"
 STEPS = (
-    Step("check-sync", 1, "true"),
     Step("soak ROUNDS=400", 1, "true"),
     Step("deb-test", 2, ROOT),
     Step("container-test", 2, f"{ROOT} && unshare --net --pid --fork --mount-proc true"),
+    Step("siege ATTACKS='--seconds 5'", 3, "true"),
     Step("web-test", 3, "true"),
-    Step("farm-drill ROUNDS=60", 3, "true"),
     Step("farm-test", 4, "true"),
     Step("blender-test", 5, "true"),
     Step("fuzz SECONDS=10", 6, "true"),
-    Step("siege", 6, "true"),
+    Step("check-sync", 7, "true"),
+    Step("farm-drill ROUNDS=60", 7, "true"),
     Step("fidelity SMALL=1 SAMPLES=16", 7, NO_FIDELITY),
 )
 # Names of targets that must be among them.
