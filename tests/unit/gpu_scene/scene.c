@@ -295,6 +295,24 @@ TEST(lights_go_along_minus_z_of_their_nodes)
     fixture_finish(&fixture);
 }
 
+TEST(the_radius_of_a_sphere_light_is_scaled_by_the_mean_of_its_node)
+{
+    struct fixture fixture;
+    struct light back;
+    float m[12];
+    fixture_init(&fixture, test_scene_create());
+    test_add(&fixture.edits, OBJECT_LIGHT)->set.light =
+        (struct scene_light){.base.id = 1, .kind = LIGHT_SPHERE, .size = {0.5f}};
+    test_transform(m, 1, 2, 4, 1, 0.7f, 5, 6, 7);
+    test_node(&fixture.edits, 1, 0, NODE_LIGHT, 1, m);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    gpu_buffer_read(device, &fixture.gpu.lights, 0, &back, sizeof(back));
+    assert_float_equal(back.position_kind[3], LIGHT_KIND_SPHERE, 0);
+    assert_float_equal(back.colour[3], 1, 1e-5); /* the cube root of 8 times as large */
+    fixture_finish(&fixture);
+}
+
 TEST(an_environment_image_stays_until_it_is_removed)
 {
     struct fixture fixture;
