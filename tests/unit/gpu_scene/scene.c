@@ -233,6 +233,26 @@ TEST(materials_keep_their_indices)
     fixture_finish(&fixture);
 }
 
+TEST(a_material_asks_for_tangents_of_the_coordinates_of_the_first_texture_that_needs_them)
+{
+    struct fixture fixture;
+    struct material back;
+    fixture_init(&fixture, test_scene_create());
+    test_texture(&fixture.edits, 1, 1, 1, TEXTURE_RGBA8_LINEAR, WRAP_REPEAT, WRAP_REPEAT, 1);
+    for (uint32_t second = 0; second < 2; second++) {
+        struct texture_use *uses = test_material(&fixture.edits, 1, 0.5f, 0.5f, 0.5f)->textures;
+        uses[MATERIAL_NORMAL].texture = uses[MATERIAL_BUMP].texture = 1;
+        uses[MATERIAL_NORMAL].texcoord_set = second;
+        uses[MATERIAL_BUMP].texcoord_set = !second;
+        test_commit(&fixture.edits);
+        update(&fixture);
+        read_table(&fixture.gpu, fixture.gpu.table_starts.materials + MATERIAL_TEXELS, &back, sizeof(back));
+        assert_int_equal(back.flags & (MATERIAL_TANGENT | MATERIAL_TANGENT_SECOND),
+                         MATERIAL_TANGENT | (second ? MATERIAL_TANGENT_SECOND : 0));
+    }
+    fixture_finish(&fixture);
+}
+
 TEST(a_texture_is_halved_in_linear_light_down_to_one_texel)
 {
     struct fixture fixture;
