@@ -8,6 +8,7 @@
 #include "tests/fixtures/device.h"
 #include "tests/harness/test.h"
 
+#include <epoxy/gl.h>
 #include <stddef.h>
 
 struct fixture {
@@ -333,22 +334,39 @@ TEST(the_radius_of_a_sphere_light_is_scaled_by_the_mean_of_its_node)
     fixture_finish(&fixture);
 }
 
-TEST(an_environment_image_stays_until_it_is_removed)
+/* Two texels, of which the first is as red as `half` says. */
+static void bring_environment_image(struct fixture *fixture, uint16_t half)
 {
-    struct fixture fixture;
-    uint16_t half_floats[2 * 1 * 4] = {0x3c00};
-    fixture_init(&fixture, test_scene_create());
-    struct scene_edit *edit = test_add(&fixture.edits, OBJECT_NODE);
+    uint16_t half_floats[2 * 1 * 4] = {half};
+    struct scene_edit *edit = test_add(&fixture->edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment = (struct scene_environment){
         .colour = {1, 1, 1}, .width = 2, .height = 1, .texels = test_blob(half_floats, sizeof(half_floats))};
-    test_commit(&fixture.edits);
-    update(&fixture);
-    assert_true(fixture.gpu.has_environment_image && (fixture.changes.bits & CHANGED_LIGHTS));
+    test_commit(&fixture->edits);
+    update(fixture);
+    assert_true(fixture->gpu.has_environment_image && (fixture->changes.bits & CHANGED_LIGHTS));
     bool done = false;
-    assert_true(gpu_scene_upload_environment(&fixture.gpu, UINT64_MAX, &done, NULL) && done);
-    assert_int_equal(fixture.gpu.environment.width, 2);
-    edit = test_add(&fixture.edits, OBJECT_NODE);
+    assert_true(gpu_scene_upload_environment(&fixture->gpu, UINT64_MAX, &done, NULL) && done);
+    assert_int_equal(fixture->gpu.environment.width, 2);
+    glGetTextureImage(fixture->gpu.environment.name, 0, GL_RGBA, GL_HALF_FLOAT, sizeof(half_floats), half_floats);
+    assert_int_equal(half_floats[0], half);
+}
+
+TEST(an_environment_image_is_replaced_by_one_of_the_same_size)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_create());
+    bring_environment_image(&fixture, 0x3c00);
+    bring_environment_image(&fixture, 0x4000);
+    fixture_finish(&fixture);
+}
+
+TEST(an_environment_image_stays_until_it_is_removed)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_create());
+    bring_environment_image(&fixture, 0x3c00);
+    struct scene_edit *edit = test_add(&fixture.edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment = (struct scene_environment){.colour = {0.5f, 0.5f, 0.5f}, .rotation = 1};
     test_commit(&fixture.edits);
