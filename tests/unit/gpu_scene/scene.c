@@ -285,6 +285,28 @@ TEST(a_texture_is_halved_in_linear_light_down_to_one_texel)
     fixture_finish(&fixture);
 }
 
+TEST(the_last_column_of_an_odd_width_counts_in_the_next_level)
+{
+    static const uint8_t texels[5][4] = {[4] = {255, 255, 255, 255}};
+    struct fixture fixture;
+    uint8_t back[2][4];
+    fixture_init(&fixture, test_scene_create());
+    struct scene_texture *texture = &test_add(&fixture.edits, OBJECT_TEXTURE)->set.texture;
+    *texture = (struct scene_texture){.base.id = 1,
+                                      .width = 5,
+                                      .height = 1,
+                                      .format = TEXTURE_RGBA8_LINEAR,
+                                      .texels = test_blob(texels, sizeof(texels))};
+    test_commit(&fixture.edits);
+    update(&fixture);
+    gpu_buffer_read(device, &fixture.gpu.texels, sizeof(texels), back, sizeof(back));
+    for (int k = 0; k < 4; k++) {
+        assert_int_equal(back[0][k], 0);
+        assert_int_equal(back[1][k], 85); /* of three texels */
+    }
+    fixture_finish(&fixture);
+}
+
 TEST(lights_go_along_minus_z_of_their_nodes)
 {
     struct fixture fixture;
