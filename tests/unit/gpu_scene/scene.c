@@ -8,6 +8,7 @@
 #include "tests/fixtures/device.h"
 #include "tests/harness/test.h"
 
+#include <epoxy/gl.h>
 #include <stddef.h>
 
 struct fixture {
@@ -233,6 +234,26 @@ TEST(materials_keep_their_indices)
     fixture_finish(&fixture);
 }
 
+TEST(a_material_asks_for_tangents_of_the_coordinates_of_the_first_texture_that_needs_them)
+{
+    struct fixture fixture;
+    struct material back;
+    fixture_init(&fixture, test_scene_create());
+    test_texture(&fixture.edits, 1, 1, 1, TEXTURE_RGBA8_LINEAR, WRAP_REPEAT, WRAP_REPEAT, 1);
+    for (uint32_t second = 0; second < 2; second++) {
+        struct texture_use *uses = test_material(&fixture.edits, 1, 0.5f, 0.5f, 0.5f)->textures;
+        uses[MATERIAL_NORMAL].texture = uses[MATERIAL_BUMP].texture = 1;
+        uses[MATERIAL_NORMAL].texcoord_set = second;
+        uses[MATERIAL_BUMP].texcoord_set = !second;
+        test_commit(&fixture.edits);
+        update(&fixture);
+        read_table(&fixture.gpu, fixture.gpu.table_starts.materials + MATERIAL_TEXELS, &back, sizeof(back));
+        assert_int_equal(back.flags & (MATERIAL_TANGENT | MATERIAL_TANGENT_SECOND),
+                         MATERIAL_TANGENT | (second ? MATERIAL_TANGENT_SECOND : 0));
+    }
+    fixture_finish(&fixture);
+}
+
 TEST(a_texture_is_halved_in_linear_light_down_to_one_texel)
 {
     struct fixture fixture;
@@ -261,6 +282,28 @@ TEST(a_texture_is_halved_in_linear_light_down_to_one_texel)
     assert_int_equal(back[0][6][0], 156);
     assert_int_equal(back[1][6][0], 85);
     assert_int_equal(back[0][6][3], 85); /* alpha is linear always */
+    fixture_finish(&fixture);
+}
+
+TEST(the_last_column_of_an_odd_width_counts_in_the_next_level)
+{
+    static const uint8_t texels[5][4] = {[4] = {255, 255, 255, 255}};
+    struct fixture fixture;
+    uint8_t back[2][4];
+    fixture_init(&fixture, test_scene_create());
+    struct scene_texture *texture = &test_add(&fixture.edits, OBJECT_TEXTURE)->set.texture;
+    *texture = (struct scene_texture){.base.id = 1,
+                                      .width = 5,
+                                      .height = 1,
+                                      .format = TEXTURE_RGBA8_LINEAR,
+                                      .texels = test_blob(texels, sizeof(texels))};
+    test_commit(&fixture.edits);
+    update(&fixture);
+    gpu_buffer_read(device, &fixture.gpu.texels, sizeof(texels), back, sizeof(back));
+    for (int k = 0; k < 4; k++) {
+        assert_int_equal(back[0][k], 0);
+        assert_int_equal(back[1][k], 85); /* of three texels */
+    }
     fixture_finish(&fixture);
 }
 
@@ -295,22 +338,57 @@ TEST(lights_go_along_minus_z_of_their_nodes)
     fixture_finish(&fixture);
 }
 
-TEST(an_environment_image_stays_until_it_is_removed)
+TEST(the_radius_of_a_sphere_light_is_scaled_by_the_mean_of_its_node)
 {
     struct fixture fixture;
-    uint16_t half_floats[2 * 1 * 4] = {0x3c00};
+    struct light back;
+    float m[12];
     fixture_init(&fixture, test_scene_create());
-    struct scene_edit *edit = test_add(&fixture.edits, OBJECT_NODE);
+    test_add(&fixture.edits, OBJECT_LIGHT)->set.light =
+        (struct scene_light){.base.id = 1, .kind = LIGHT_SPHERE, .size = {0.5f}};
+    test_transform(m, 1, 2, 4, 1, 0.7f, 5, 6, 7);
+    test_node(&fixture.edits, 1, 0, NODE_LIGHT, 1, m);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    gpu_buffer_read(device, &fixture.gpu.lights, 0, &back, sizeof(back));
+    assert_float_equal(back.position_kind[3], LIGHT_KIND_SPHERE, 0);
+    assert_float_equal(back.colour[3], 1, 1e-5); /* the cube root of 8 times as large */
+    fixture_finish(&fixture);
+}
+
+/* Two texels, of which the first is as red as `half` says. */
+static void bring_environment_image(struct fixture *fixture, uint16_t half)
+{
+    uint16_t half_floats[2 * 1 * 4] = {half};
+    struct scene_edit *edit = test_add(&fixture->edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment = (struct scene_environment){
         .colour = {1, 1, 1}, .width = 2, .height = 1, .texels = test_blob(half_floats, sizeof(half_floats))};
-    test_commit(&fixture.edits);
-    update(&fixture);
-    assert_true(fixture.gpu.has_environment_image && (fixture.changes.bits & CHANGED_LIGHTS));
+    test_commit(&fixture->edits);
+    update(fixture);
+    assert_true(fixture->gpu.has_environment_image && (fixture->changes.bits & CHANGED_LIGHTS));
     bool done = false;
-    assert_true(gpu_scene_upload_environment(&fixture.gpu, UINT64_MAX, &done, NULL) && done);
-    assert_int_equal(fixture.gpu.environment.width, 2);
-    edit = test_add(&fixture.edits, OBJECT_NODE);
+    assert_true(gpu_scene_upload_environment(&fixture->gpu, UINT64_MAX, &done, NULL) && done);
+    assert_int_equal(fixture->gpu.environment.width, 2);
+    glGetTextureImage(fixture->gpu.environment.name, 0, GL_RGBA, GL_HALF_FLOAT, sizeof(half_floats), half_floats);
+    assert_int_equal(half_floats[0], half);
+}
+
+TEST(an_environment_image_is_replaced_by_one_of_the_same_size)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_create());
+    bring_environment_image(&fixture, 0x3c00);
+    bring_environment_image(&fixture, 0x4000);
+    fixture_finish(&fixture);
+}
+
+TEST(an_environment_image_stays_until_it_is_removed)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_create());
+    bring_environment_image(&fixture, 0x3c00);
+    struct scene_edit *edit = test_add(&fixture.edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment = (struct scene_environment){.colour = {0.5f, 0.5f, 0.5f}, .rotation = 1};
     test_commit(&fixture.edits);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* net: addresses, listeners, the loop, the out-queue. Sessions over real sockets are in unit/session/session.c. */
+/* net: addresses, listeners, the loop, limits of time, the out-queue. Sessions over real sockets are in
+ * unit/session/session.c. */
 #include <stddef.h>
 #include <stdint.h>
 
@@ -7,9 +8,11 @@
 #include "base/sys.h"
 #include "net/address.h"
 #include "net/auth.h"
+#include "net/connection.h"
 #include "net/listen.h"
 #include "net/loop.h"
 #include "net/out_queue.h"
+#include "net/timeouts.h"
 #include "session/blob_store.h"
 #include "tests/harness/test.h"
 
@@ -382,6 +385,39 @@ TEST(a_watch_that_was_removed_is_not_called_even_in_the_same_turn)
         close(pipes[i][1]);
     }
     loop_destroy(scene.loop);
+}
+
+/* ---- limits of time ---------------------------------------------------------------------------------- */
+
+static void on_turn_end(void *context)
+{
+    (void)context;
+}
+
+TEST(a_client_is_charged_for_slow_progress_only_while_it_is_read_from)
+{
+    const uint64_t later_ns = UINT64_C(10000000000);
+    const struct connection_limits limits = {
+        .progress_grace_ms = 100, .progress_bytes_per_s = 1000, .queued_hard_bytes = 1000};
+    struct error error = {0};
+    struct connection connection = {.loop = loop_create(&error),
+                                    .limits = &limits,
+                                    .state = CONNECTION_OPEN,
+                                    .turn_end = {.call = on_turn_end},
+                                    .in_used = 1,
+                                    .message_began_ns = 1};
+    out_queue_init(&connection.out);
+    connection_hold(&connection, true);
+    timeouts_check(&connection, later_ns);
+    assert_int_equal(connection.state, CONNECTION_OPEN);
+    connection_hold(&connection, false); /* from here on it has all its time */
+    timeouts_check(&connection, later_ns);
+    assert_int_equal(connection.state, CONNECTION_OPEN);
+    connection.message_began_ns = 1;
+    timeouts_check(&connection, later_ns);
+    assert_int_equal(connection.state, CONNECTION_FLUSHING);
+    out_queue_finish(&connection.out);
+    loop_destroy(connection.loop);
 }
 
 /* ---- the out-queue ----------------------------------------------------------------------------------- */

@@ -89,11 +89,17 @@ TEST(what_is_in_use_is_not_removed)
     struct scene_texture *texture = &add_set(&list, OBJECT_TEXTURE, 9)->set.texture;
     texture->width = texture->height = 1;
     texture->texels = make_blob("\1\2\3\4", 4);
+    add_set(&list, OBJECT_MATERIAL, 6);
+    struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 3)->set.disc;
+    disc->normal_world[1] = disc->radius = 1.0f;
+    disc->material = 6;
     expect_commit(scene, &list);
     add_remove(&list, OBJECT_MESH, 7);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7)");
     add_remove(&list, OBJECT_MATERIAL, 5);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (material 5)");
+    add_remove(&list, OBJECT_MATERIAL, 6);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (material 6)");
     add_remove(&list, OBJECT_TEXTURE, 9);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (texture 9)");
     add_remove(&list, OBJECT_LIGHT, 1);
@@ -103,6 +109,8 @@ TEST(what_is_in_use_is_not_removed)
     add_remove(&list, OBJECT_MESH, 7);
     add_remove(&list, OBJECT_NODE, 1);
     add_remove(&list, OBJECT_MATERIAL, 5);
+    add_remove(&list, OBJECT_MATERIAL, 6);
+    add_remove(&list, OBJECT_DISC, 3);
     expect_commit(scene, &list);
     assert_int_equal(scene->host_bytes, 0);
 }

@@ -1,9 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene as bytes and back: nothing is lost, and any bytes may be given. */
+/* A scene as bytes and back, also by way of the disk: nothing is lost, and any bytes may be given. */
 #include "session/scene_record.h"
 
+#include "session/keeper.h"
+#include "tests/fixtures/engine_port.h"
 #include "tests/harness/test.h"
 #include "tests/unit/scene/drafts.h"
+
+#include <unistd.h>
 
 static const uint8_t texels[16] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16};
 static const uint8_t half_floats[2 * 8];
@@ -272,4 +276,57 @@ TEST(what_is_abandoned_is_not_written)
     assert_false(scene_record_write(&record, scene, SHARING_SHARED, &abandoned));
     store_record_finish(&record);
     scene_destroy(scene);
+}
+
+/* ---- by way of the disk ------------------------------------------------------------------------------ */
+
+#define PRINCIPAL 1000u /* a user: found again by the next process */
+
+static size_t edits_committed;
+
+/* An engine that does what it is told and keeps nothing. */
+static bool submit(void *context, struct engine_command *command, struct error *error)
+{
+    (void)context, (void)error;
+    edits_committed += command->edit_count;
+    port_say(port_event(ENGINE_DONE, command->client, command->request));
+    engine_command_destroy(command);
+    return true;
+}
+
+static void keep(struct store *store, const struct scene *scene)
+{
+    static const atomic_bool not_abandoned;
+    const struct engine_keeper keeper = keeper_port(store);
+    struct store_record record = record_of(scene);
+    hash_blobs(&record);
+    store_record_finish(&record);
+    void *made = keeper.read(keeper.context, scene, PRINCIPAL, SHARING_KEPT, &not_abandoned);
+    assert_non_null(made);
+    keeper.write(keeper.context, made, &not_abandoned);
+}
+
+TEST(blobs_of_a_restored_scene_end_with_it)
+{
+    char folder[] = "/tmp/farlight-keeper-XXXXXX", command[64];
+    struct error error = {0};
+    assert_non_null(mkdtemp(folder));
+    struct store *store = store_open(folder, 1 << 20, &error);
+    assert_string_equal(error.text, "");
+    struct scene *scene = make_scene();
+    keep(store, scene);
+    struct hub hub = {.options.engine = port_begin(submit),
+                      .options.limits.texture_edge_texels = 16384,
+                      .blobs = blob_store_create(1 << 20, 0)}; /* none that is not in use stays */
+    edits_committed = 0;
+    keeper_restore(store, &hub);
+    assert_in_range(edits_committed, OBJECT_ENVIRONMENT, SIZE_MAX);
+    blob_store_trim(hub.blobs);
+    assert_int_equal(blob_store_count(hub.blobs), 0);
+    blob_store_destroy(hub.blobs);
+    port_end();
+    scene_destroy(scene);
+    store_close(store);
+    snprintf(command, sizeof(command), "rm -r %s", folder);
+    assert_int_equal(system(command), 0);
 }
