@@ -66,7 +66,7 @@ static inline void receive_some(struct client *client)
         return;
     struct pollfd fd = {.fd = client->fd, .events = POLLIN};
     if (poll(&fd, 1, 60000) != 1)
-        fail_msg("nothing came for 20 s");
+        fail_msg("nothing came for 60 s");
     if (client->link) {
         if (!receive_sealed(client))
             fail_msg("the connection is closed");
@@ -171,7 +171,7 @@ static inline const struct message *receive(struct client *client)
     while (!(message = receive_now(client))) {
         struct pollfd fd = {.fd = client->fd, .events = POLLIN};
         if (poll(&fd, 1, 60000) != 1)
-            fail_msg("nothing came for 20 s");
+            fail_msg("nothing came for 60 s");
     }
     return message;
 }
