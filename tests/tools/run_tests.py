@@ -13,7 +13,7 @@ own. Integration tests are unittest modules in tests/integration, which find the
 modules run side by side, as most of them leave processors idle: FARLIGHT_TEST_JOBS at a time (default: two more than
 there are processors, at most 4), those first that took longest the last time.
 With CI=true in the environment, a skipped test fails unless EXPECTED_SKIPS names its reason. FARLIGHT_TEST_LONG=1, which
---rest and --part set, runs the tests as well that are declared as long.
+--rest and --part set in the plain way, runs the tests as well that are declared as long.
 """
 import collections
 import concurrent.futures
@@ -249,27 +249,27 @@ def begin_ways(build, runs):
 
 
 def choose(found, sanitized, arguments):
-    """The runs that are asked for, and whether tests may be left to others."""
+    """The runs that are asked for."""
     core, rest = suite.runs(found, sanitized)
     if arguments[:1] == ["--rest"]:
-        return rest, False
+        return rest
     if arguments[:1] == ["--part"]:
-        return suite.part(rest, int(arguments[1])), False
-    long = bool(os.environ.get("FARLIGHT_TEST_LONG"))
-    return (named(core, rest, arguments) if arguments else core), not long
+        return suite.part(rest, int(arguments[1]))
+    return named(core, rest, arguments) if arguments else core
 
 
-def run_all(build, runs, tests, leaves, sums):
+def run_all(build, runs, tests, sums):
     jobs = int(os.environ.get("FARLIGHT_TEST_JOBS") or min(JOBS_MAX, len(os.sched_getaffinity(0)) + 2))
     times_path = build / "test_times.json"
     times, took, used = {**dict.fromkeys(suite.LONGEST, 1000), **known_times(times_path)}, {}, {}
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        running = {pool.submit(timed, functools.partial(tests[run.test], run.name, run.environment)): run.name
+        running = {pool.submit(timed, functools.partial(tests[run.test], run.name, run.environment)): run
                    for run in sorted(runs, key=lambda run: -times.get(run.name, 0))}
         for done in concurrent.futures.as_completed(running):
-            result, took[running[done]] = done.result()
-            used[running[done]] = result.used
-            sums.add(result, took[running[done]], leaves)
+            run = running[done]
+            result, took[run.name] = done.result()
+            used[run.name] = result.used
+            sums.add(result, took[run.name], "FARLIGHT_TEST_LONG" not in {**os.environ, **run.environment})
     times_path.write_text(json.dumps({**times, **took}, indent=1))
     for title, seconds in (("slowest", took), ("most processor time", used)):
         longest = sorted(seconds.items(), key=lambda item: -item[1])[:SLOWEST]
@@ -301,7 +301,7 @@ def main():
     os.environ.setdefault("XDG_CACHE_HOME", str(cache))
     tests = tests_of(build)
     sums = Sums()
-    runs, leaves = choose(tests, build.name == "sanitize", sys.argv[2:])
+    runs = choose(tests, build.name == "sanitize", sys.argv[2:])
     if not begin_ways(build, runs):
         return 1
     if len(sys.argv) == 2:
@@ -309,7 +309,7 @@ def main():
             sums.add(Result(fault, 0, 1, [], 0))
         sums.add(run_check("include rules", [sys.executable, "tests/tools/check_includes.py"]))
         sums.add(run_check("headers alone", ["make", "-s", "check-headers"]))
-    run_all(build, runs, tests, leaves, sums)
+    run_all(build, runs, tests, sums)
     sums.show()
     return 1 if sums.failed or not sums.passed else 0
 

@@ -79,7 +79,8 @@ def has_long(name):
 
 
 def runs(names, sanitized):
-    """(those of `make test`, those of `make test-all`), which together run every test in every way that it has."""
+    """(those of `make test`, those of `make test-all`), which together run every test in every way that it has, and long
+    tests in the first way alone."""
     core, rest = [], []
     for name in sorted(names):
         for prefix, way in WAYS.items():
@@ -95,8 +96,10 @@ def runs(names, sanitized):
                 is_core = {"": not matches(LEFT, name), "like-gpu/": matches(LIKE_GPU, name)}.get(prefix, False)
             if is_core:
                 core.append(Run(prefix + name, name, way.environment))
-            if not is_core or has_long(name):
-                rest.append(Run(prefix + name, name, {**way.environment, "FARLIGHT_TEST_LONG": "1"}))
+            if prefix and not is_core:
+                rest.append(Run(prefix + name, name, way.environment))
+            elif not prefix and (not is_core or has_long(name)):
+                rest.append(Run(name, name, {"FARLIGHT_TEST_LONG": "1"}))
     return core, rest
 
 
