@@ -11,7 +11,8 @@ import os
 
 from farlight_test import Case, Daemon, bundled_scenes, farlight, read_exr
 
-OTHER = {**os.environ, "GALLIUM_DRIVER": "llvmpipe"}
+# Choices as on the stack under test, which queues its work: of two drivers alike in that, only their arithmetic differs.
+OTHER = {**os.environ, "GALLIUM_DRIVER": "llvmpipe", "FARLIGHT_LIKE_GPU": "1"}
 SIZE = ["--size", "64x48"]
 TRACERS = ("bvh", "reference", "ldc", "abuffer", "rayspace")  # naive takes no scene of this size
 INTEGRATORS = ("raycast", "whitted", "distributed", "ao", "path")
