@@ -59,7 +59,7 @@ class Stacks(Case):
                     # Where rays pass between samples, rounding decides, and a path that goes another way may bring
                     # anything: the number of such pixels is limited, and not what they differ by. (Three such pixels
                     # of another seed make 28 dB.)
-                    psnr_min = 0 if (tracer, integrator) == ("ldc", "path") else PSNR_MIN
+                    psnr_min = 0 if tracer == "ldc" and integrator in ("path", "distributed") else PSNR_MIN
                     if paths:
                         print(f"{tracer} {integrator}: {self.expect_alike(paths, psnr_min):.1f} dB")
 
