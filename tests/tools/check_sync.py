@@ -24,7 +24,7 @@ import tempfile
 
 # Tests of unit_tests, and which passes they have. They check their pictures, too.
 FRAMES = (
-    ("accuracy/frame_ahead:every_integrator_and_tracer", "every tracer with every integrator, waves queued and waited for"),
+    ("accuracy/frame_ahead:the_host_waits_once_for", "frames whose waves are queued and waited for"),
     ("accuracy/layers:", "layers of every tracer"),
     ("accuracy/render_frame:rasterised_and_traced", "rasterised first hits"),
     ("accuracy/frame_ycbcr:", "pictures as YCbCr"),
@@ -60,7 +60,7 @@ def prepare(folder, library):
         "name": LAYER, "type": "GLOBAL", "library_path": str(library), "api_version": "1.3.239",
         "implementation_version": "1", "description": "barriers of glMemoryBarrier() alone",
         "functions": {"vkNegotiateLoaderLayerInterfaceVersion": "farlight_sync_layer"}}}))
-    return {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink",
+    return {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink", "FARLIGHT_TEST_LONG": "1",
             "VK_ADD_LAYER_PATH": str(folder), "VK_INSTANCE_LAYERS": f"{LAYER}:VK_LAYER_KHRONOS_validation",
             "VK_LAYER_SETTINGS_PATH": str(folder), "FARLIGHT_SYNC_COUNTS": str(folder / "counts")}
 
