@@ -12,7 +12,7 @@
 
 #define MS UINT64_C(1000000)
 
-/* What client 1, who has opened scene 1, wishes to see. */
+/* The wishes of client 1, which has opened scene 1. */
 static struct view_wishes *wishes;
 
 static struct engine_frame *taken[256]; /* until the test ends */

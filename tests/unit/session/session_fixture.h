@@ -83,7 +83,7 @@ static struct auth_keys session_keys = {
     .read_only = {false, true},
     .count = 2};
 
-/* All of these are said to the one client. */
+/* The one client hears all of these. */
 #define send_bytes(...) send_bytes(&client, __VA_ARGS__)
 #define send_plainly(...) send_plainly(&client, __VA_ARGS__)
 #define send_sealed() send_sealed(&client)

@@ -838,7 +838,7 @@ SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
     engine_command_destroy(command);
 }
 
-/* Such a frame holds the owner of its client. */
+/* A frame of a replaced view holds the owner of its client. */
 TEST_WITH(an_owner_is_forgotten_after_a_frame_of_a_view_that_was_replaced, set_up, tear_down)
 {
     start_view_with_credit();
