@@ -224,6 +224,16 @@ static int is_at_end_of_hdr(void *context)
     return bytes->left_bytes == 0;
 }
 
+/* A row has four bytes a texel or, if it has eight texels or more, a head of four bytes and then, for each of four
+ * channels, two bytes a run of at most 127. A header that claims more than the file can hold is refused before memory
+ * is taken for it. */
+static bool holds_rows_of_hdr(const struct texture_job *job, int width, int height)
+{
+    const uint64_t texels = (uint64_t)width, rows = (uint64_t)height;
+    const uint64_t row_bytes = texels < 8 ? 4 * texels : 4 + 4 * 2 * ((texels + 126) / 127);
+    return job->size_bytes >= rows * row_bytes;
+}
+
 static float *decode_hdr(const struct texture_job *job, int *width, int *height)
 {
     static const stbi_io_callbacks calls = {.read = read_hdr, .skip = skip_hdr, .eof = is_at_end_of_hdr};
@@ -234,7 +244,8 @@ static float *decode_hdr(const struct texture_job *job, int *width, int *height)
         return NULL;
     bytes = whole;
     if (!stbi_info_from_callbacks(&calls, &bytes, width, height, &channels) || *width < 1 || *height < 1 ||
-        *width > EDGE_MAX || *height > EDGE_MAX || (uint64_t)*width * (uint64_t)*height > IMAGE_TEXELS_MAX)
+        *width > EDGE_MAX || *height > EDGE_MAX || (uint64_t)*width * (uint64_t)*height > IMAGE_TEXELS_MAX ||
+        !holds_rows_of_hdr(job, *width, *height))
         return NULL;
     bytes = whole;
     float *pixels = stbi_loadf_from_callbacks(&calls, &bytes, width, height, &channels, 3);
