@@ -90,6 +90,25 @@ void camera_turn(struct viewer_camera *camera, double right, double up)
         camera->look_at[i] = camera->eye[i] + arm[i];
 }
 
+void camera_swing(const struct viewer_camera *from, const struct viewer_camera *to, double *right, double *up)
+{
+    double before[3], after[3], level_before[3], level_after[3], side[3];
+    for (int i = 0; i < 3; i++) {
+        before[i] = from->look_at[i] - from->eye[i];
+        after[i] = to->look_at[i] - to->eye[i];
+    }
+    unit(before);
+    unit(after);
+    const double rise_before = dot(before, to->up), rise_after = dot(after, to->up);
+    for (int i = 0; i < 3; i++) {
+        level_before[i] = before[i] - rise_before * to->up[i];
+        level_after[i] = after[i] - rise_after * to->up[i];
+    }
+    cross(level_after, level_before, side);
+    *right = atan2(dot(side, to->up), dot(level_before, level_after));
+    *up = asin(fmax(-1, fmin(1, rise_after))) - asin(fmax(-1, fmin(1, rise_before)));
+}
+
 void camera_fly(struct viewer_camera *camera, const double metres[3])
 {
     double right[3], above[3], into[3];

@@ -17,6 +17,9 @@ double camera_distance(const struct viewer_camera *camera); /* from the eye to w
 void camera_orbit(struct viewer_camera *camera, double right, double up);
 /* The same about the eye: looks around. */
 void camera_turn(struct viewer_camera *camera, double right, double up);
+/* The angles by which camera_orbit() or camera_turn() swings the view of `from` into the direction of that of
+ * `to`, about the axis of `to`. */
+void camera_swing(const struct viewer_camera *from, const struct viewer_camera *to, double *right, double *up);
 /* Pans by a share of the picture's height at the target's distance. */
 void camera_pan(struct viewer_camera *camera, double right, double up);
 /* Multiplies the distance; at least `minimum` metres. */

@@ -71,7 +71,7 @@ static const struct argp_option options[] = {
     {"eyes", KEY_EYES, "rays|quadtree", 0,
      "Render both eyes of --stereo, or make them on the daemon from depth layers (default)", -2},
     {"views", KEY_VIEWS, "off|auto|on", 0,
-     "Make views here while the camera moves, from the newest picture and its depths, at the display's rate "
+     "Make views here while the camera moves, from a picture and its depths, at the display's rate "
      "(auto, the default: where the daemon and the link take longer than a frame of the display)",
      -2},
     {"holes", KEY_HOLES, "fill|pattern", 0,

@@ -28,8 +28,31 @@ bool plan_switch(struct plan_switch *plan, double round_s, uint64_t now_ns)
 /* ---- of which camera ---- */
 
 #define VELOCITY_NS UINT64_C(100000000) /* over which it is measured: the pointer's steps are uneven */
-#define AHEAD_MAX_NS UINT64_C(250000000)
-#define POLE 0.999 /* cosine between the view and its upward direction, beyond which no picture has an upright */
+#define AHEAD_MAX_NS UINT64_C(400000000)
+
+#define PACE_NS 66666667.0 /* of pictures that are not known yet: what the daemon is asked for */
+#define PACE_LEARN 0.25
+#define PACE_PAUSE_NS UINT64_C(1000000000) /* without a picture: that was another motion */
+
+static void learn(double *known, double seen)
+{
+    *known = *known > 0 ? *known + PACE_LEARN * (seen - *known) : seen;
+}
+
+void plan_pace_add(struct plan_pace *pace, uint64_t sent_ns, uint64_t came_ns)
+{
+    if (sent_ns != 0)
+        learn(&pace->round_ns, (double)(came_ns - sent_ns));
+    if (pace->came_ns != 0 && came_ns - pace->came_ns < PACE_PAUSE_NS)
+        learn(&pace->interval_ns, (double)(came_ns - pace->came_ns));
+    pace->came_ns = came_ns;
+}
+
+uint64_t plan_pace_ahead_ns(const struct plan_pace *pace)
+{
+    const double round_ns = pace->round_ns > 0 ? pace->round_ns : PACE_NS;
+    return (uint64_t)(round_ns + (pace->interval_ns > 0 ? pace->interval_ns : PACE_NS) / 2);
+}
 
 void plan_motion_add(struct plan_motion *motion, const struct viewer_camera *camera, uint64_t at_ns)
 {
@@ -58,9 +81,9 @@ static uint64_t clamp(uint64_t value, uint64_t minimum, uint64_t maximum)
     return value < minimum ? minimum : value < maximum ? value : maximum;
 }
 
-static double dot(const double a[3], const double b[3])
+static double way_of(const double from[3], const double to[3])
 {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    return hypot(hypot(to[0] - from[0], to[1] - from[1]), to[2] - from[2]);
 }
 
 void plan_motion_predict(const struct plan_motion *motion, uint64_t now_ns, uint64_t ahead_ns,
@@ -74,29 +97,18 @@ void plan_motion_predict(const struct plan_motion *motion, uint64_t now_ns, uint
     const uint64_t elapsed_ns = clamp(now_ns - motion->steps[first].at_ns, PLAN_FRAME_NS, VELOCITY_NS);
     const double share = (double)clamp(ahead_ns, 0, AHEAD_MAX_NS) / (double)elapsed_ns;
     const struct viewer_camera *before = &motion->steps[first].camera;
-    struct viewer_camera made = *newest;
-    double way[3], distance = camera_distance(newest);
-    for (int i = 0; i < 3; i++) {
-        made.eye[i] += (newest->eye[i] - before->eye[i]) * share;
-        way[i] = made.look_at[i] + (newest->look_at[i] - before->look_at[i]) * share - made.eye[i];
-    }
-    const double length = sqrt(dot(way, way));
+    const bool orbits = way_of(before->look_at, newest->look_at) < way_of(before->eye, newest->eye);
+    double right, up;
+    camera_swing(before, newest, &right, &up);
     *camera = *newest;
-    if (!(length > distance * 1e-3) || fabs(dot(way, made.up)) > POLE * length)
-        return;
-    for (int i = 0; i < 3; i++)
-        made.look_at[i] = made.eye[i] + way[i] * distance / length;
-    *camera = made;
-}
-
-/* ---- when ---- */
-
-bool plan_is_due(const struct plan_need *need)
-{
-    const double least = (double)PLAN_STICKING_KEY_NS / (double)PLAN_KEY_NS;
-    const double sooner = 1 - (1 - least) * fmin(need->sticking / PLAN_STICKING_FULL, 1);
-    return (double)need->since_asked_ns >= sooner * (double)PLAN_KEY_NS ||
-           need->gone >= sooner * need->radius / 2 || need->unseen > PLAN_UNSEEN_MAX;
+    (orbits ? camera_orbit : camera_turn)(camera, right * share, up * share);
+    if (orbits)
+        camera_dolly(camera, pow(camera_distance(newest) / camera_distance(before), share), 0);
+    for (int i = 0; i < 3; i++) {
+        const double step = orbits ? newest->look_at[i] - before->look_at[i] : newest->eye[i] - before->eye[i];
+        camera->eye[i] += step * share;
+        camera->look_at[i] += step * share;
+    }
 }
 
 /* ---- in which quality ---- */

@@ -11,21 +11,21 @@
 
 #define PLAN_FRAME_NS UINT64_C(16666667) /* of a display, where nothing else is known */
 #define PLAN_RADIUS_SHARE 0.1            /* of the distance of what is looked at: that of a key view's sphere */
-#define PLAN_UNSEEN_MAX 0.03             /* share of a view's pixels */
-#define PLAN_KEY_NS UINT64_C(250000000)  /* the oldest picture that views are made from while it moves */
-/* Of a view in whose colours mirrors, glass and highlights have this share, or more: as often as pictures of
- * motion come at most. What sticks is wrong from the first step of the eye on, and by no stated bound. */
-#define PLAN_STICKING_KEY_NS UINT64_C(100000000)
-#define PLAN_STICKING_FULL 0.5
+/* A view of which a larger share of pixels is unseen is not shown: the daemon's own picture is nearer to the
+ * truth. */
+#define PLAN_UNSEEN_MAX 0.1
+/* Views are made from a finished picture up to this share, though newer ones of motion are there: those are
+ * smaller and have fewer samples. */
+#define PLAN_UNSEEN_LITTLE 0.03
 
 /* ---- whether ---- */
 
 enum local_views { LOCAL_OFF, LOCAL_AUTO, LOCAL_ON, LOCAL_VIEWS_COUNT };
 extern const char *const local_views_names[LOCAL_VIEWS_COUNT + 1]; /* ends with NULL */
 
-/* LOCAL_AUTO; all zero at first. */
+/* LOCAL_AUTO. */
 struct plan_switch {
-    bool on;
+    bool on;          /* at first: else the first drag would find no picture to make views from */
     uint64_t fast_ns; /* since then pictures come soon enough without; 0: they do not */
 };
 
@@ -46,26 +46,23 @@ struct plan_motion {
     size_t next, count;
 };
 
-void plan_motion_add(struct plan_motion *motion, const struct viewer_camera *camera, uint64_t at_ns);
-/* Where the camera will be `ahead_ns` after `now_ns` (250 ms at most) if it goes on as in the last tenth of a
- * second; with the lens and the distance of the newest one. No camera was added: *camera stays. */
-void plan_motion_predict(const struct plan_motion *motion, uint64_t now_ns, uint64_t ahead_ns,
-                         struct viewer_camera *camera);
-
-/* ---- when ---- */
-
-struct plan_need {
-    uint64_t since_asked_ns; /* since the daemon was told of a camera */
-    double gone;             /* of the eye, from the one that was asked for last */
-    double radius;
-    double unseen;   /* share of the last view's pixels */
-    double sticking; /* likewise */
+/* How pictures of motion come. All zero at first. */
+struct plan_pace {
+    double round_ns, interval_ns; /* from a camera to its picture, from picture to picture; 0: unknown */
+    uint64_t came_ns;             /* the last one */
 };
 
-/* Whether a new picture is needed while it moves: else the link is spared. It is needed after PLAN_KEY_NS, when
- * the eye has gone half of the radius, and when more than PLAN_UNSEEN_MAX is unseen; both the first come sooner,
- * by the same factor, the more sticks: at PLAN_STICKING_FULL after PLAN_STICKING_KEY_NS. */
-bool plan_is_due(const struct plan_need *need);
+/* A picture of a camera that was sent then has come. */
+void plan_pace_add(struct plan_pace *pace, uint64_t sent_ns, uint64_t came_ns);
+/* From sending a camera to the middle of the time in which views are made of its picture. */
+uint64_t plan_pace_ahead_ns(const struct plan_pace *pace);
+
+void plan_motion_add(struct plan_motion *motion, const struct viewer_camera *camera, uint64_t at_ns);
+/* Where the camera will be `ahead_ns` after `now_ns` (400 ms at most) if it goes on as in the last tenth of a
+ * second: the eye or what is looked at, whichever has moved less, goes straight on, and the other one swings about
+ * it. With the lens of the newest one. No camera was added: *camera stays. */
+void plan_motion_predict(const struct plan_motion *motion, uint64_t now_ns, uint64_t ahead_ns,
+                         struct viewer_camera *camera);
 
 /* ---- in which quality ---- */
 

@@ -293,6 +293,7 @@ static void close_viewer(struct viewer *viewer)
     pixmap_finish(&viewer->heat);
     viewer_edit_forget(viewer);
     viewer_outline_forget(viewer);
+    viewer_write_screenshots(viewer, &(struct fl_error){0}); /* those that were taken before it failed */
     replay_finish(&viewer->replay);
 }
 
@@ -307,6 +308,7 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
     viewer->height = (int)options->view.height;
     viewer->scale = 1;
     viewer->edit.tab = EDIT_MATERIAL;
+    viewer->local_switch.on = true;
     viewer->settings = (struct settings){.tracer = options->view.tracer,
                                          .integrator = options->view.integrator,
                                          .tone_map = options->view.tone_map,

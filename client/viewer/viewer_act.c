@@ -206,8 +206,8 @@ void viewer_input(struct viewer *viewer, const struct input *input)
 
 static bool has_come(const struct viewer *viewer, const struct replay_event *event)
 {
-    const bool is_live =
-        !viewer->next && viewer->times_live > 0 && viewer->times_live == session_times_live(viewer->session);
+    const bool is_live = !viewer->next && viewer->times_live > 0 && session_has_scene(viewer->session) &&
+                         viewer->times_live == session_times_live(viewer->session);
     switch (event->kind) {
     case REPLAY_REST:
         return is_live && viewer_is_at_rest(viewer, event->samples) && viewer->task == TASK_NONE &&
@@ -227,12 +227,17 @@ static bool has_come(const struct viewer *viewer, const struct replay_event *eve
     }
 }
 
+static bool is_wait(const struct replay_event *event)
+{
+    return event->kind != REPLAY_INPUT && event->kind != REPLAY_SCREENSHOT && event->kind != REPLAY_STATE;
+}
+
 static void do_event(struct viewer *viewer, const struct replay_event *event)
 {
     if (event->kind == REPLAY_INPUT)
         viewer_input(viewer, &event->input);
     else if (event->kind == REPLAY_SCREENSHOT)
-        viewer_screenshot(viewer, event->path, &viewer->failure);
+        viewer_keep_screenshot(viewer, event->path, &viewer->failure);
     else if (event->kind == REPLAY_STATE)
         viewer_print_state(viewer, event->path);
 }
@@ -251,6 +256,7 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         if (now_ns < due_ns)
             return;
         if (!has_come(viewer, event)) {
+            viewer_write_screenshots(viewer, &viewer->failure);
             if (now_ns >= due_ns + (uint64_t)(event->timeout_s * 1e9))
                 fl_error_set(&viewer->failure, FL_ERROR_TIMEOUT, viewer->options->replay,
                              "event %zu: the awaited state did not occur within %g s", event->number,
@@ -261,9 +267,10 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         viewer->replay_next++;
         if (session_scene(viewer->session) && !edit->works)
             viewer->replay_revision = fl_scene_revision(session_scene(viewer->session));
-        /* Time lost in a long operation, such as a screenshot, is not made up for. */
-        viewer->replay_ns = event->kind == REPLAY_INPUT ? due_ns : monotonic_now_ns();
+        viewer->replay_ns = is_wait(event) ? monotonic_now_ns() : due_ns;
     }
-    if (viewer->replay_next == viewer->replay.count)
+    if (viewer->replay_next == viewer->replay.count) {
+        viewer_write_screenshots(viewer, &viewer->failure);
         viewer->quit = true;
+    }
 }

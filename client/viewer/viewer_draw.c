@@ -66,7 +66,7 @@ static void fill_local(const struct viewer *viewer, struct hud_state *state)
         return;
     state->local.age_s = (double)(state->now_ns - made->key_came_ns) * 1e-9;
     state->local.bound_pixels = (double)made->counts.bound_pixels;
-    state->local.unseen = (double)(made->counts.behind + made->counts.outside);
+    state->local.unseen = (double)views_unseen(made);
     state->local.sticking = (double)made->counts.sticking;
     state->local.view_s = (double)made->counts.processor_ns * 1e-9;
 }
@@ -112,15 +112,45 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
         state->notice = viewer->notice;
 }
 
-bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error)
+static bool paint(struct viewer *viewer, struct pixmap *made, struct fl_error *error)
 {
     struct hud_state state;
-    struct pixmap made = {0};
     viewer_hud(viewer, &state);
-    const bool done =
-        paint_in_memory(viewer->width, viewer->height, viewer_picture(viewer), &state, &made, error) &&
-        snapshot_write(path, &made, error);
+    return paint_in_memory(viewer->width, viewer->height, viewer_picture(viewer), &state, made, error);
+}
+
+bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error)
+{
+    struct pixmap made = {0};
+    const bool done = paint(viewer, &made, error) && snapshot_write(path, &made, error);
     pixmap_finish(&made);
+    return done;
+}
+
+bool viewer_keep_screenshot(struct viewer *viewer, const char *path, struct fl_error *error)
+{
+    struct viewer_shot *shots = realloc(viewer->shots, (viewer->shot_count + 1) * sizeof(*shots));
+    if (!shots)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    viewer->shots = shots;
+    struct viewer_shot *shot = &shots[viewer->shot_count];
+    *shot = (struct viewer_shot){.path = path};
+    if (!paint(viewer, &shot->picture, error))
+        return false;
+    viewer->shot_count++;
+    return true;
+}
+
+bool viewer_write_screenshots(struct viewer *viewer, struct fl_error *error)
+{
+    bool done = true;
+    for (size_t i = 0; i < viewer->shot_count; i++) {
+        done = done && snapshot_write(viewer->shots[i].path, &viewer->shots[i].picture, error);
+        pixmap_finish(&viewer->shots[i].picture);
+    }
+    free(viewer->shots);
+    viewer->shots = NULL;
+    viewer->shot_count = 0;
     return done;
 }
 

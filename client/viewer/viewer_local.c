@@ -28,7 +28,8 @@ void viewer_plan_local(struct viewer *viewer, uint64_t now_ns)
 {
     struct metrics_summary summary;
     metrics_summarise(&viewer->metrics, now_ns, &summary);
-    viewer->round_ns = (uint64_t)(summary.round_s * 1e9);
+    if (viewer->frame.moving)
+        plan_pace_add(&viewer->pace, viewer->frame.command_sent_ns, now_ns);
     if (summary.round_frames >= ROUNDS_MIN)
         plan_switch(&viewer->local_switch, summary.round_s, now_ns);
 }
@@ -93,28 +94,7 @@ void viewer_aim(const struct viewer *viewer, bool moving, uint64_t now_ns, struc
 {
     *camera = viewer->camera;
     if (moving && viewer->local_asked)
-        plan_motion_predict(&viewer->motion, now_ns, viewer->round_ns, camera);
-}
-
-static double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
-bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns)
-{
-    struct viewer_camera next;
-    if (!viewer->shows_made || viewer->tour.playing)
-        return true;
-    viewer_aim(viewer, true, now_ns, &next);
-    const struct fl_warp_counts *counts = &viewer->made_of.counts;
-    /* What the iteration has not found may well be seen. */
-    const float behind = viewer->made_of.quality == FL_WARP_TREE ? counts->behind : 0;
-    return plan_is_due(&(struct plan_need){.since_asked_ns = now_ns - viewer->looked_ns,
-                                           .gone = distance(next.eye, viewer->asked.eye),
-                                           .radius = (double)viewer->local_radius,
-                                           .unseen = (double)(behind + counts->outside),
-                                           .sticking = (double)counts->sticking});
+        plan_motion_predict(&viewer->motion, now_ns, plan_pace_ahead_ns(&viewer->pace), camera);
 }
 
 /* ---- what comes ---- */
@@ -129,14 +109,14 @@ static void leave_margin(struct fl_frame *frame)
     frame->ortho_height *= (float)inner;
 }
 
-/* The pictures of motion are for views; one at rest is shown as well. Leaves the picture to the key where it can.
- */
+/* Leaves the picture to the key where it is not shown as well. */
 static bool give_key(struct viewer *viewer, struct fl_frame *frame, bool is_shown)
 {
     struct views_key key = {.depth_step = frame->depth_step,
                             .radius = viewer->local_radius,
                             .is_smeared = frame->encoding == PROTOCOL_ENCODING_JPEG ||
                                           frame->encoding == PROTOCOL_ENCODING_H264,
+                            .is_moving = frame->moving,
                             .is_final = !frame->moving && !frame->more_follows &&
                                         viewer_has_samples(viewer, frame, viewer->view.samples),
                             .came_ns = monotonic_now_ns()};
@@ -164,10 +144,10 @@ bool viewer_take_picture(struct viewer *viewer, struct fl_frame *frame)
     const bool is_key = frame->depth && frame->fov_y > 0 && viewer_has_local(viewer);
     /* Of two eyes, whose own picture has no depth. */
     const bool is_middle = viewer->settings.stereo && frame->depth;
-    const bool is_shown = !frame->moving || !is_key || (viewer->live.width == 0 && !is_middle);
+    const bool is_shown = !is_middle;
     if (is_middle && !is_key)
         return false; /* no view is made of it any more */
-    viewer->is_live = is_shown;
+    viewer->is_live = is_shown && (!frame->moving || !is_key);
     if (is_key && !give_key(viewer, frame, is_shown))
         return false;
     const int margin_x = (int)frame->margin_x, margin_y = (int)frame->margin_y;
@@ -252,15 +232,25 @@ static void want(struct viewer *viewer)
     viewer->wish = views_want(viewer->views, &wish);
 }
 
+/* One of which too much is unseen gives way to the daemon's own last picture, but for two eyes, which have none.
+ */
+static bool is_good(const struct viewer *viewer)
+{
+    return viewer->settings.stereo || views_unseen(&viewer->made_of) <= (float)PLAN_UNSEEN_MAX;
+}
+
 static void show_view(struct viewer *viewer)
 {
     const uint64_t before = viewer->shows_made ? viewer->made_of.wish : 0;
     if (!views_take(viewer->views, &viewer->made, &viewer->made_of))
         return;
+    viewer->must_draw = true;
+    viewer->shows_made = is_good(viewer);
+    if (!viewer->shows_made)
+        return;
     /* One from a newer key is no answer to a move. */
     const uint64_t moved_ns = viewer->made_of.wish != before ? viewer->made_of.moved_ns : 0;
     metrics_add_view(&viewer->metrics, moved_ns, monotonic_now_ns());
-    viewer->shows_made = viewer->must_draw = true;
     viewer->local_views++;
 }
 

@@ -60,13 +60,6 @@ static void choose_encodings(const struct viewer *viewer, struct message_render 
     view->parts = !is_local;
 }
 
-/* Views that are made here move at the display's rate whatever the daemon's take; clips do not move in them. */
-static void choose_rate(const struct viewer *viewer, struct message_render *view)
-{
-    if (!viewer->local_asked || viewer->tour.clip != TOUR_NONE)
-        view->moving_rate = viewer->options->moving_rate;
-}
-
 static void show(struct viewer *viewer)
 {
     struct message_render view = viewer->view;
@@ -90,7 +83,7 @@ static void show(struct viewer *viewer)
         view.clips_count = 1;
     }
     viewer_ask_local(viewer, &view);
-    choose_rate(viewer, &view);
+    view.moving_rate = viewer->options->moving_rate;
     viewer->must_show = !session_show(viewer->session, &view, &viewer->change);
     viewer->must_look = true; /* frames name a camera from which on they are the new ones */
 }
@@ -98,8 +91,9 @@ static void show(struct viewer *viewer)
 static void look(struct viewer *viewer, bool moving, uint64_t now_ns)
 {
     struct fl_view_camera camera = {.time_s = (float)viewer->tour.time_s, .moving = moving};
-    viewer_aim(viewer, moving, now_ns, &viewer->asked);
-    camera_export(&viewer->asked, &camera);
+    struct viewer_camera aimed;
+    viewer_aim(viewer, moving, now_ns, &aimed);
+    camera_export(&aimed, &camera);
     camera.node = viewer_follows(viewer) ? viewer->followed : 0;
     if (!session_look(viewer->session, &camera, &viewer->command))
         return;
@@ -117,8 +111,7 @@ void viewer_tell(struct viewer *viewer, uint64_t now_ns)
         show(viewer);
     if (!viewer->has_camera)
         return;
-    const bool is_needed = !is_moving || !viewer->local_asked || viewer_needs_picture(viewer, now_ns);
-    if (viewer->must_look && is_needed && now_ns >= viewer->looked_ns + LOOK_PAUSE_NS)
+    if (viewer->must_look && now_ns >= viewer->looked_ns + LOOK_PAUSE_NS)
         look(viewer, is_moving, now_ns);
     else if (viewer->told_moving && !is_moving)
         look(viewer, false, now_ns);

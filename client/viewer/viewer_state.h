@@ -71,12 +71,11 @@ struct viewer {
     struct plan_switch local_switch;
     struct plan_motion motion; /* up to .. */
     struct viewer_camera followed_camera;
-    uint64_t round_ns;               /* from camera to picture, lately */
+    struct plan_pace pace;
     bool local_asked, local_granted; /* the stream was asked to have depths; it has had them since then */
     bool has_keys;                   /* views can be made */
     uint32_t key_frame;              /* number of the frame that the last key was */
     float local_radius;              /* of the sphere that their bound holds in */
-    struct viewer_camera asked;      /* that the daemon was told last: where it was going to be */
     bool is_live;                    /* the last frame is in `live` */
     struct views *views;             /* NULL: none was needed */
     struct views_wish wished;
@@ -111,6 +110,11 @@ struct viewer {
     uint64_t notice_ns; /* until then */
     unsigned screenshots;
 
+    struct viewer_shot {
+        const char *path;
+        struct pixmap picture;
+    } * shots; /* screenshots of the replay that are not written yet */
+    size_t shot_count;
     struct replay replay;
     size_t replay_next;
     uint64_t replay_ns;       /* since when the next event is looked at */
@@ -160,7 +164,6 @@ bool viewer_asks_otherwise(const struct viewer *viewer); /* than it did */
 void viewer_refuse_local(struct viewer *viewer);
 /* The camera that the daemon is told: while it moves, where it will be when the picture is here. */
 void viewer_aim(const struct viewer *viewer, bool moving, uint64_t now_ns, struct viewer_camera *camera);
-bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns); /* while it moves */
 /* What the picture of a key hides. */
 void viewer_take_hidden(struct viewer *viewer, struct fl_frame *frame);
 /* The frame that has `arrived`, which is without its margin afterwards. */
@@ -209,6 +212,10 @@ void viewer_choose_clip(struct viewer *viewer, int clip);
 const struct pixmap *viewer_picture(const struct viewer *viewer); /* that is shown */
 void viewer_hud(struct viewer *viewer, struct hud_state *state);
 bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
+/* One that is written later, so that a replay goes on in time. The path must live until then. */
+bool viewer_keep_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
+/* Of those that are kept; frees them. */
+bool viewer_write_screenshots(struct viewer *viewer, struct fl_error *error);
 void viewer_print_state(struct viewer *viewer, const char *name);
 
 #endif

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define COMPARED_SAMPLES 4u /* of a pixel: the reference may take long */
+#define NEAR_SHARE 0.05     /* of the scene's diagonal: nearer to the eye its middle is nothing to turn about */
 
 uint32_t viewer_primary(const struct viewer *viewer)
 {
@@ -196,20 +197,41 @@ static bool met(const struct fl_frame *frame, double numbers[3])
     return values[3] > 0;
 }
 
-/* If nothing is at the picture's centre, the scene's centre gives the distance. */
-static double distance_from(const struct viewer *viewer, const struct fl_frame *frame)
+static double from_eye(const struct fl_frame *frame, int axis, double place)
 {
-    double place[3], square = 0;
-    const bool has_place = met(frame, place);
+    return place - (double)frame->world_from_view[axis * 4 + 3];
+}
+
+/* Along the view, to the middle of the scene; 0: it is not in front of the eye, or one node of it is framed. */
+static double depth_of_scene(const struct viewer *viewer, const struct fl_frame *frame)
+{
     struct fl_scene_bounds bounds = {.empty = true};
     struct fl_error ignored;
-    if (!has_place && fl_scene_get_bounds(session_scene(viewer->session), &bounds, &ignored) && !bounds.empty)
-        for (int i = 0; i < 3; i++)
-            place[i] = ((double)bounds.lower_world[i] + (double)bounds.upper_world[i]) / 2;
-    else if (!has_place)
+    double depth = 0, diagonal = 0;
+    if (viewer->view.auto_node != 0 || !fl_scene_get_bounds(session_scene(viewer->session), &bounds, &ignored) ||
+        bounds.empty)
+        return 0;
+    for (int i = 0; i < 3; i++) {
+        const double lower = (double)bounds.lower_world[i], upper = (double)bounds.upper_world[i];
+        depth -= (double)frame->world_from_view[i * 4 + 2] * from_eye(frame, i, (lower + upper) / 2);
+        diagonal = hypot(diagonal, upper - lower);
+    }
+    return depth > NEAR_SHARE * diagonal ? depth : 0;
+}
+
+/* The distance of what the view turns about: the middle of the scene, else the surface in the middle of the
+ * picture.
+ */
+static double distance_from(const struct viewer *viewer, const struct fl_frame *frame)
+{
+    const double depth = depth_of_scene(viewer, frame);
+    double place[3], square = 0;
+    if (depth > 0)
+        return depth;
+    if (!met(frame, place))
         return viewer->has_camera ? camera_distance(&viewer->camera) : 1;
     for (int i = 0; i < 3; i++)
-        square += pow(place[i] - (double)frame->world_from_view[i * 4 + 3], 2);
+        square += pow(from_eye(frame, i, place[i]), 2);
     return square > 0 ? sqrt(square) : 1;
 }
 

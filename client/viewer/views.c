@@ -6,6 +6,7 @@
 #include "protocol/common/clock.h"
 
 #include <errno.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -116,27 +117,54 @@ static bool make_eye(struct views *views, const struct views_wish *wish, unsigne
     return true;
 }
 
+/* Pixels along a side of the picture that is made for each that is wanted: more than the key's texels show
+ * nothing. */
+static double density_of(const struct views *views, const struct views_wish *wish, uint32_t eye_height)
+{
+    const double of_key = views->current.height / tan((double)views->current.key.camera.fov_y / 2);
+    const double of_wish = eye_height / tan((double)wish->camera.fov_y / 2);
+    return of_key < of_wish ? of_key / of_wish : 1;
+}
+
+static uint32_t fewer(uint32_t pixels, double density)
+{
+    const long made = lround(pixels * density);
+    return made > 1 ? (uint32_t)made : 1;
+}
+
+/* As it is made. */
+static struct views_wish sized(const struct views *views, const struct views_wish *wish, unsigned eyes)
+{
+    const uint32_t across = wish->over ? 1 : eyes, down = wish->over ? eyes : 1;
+    const double density = density_of(views, wish, wish->height / down);
+    struct views_wish made = *wish;
+    made.width = across * fewer(wish->width / across, density);
+    made.height = down * fewer(wish->height / down, density);
+    return made;
+}
+
 /* Into `picture` and `last`. `may_end`: it is given up when another one is wanted. */
-static bool make(struct views *views, const struct views_wish *wish, enum fl_warp_quality quality, bool may_end,
+static bool make(struct views *views, const struct views_wish *wanted, enum fl_warp_quality quality, bool may_end,
                  struct fl_warp_error *error)
 {
-    if (!reserve(views, wish, error))
+    const unsigned eyes = wanted->baseline > 0 ? 2 : 1;
+    const struct views_wish wish = sized(views, wanted, eyes);
+    if (!reserve(views, &wish, error))
         return false;
-    const unsigned eyes = wish->baseline > 0 ? 2 : 1;
-    const struct fl_warp_view view = {.width = wish->over ? wish->width : wish->width / eyes,
-                                      .height = wish->over ? wish->height / eyes : wish->height,
-                                      .camera = wish->camera,
+    const struct fl_warp_view view = {.width = wish.over ? wish.width : wish.width / eyes,
+                                      .height = wish.over ? wish.height / eyes : wish.height,
+                                      .camera = wish.camera,
                                       .quality = quality,
-                                      .holes = wish->holes,
+                                      .holes = wish.holes,
                                       .is_given_up = may_end ? is_overtaken : NULL,
                                       .given_up_context = views};
     const uint64_t begin_ns = monotonic_now_ns();
     views->last.counts = (struct fl_warp_counts){0};
     for (unsigned eye = 0; eye < eyes; eye++)
-        if (!make_eye(views, wish, eye, eyes, view, error))
+        if (!make_eye(views, &wish, eye, eyes, view, error))
             return false;
     views->begun_ns = begin_ns;
-    views->last.moved_ns = wish->moved_ns;
+    views->last.moved_ns = wish.moved_ns;
     views->last.key_came_ns = views->current.key.came_ns;
     views->last.quality = quality;
     views->last.took_ns = monotonic_now_ns() - begin_ns;
@@ -151,11 +179,29 @@ static bool same_camera(const struct fl_warp_camera *a, const struct fl_warp_cam
     return memcmp(a, b, sizeof(*a)) == 0;
 }
 
+static float distance(const struct fl_warp_camera *a, const struct fl_warp_camera *b)
+{
+    const float *from = a->world_from_view, *to = b->world_from_view;
+    return hypotf(hypotf(to[3] - from[3], to[7] - from[7]), to[11] - from[11]);
+}
+
+/* A picture of motion that was given is no better than what the last view was made of. */
+static bool keeps_key(const struct views *views)
+{
+    const struct views_key *key = &views->current.key;
+    return views->given.is_moving && key->is_final && views->current.number != 0 &&
+           views->last.key == views->current.number &&
+           distance(&views->wish.camera, &key->camera) <= key->radius &&
+           views_unseen(&views->last) <= (float)PLAN_UNSEEN_LITTLE;
+}
+
 /* At rest the first picture of a camera and the last one are prepared, so that motion begins with a view. */
 static bool wants_key(const struct views *views)
 {
-    return views->given.depth && (views->wants || views->given.is_final || views->current.number == 0 ||
-                                  !same_camera(&views->given.camera, &views->current.key.camera));
+    if (!views->given.depth || (views->wants && keeps_key(views)))
+        return false;
+    return views->wants || views->given.is_final || views->current.number == 0 ||
+           !same_camera(&views->given.camera, &views->current.key.camera);
 }
 
 static bool is_of_now(const struct views *views, const struct views_made *made)
@@ -247,7 +293,8 @@ static void take_wish(struct views *views)
     views->last.wish = number;
     views->last.key = views->current.number;
     views->last.layers = views->key_layers;
-    if (number < views->first_wish) /* another motion's */
+    pthread_cond_broadcast(&views->changed); /* its holes may be why another key is wanted */
+    if (number < views->first_wish)          /* another motion's */
         return;
     pixmap_exchange(&views->made_picture, &views->picture);
     views->made = views->last;
@@ -375,7 +422,8 @@ bool views_take(struct views *views, struct pixmap *picture, struct views_made *
 bool views_is_best(struct views *views, const struct views_made *made, uint64_t wish)
 {
     pthread_mutex_lock(&views->lock);
-    const bool is_best = made->wish == wish && made->key == views->keys && made->layers == views->key_layers &&
+    const bool is_newest = made->key == views->keys || (views->given.depth && keeps_key(views));
+    const bool is_best = made->wish == wish && is_newest && made->layers == views->key_layers &&
                          views->given_layer_count == 0 && !views->is_adding && made->quality == FL_WARP_TREE;
     pthread_mutex_unlock(&views->lock);
     return is_best;

@@ -19,13 +19,14 @@ struct views_key {
     float depth_step; /* as of struct fl_frame */
     float radius;     /* metres round its eye */
     bool is_smeared;  /* as of struct fl_warp_key */
+    bool is_moving;   /* of motion: smaller, with fewer samples */
     bool is_final;    /* nothing better of this camera will come */
     uint64_t came_ns; /* when it had arrived */
 };
 
 /* What is wanted. */
 struct views_wish {
-    uint32_t width, height; /* of the picture, all eyes */
+    uint32_t width, height; /* of the picture, all eyes; it comes smaller where its key shows no more */
     struct fl_warp_camera camera;
     float baseline; /* metres between both eyes, which the camera is in the middle of; 0: it is the only one */
     bool over;      /* the left one above the other, not beside it */
@@ -44,10 +45,18 @@ struct views_made {
     uint64_t took_ns, build_ns; /* it, from beginning to end; the work on its key, of all threads */
 };
 
+/* The share of its pixels that no picture shows. What the iteration has not found behind others may well be seen.
+ */
+static inline float views_unseen(const struct views_made *made)
+{
+    return made->counts.outside + (made->quality == FL_WARP_TREE ? made->counts.behind : 0);
+}
+
 struct views *views_create(struct fl_error *error);
 void views_destroy(struct views *views);
 
-/* Takes over the picture's pixels and the depths; what came before is outdated. */
+/* Takes over the picture's pixels and the depths; what came before is outdated. Views go on to be made from a
+ * final picture while they are within its radius and no more than PLAN_UNSEEN_LITTLE of them is unseen. */
 void views_give_key(struct views *views, struct views_key *key);
 /* Of the last key that was given; likewise. One that does not fit it is dropped. */
 void views_give_layer(struct views *views, struct views_layer *layer);

@@ -25,7 +25,7 @@
 #define SPARING_NS 250000000.0
 /* Between pictures with a margin at least: who has them makes views in between, which a better picture helps more
  * than a newer one. */
-#define KEY_NS UINT64_C(100000000)
+#define KEY_NS UINT64_C(50000000)
 /* Of a frame that a link carries within that, a first part would come hardly sooner: it is spared what parts cost,
  * some 7 ms of processors for 1280x720. */
 #define PARTS_NS UINT64_C(30000000)

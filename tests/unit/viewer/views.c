@@ -54,10 +54,15 @@ static int end(void **state)
 
 EACH_TEST(begin, end)
 
+static uint64_t want_of(uint32_t width, uint32_t height, float x)
+{
+    const struct views_wish wish = {.width = width, .height = height, .camera = camera_at(x), .frame_ns = 1000000};
+    return views_want(views, &wish);
+}
+
 static uint64_t want(float x)
 {
-    const struct views_wish wish = {.width = EDGE, .height = EDGE, .camera = camera_at(x), .frame_ns = 1000000};
-    return views_want(views, &wish);
+    return want_of(EDGE, EDGE, x);
 }
 
 static void wait_for_one(void)
@@ -207,6 +212,34 @@ TEST(both_eyes_are_those_of_views_half_the_distance_aside)
         assert_float_equal(made.counts.behind, (left + right) / 2, 1e-6); /* of both: rounding alone */
     }
     fl_warp_destroy(alike.warp);
+}
+
+TEST(a_final_picture_stays_the_key_until_its_views_have_holes)
+{
+    struct views_key key = some_key(100);
+    views_give_key(views, &key);
+    wait_for_best(want(0.01f));
+    key = some_key(50);
+    key.is_moving = true;
+    key.is_final = false;
+    views_give_key(views, &key);
+    const uint64_t near = want(0.02f);
+    wait_for_best(near);
+    assert_int_equal(grey(), 100);
+    assert_true(views_unseen(&made) > 0 && views_unseen(&made) < 0.03f);
+    /* Farther aside more than PLAN_UNSEEN_LITTLE is unseen. */
+    wait_for_best(want(0.15f));
+    assert_int_equal(grey(), 50);
+}
+
+TEST(a_view_has_no_more_pixels_than_its_key_shows)
+{
+    struct views_key key = some_key(100);
+    views_give_key(views, &key);
+    wait_for_best(want_of(4 * EDGE, 2 * EDGE, 0));
+    assert_true(picture.width == 2 * EDGE && picture.height == EDGE);
+    wait_for_best(want_of(EDGE / 2, EDGE / 2, 0));
+    assert_true(picture.width == EDGE / 2 && picture.height == EDGE / 2);
 }
 
 TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
