@@ -508,11 +508,12 @@ analyze: analyze-packages
 ANALYZE_FLAGS := -fanalyzer
 ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
     $(WEB_OBJ) $(HELPER_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
-# Lines that tests reach, as HTML; TESTS chooses among them.
+# Lines that tests reach, as HTML; TESTS chooses among them. A program that may not write its counts, in a sandbox or beyond a limit,
+# fails its test; what the others have reached is shown all the same.
 coverage: coverage-packages
 	$(MAKE) -j$(JOBS) config=coverage all tests
 	find build/coverage -name '*.gcda' -delete
-	python3 tests/tools/run_tests.py build/coverage $(TESTS)
+	-python3 tests/tools/run_tests.py build/coverage $(TESTS)
 	@mkdir -p out/coverage
 	gcovr -j $(JOBS) --root . --filter 'server/' --filter 'client/' --filter 'protocol/' --gcov-ignore-parse-errors \
 	    --html-details out/coverage/index.html --print-summary build/coverage

@@ -15,7 +15,7 @@ import time
 from farlight_test import BIN, Case
 
 IMPORTER = os.path.join(os.path.abspath(BIN), "farlight-import")
-SLOWER = 6 if "sanitize" in str(BIN) else 1
+SLOWER = 6 if any(config in str(BIN) for config in ("sanitize", "coverage")) else 1
 BUSY_S = 120  # that other work on the machine may take meanwhile
 
 OK, ERROR, CREDIT = 0x0001, 0x0002, 0x0007
