@@ -4,6 +4,7 @@ lie, and connections that are cut."""
 import asyncio
 import contextlib
 import importlib.util
+import json
 import os
 import random
 import re
@@ -380,6 +381,47 @@ esac
         np.testing.assert_allclose(picture.normal[:, 8:], np.broadcast_to((0, 0, 1), (16, 8, 3)), atol=1e-5)
         self.assertFalse(picture.colour.flags.writeable)
 
+    def test_what_is_added_is_shown_unless_a_node_shows_it(self):
+        client = self.connect()
+        scene = farlight.Scene()
+        ball = scene.add_spheres([(0, 0, 0)], 1)
+        scene.add_mesh([(5, 0, 0), (6, 0, 0), (5, 1, 0)])
+        scene.add_instances(ball, [farlight.scene.look_at((x, 0, 0), (x, 0, -1)) for x in (-3, 3)])
+        bounds = client.describe(scene)
+        self.assertEqual((list(bounds.lower_world), list(bounds.upper_world)), ([-4, -1, -1], [6, 1, 1]))
+        self.assertEqual(len(scene.objects("node")), 3)
+        hidden = farlight.Scene()
+        hidden.add_spheres([(0, 0, 0)], 1, place=False)
+        with self.assertWarnsRegex(UserWarning, "shows nothing"):
+            client.send(hidden)
+
+    def test_a_pinhole_and_a_pose_put_points_where_they_say(self):
+        """Two small balls; of a principal point that is not the middle, and of OpenCV's axes."""
+        scene = farlight.Scene()
+        places = [(0.5, 0.25, 0), (-0.75, 0.5, -1)]
+        balls = [scene.add_node(scene.add_spheres([place], 0.1)) for place in places]
+        pose = farlight.look_at((1, 2, 4), (0, 0, 0)) @ np.diag([1, -1, -1, 1])
+        K = np.array([[60, 0, 40.5], [0, 60, 20], [0, 0, 1]])
+        camera, size = farlight.Camera.intrinsics(K, 64, 48, pose)
+        frame = self.connect().render(scene, camera, layers="id", samples=1, primary="trace", **size)
+        self.assertEqual(frame.size, (64, 48))
+        np.testing.assert_allclose(frame.K, K, atol=1e-3)  # by the angle of view in floats
+        np.testing.assert_allclose(frame.world_from_view @ np.diag([1, -1, -1, 1]), pose, atol=1e-5)
+        for place, ball in zip(places, balls):
+            ray = K @ (np.linalg.inv(pose) @ [*place, 1])[:3]
+            rows, columns = np.nonzero(frame.mask(ball))
+            # A ball of 3 pixels: its pixels lie evenly round the point, to a pixel.
+            np.testing.assert_allclose([columns.mean() + 0.5, rows.mean() + 0.5], ray[:2] / ray[2], atol=1)
+        for wrong in (np.eye(2), [[60, 0, 99], [0, 60, 20], [0, 0, 1]], [[60, 0, 32], [0, 90, 20], [0, 0, 1]]):
+            with self.assertRaises(farlight.InvalidValue):
+                farlight.Camera.intrinsics(wrong, 64, 48, pose)
+
+    def test_a_notebook_shows_a_frame(self):
+        client, (scene, _) = self.connect(), triangle()
+        picture = client.render(scene, STRAIGHT, width=8, height=8, samples=1)
+        (self.folder / "cell.png").write_bytes(picture._repr_png_())  # pylint: disable=protected-access
+        self.assertEqual(read_png(self.folder / "cell.png")[:2], (8, 8))
+
     def test_only_what_has_changed_is_sent(self):
         client, (scene, material) = self.connect(), triangle()
         first = client.render(scene, STRAIGHT, width=16, height=16)
@@ -505,6 +547,10 @@ esac
             self.assertEqual({name: made[name].shape for name in ("colour", "depth", "normal", "world_from_view")},
                              {"colour": (24, 24, 4), "depth": (24, 24), "normal": (24, 24, 3), "world_from_view": (4, 4)})
             self.assertTrue(np.isfinite(made["depth"]).any())
+        coco = json.loads((self.folder / "set/coco.json").read_text())
+        self.assertEqual([image["file_name"] for image in coco["images"]], ["00000.png", "00001.png"])
+        self.assertLessEqual({one["category_id"] for one in coco["annotations"]}, {one["id"] for one in coco["categories"]})
+        self.assertTrue(coco["annotations"])
         self.expect(python(PACKAGE / "examples/turntable.py", bundled_scenes() / "sphereflake-2.nff", self.folder / "turn", 2), 0)
         self.assertEqual(sorted(path.name for path in (self.folder / "turn").iterdir()), ["000.png", "001.png"])
 

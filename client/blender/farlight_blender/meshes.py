@@ -163,4 +163,4 @@ class Shared:
         if arrays is None:
             return None, False
         more = with_targets(self._mirror.scene, arrays)
-        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], **arrays, **more), bool(more)
+        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], place=False, **arrays, **more), bool(more)

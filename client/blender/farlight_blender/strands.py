@@ -257,7 +257,7 @@ class Shared:
             return None, False
         more = with_targets(self._mirror.scene, arrays)
         material = Object(ObjectKind.MATERIAL, self._material(thing, slot).number)
-        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], material=material, **arrays,
+        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], material=material, place=False, **arrays,
                                            **more), bool(more)
 
     def _fur(self, thing: bpy.types.Object, modifier: bpy.types.Modifier, key: Hashable) -> tuple[Optional[Object], bool]:
@@ -302,5 +302,5 @@ class Shared:
         if self._bent(thing, key, len(thing.data.points)) is not None:
             self._mirror.note(f"{thing.name}: its points move in it while the shutter is open, and are drawn where they are at the frame's time")
         material = Object(ObjectKind.MATERIAL, self._material(thing, 0).number)
-        return self._mirror.scene.add_spheres(*found, material=material, name=thing.name[:100],
+        return self._mirror.scene.add_spheres(*found, material=material, place=False, name=thing.name[:100],
                                               spheres=self._mirror.number(ObjectKind.SPHERES, key))

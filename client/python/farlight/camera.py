@@ -67,6 +67,41 @@ class Camera:
         if not FOV_MIN <= self.fov_degrees <= FOV_MAX:
             raise InvalidValue(f"{self.fov_degrees:g} is not within {FOV_MIN} .. {FOV_MAX}", field="camera.fov_degrees")
 
+    @classmethod
+    def from_matrix(cls, world_from_camera: Numbers, fov_degrees: float = 40.0, *, convention: str = "opengl",
+                    time_s: float = 0.0) -> Camera:
+        """From a 4 x 4 or 3 x 4 pose. convention: "opengl", as of Blender and of Frame.world_from_view, looks along -z with y
+        up; "opencv", as of COLMAP's inverse poses, along +z with y down."""
+        if convention not in ("opengl", "opencv"):
+            raise InvalidValue(f"{convention!r:.80}; allowed: opengl, opencv", field="convention")
+        pose = np.array(arrays.transform(world_from_camera)).reshape(3, 4)
+        sign = 1 if convention == "opengl" else -1
+        eye, look_at, up = pose[:, 3], pose[:, 3] - sign * pose[:, 2], sign * pose[:, 1]
+        return cls(eye.tolist(), look_at.tolist(), up.tolist(), fov_degrees, time_s)
+
+    @classmethod
+    def intrinsics(cls, K: Numbers, width: int, height: int, world_from_camera: Numbers, *,
+                   convention: str = "opencv", time_s: float = 0.0) -> tuple[Camera, dict[str, int]]:
+        """From a 3 x 3 matrix of a pinhole, of pixels the first of which has its middle at (0.5, 0.5), and a pose as of
+        from_matrix(). The camera, and the values of render() that make the picture of that size: one whose principal point is not
+        its middle is a part of a larger one. The point is rounded to half a pixel."""
+        k = arrays.numbers(K, "K", "3 x 3 numbers")
+        if k.shape != (3, 3) or not k[0, 0] > 0 or not abs(k[1, 1] - k[0, 0]) <= 1e-3 * k[0, 0] or abs(k[0, 1]) > 1e-3 * k[0, 0]:
+            raise InvalidValue("has pixels that are not square, or is no matrix of a pinhole", field="K",
+                               remedy="give [[f, 0, cx], [0, f, cy], [0, 0, 1]], and resize the picture if fx and fy differ")
+        values = {"width": width, "height": height}
+        crop = {}
+        for axis, name, size in ((0, "x", width), (1, "y", height)):
+            twice = round(2 * float(k[axis, 2]))  # half pixels from the first edge
+            if not 0 < twice < 2 * size:
+                raise InvalidValue(f"has its principal point outside the picture of {width} x {height}", field="K")
+            crop[f"crop_{name}"] = max(0, size - twice)
+            values["width" if name == "x" else "height"] = max(twice, 2 * size - twice)
+        if any(values[name] != size for name, size in (("width", width), ("height", height))):
+            values.update(crop, crop_width=width, crop_height=height)
+        fov = 2 * math.atan(values["height"] / 2 / ((float(k[0, 0]) + float(k[1, 1])) / 2))
+        return cls.from_matrix(world_from_camera, math.degrees(fov), convention=convention, time_s=time_s), values
+
     def key(self) -> messages.CameraKey:
         """As a job's camera."""
         return messages.CameraKey(self.time_s, self.eye, self.look_at, self.up, math.radians(self.fov_degrees))

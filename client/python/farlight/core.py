@@ -161,6 +161,7 @@ class Core(Connection):
         """Sends what has changed in the scene since the last time; its revision."""
         state = yield from self.open(scene)
         yield from self._until(lambda: not state.is_busy)
+        scene.show_unplaced()
         if state.version == scene.version:
             return state.revision
         state.is_busy = True

@@ -2,14 +2,17 @@
 """Frames as arrays."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Union
 
 import numpy as np
 import numpy.typing as npt
 
+from . import png
 from .errors import InvalidValue
-from .messages import FrameBegin, FrameEnd, Layer, PixelFormat, StructureRow
+from .messages import FrameBegin, FrameEnd, Layer, ObjectKind, PixelFormat, StructureRow
+from .objects import Object
 
 Array = npt.NDArray[Any]
 
@@ -35,11 +38,13 @@ def layer_set(layers: Union[str, Layer, "tuple[str | Layer, ...]", "list[str | L
 class Frame:
     """A picture as it came. `begin` and `end` are all that the daemon says of it: camera, revision, samples, digest,
     rays, times of the stages. Arrays are views of `data`, its pixels, rows from the top, and cannot be written to.
-    `is_checked`: they have the digest that the daemon computed; not known of JPEG, and without libxxhash."""
+    `is_checked`: they have the digest that the daemon computed; not known of JPEG, and without libxxhash. `window`: of a
+    crop, the pixels left of it and above it, and the size of the whole picture."""
     begin: FrameBegin
     end: FrameEnd
     data: memoryview
     is_checked: bool = False
+    window: Union[tuple[int, int, int, int], None] = None
 
     def __repr__(self) -> str:
         width, height = self.size
@@ -108,9 +113,38 @@ class Frame:
         return layer
 
     @property
+    def ids(self) -> Array:
+        """Height x width x 2: the numbers of node and material of the first surface; 0 where there is none."""
+        numbers: Array = self.layer(Layer.ID)[..., :2].astype(np.uint32)
+        return numbers
+
+    def mask(self, thing: Object) -> Array:
+        """Height x width: where the first surface is of that node or material."""
+        if not isinstance(thing, Object) or thing.kind not in (ObjectKind.NODE, ObjectKind.MATERIAL):
+            raise InvalidValue(f"{thing!r:.80} is no node or material", field="mask", remedy="give what an add_ function, find() or "
+                               "objects() of the scene returned")
+        is_there: Array = self.ids[..., 0 if thing.kind == ObjectKind.NODE else 1] == thing.number
+        return is_there
+
+    @property
     def world_from_view(self) -> Array:
-        """4 x 4: the camera, which looks along -z."""
+        """4 x 4: the camera, which looks along -z, with y up. Of OpenCV's, which looks along +z with y down, columns 1 and 2
+        have the other sign."""
         return np.array([*self.begin.world_from_view, 0, 0, 0, 1], dtype=np.float64).reshape(4, 4)
+
+    @property
+    def K(self) -> Array:  # as everybody calls it
+        """3 x 3: from the camera's space, with z along the view and y down, to pixels; the first one's middle is (0.5, 0.5). Of
+        an orthographic camera there is none."""
+        left, above, width, height = self.window or (0, 0, *self.size)
+        if not self.begin.fov_y > 0:
+            raise InvalidValue("the camera is orthographic", field="K")
+        focal = height / 2 / math.tan(self.begin.fov_y / 2)
+        return np.array([[focal, 0, width / 2 - left], [0, focal, height / 2 - above], [0, 0, 1]])
+
+    def _repr_png_(self) -> bytes | None:
+        """For notebooks; floats have no tone map, and show as text."""
+        return png.encode(self.colour) if self.begin.format == PixelFormat.RGBA8 and Layer.BEAUTY in self.layers else None
 
     @property
     def warnings(self) -> list[str]:

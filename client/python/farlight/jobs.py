@@ -63,6 +63,10 @@ class Job:
             raise ProtocolError(f"{begin.size_bytes} bytes, and {attached} attached, where the picture has {most}",
                                 field="frame_begin.size_bytes")
 
+    def _window(self) -> Optional[tuple[int, int, int, int]]:
+        render = self.render
+        return (render.crop_x, render.crop_y, render.width, render.height) if render.crop_width else None
+
     def take(self, message: Message) -> Optional[Frame]:
         """A frame's message; the frame that is complete with it."""
         if isinstance(message, messages.FrameBegin):
@@ -85,6 +89,6 @@ class Job:
             raise ProtocolError(f"frame {message.frame} ends with {len(self.data)} of {self.begun.size_bytes} bytes, "
                                 f"and frame {self.begun.frame} was begun", field="frame_end.frame")
         pixels, is_checked = decode.decode(self.begun, self.data, pixels_bytes(self.begun))
-        frame = Frame(self.begun, message, pixels, is_checked)
+        frame = Frame(self.begun, message, pixels, is_checked, self._window())
         self.begun, self.data, self.came = None, bytearray(), self.came + 1
         return frame

@@ -4,6 +4,7 @@ space to its parent's."""
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Union
@@ -31,6 +32,29 @@ class Scene(Objects):
 
     def __init__(self, name: str = "", sharing: Sharing | str = Sharing.PRIVATE) -> None:
         super().__init__(name, sharing)
+        self._unplaced: dict[Object, None] = {}  # meshes and spheres that no node shows yet
+
+    def set(self, edit: Message) -> Object:
+        if isinstance(edit, messages.SetNode):
+            for kind in (ObjectKind.MESH, ObjectKind.SPHERES):
+                if edit.kind == SHOWN[kind]:
+                    self._unplaced.pop(Object(kind, edit.object), None)
+        return super().set(edit)
+
+    def show_unplaced(self) -> None:
+        """Shows what was added and no node shows. Clients do so before they send the scene; one that shows nothing warns."""
+        for thing in [one for one in self._unplaced if one in self]:
+            self.add_node(thing)
+        self._unplaced.clear()
+        shows = any(isinstance(edit, messages.SetDisc) or isinstance(edit, messages.SetNode) and
+                    edit.kind in (NodeKind.MESH, NodeKind.SPHERES) for _, edit, _ in self._objects.values())
+        if not shows and not self.is_attached:
+            warnings.warn("the scene shows nothing: no node shows a mesh or spheres; add_mesh(), add_spheres() or add_node() do", stacklevel=2)
+
+    def _placed(self, thing: Object, place: bool) -> Object:
+        if place:
+            self._unplaced[thing] = None
+        return thing
 
     # ---- things that are seen
 
@@ -86,11 +110,11 @@ class Scene(Objects):
 
     def add_mesh(self, positions: Numbers, triangles: Numbers | None = None, *, material: Object | None = None,
                  materials: Any = None, normals: Numbers | None = None, tangents: Numbers | None = None,
-                 texcoords: Numbers | None = None, colours: Numbers | None = None, **values: Any) -> Object:
+                 texcoords: Numbers | None = None, colours: Numbers | None = None, place: bool = True, **values: Any) -> Object:
         """positions: n x 3. triangles: m x 3 indices, counter-clockwise where they are in front; None: each three
         positions are one. materials: that of each triangle, or its number, neighbours alike: at most 4096 runs. normals
         n x 3, tangents n x 4, texcoords n x 2, colours n x 3 or 4, linear, of 0 .. 255 or floats of 0 .. 1. Arrays are
-        copied once."""
+        copied once. place: it is shown where its positions are, unless a node shows it by the time that the scene is sent."""
         points = arrays.table(positions, "<f4", 3, "positions")
         if triangles is None and len(points) % 3:
             raise InvalidValue(f"{len(points)} points; allowed without triangles: three for each triangle", field="positions",
@@ -109,11 +133,11 @@ class Scene(Objects):
             given.pop()
         start = {"mesh": self._next(ObjectKind.MESH), "vertex_count": len(points), "triangle_count": len(corners),
                  "arrays": [messages.BlobRef() if one is None else self.blob(one.data) for one in given], "ranges": ranges}
-        return self.set(make(messages.SetMesh, {**start, **values}))
+        return self._placed(self.set(make(messages.SetMesh, {**start, **values})), place)
 
     def add_spheres(self, centres: Numbers, radii: Numbers, *, material: Object | None = None, materials: Any = None,
-                    **values: Any) -> Object:
-        """Exact spheres: centres n x 3, radii n or one for all; materials as of add_mesh()."""
+                    place: bool = True, **values: Any) -> Object:
+        """Exact spheres: centres n x 3, radii n or one for all; materials and place as of add_mesh()."""
         points = arrays.table(centres, "<f4", 3, "centres")
         wanted = f"one positive number, or one for each of the {len(points)} centres"
         sizes = arrays.numbers(radii, "radii", wanted)
@@ -125,7 +149,7 @@ class Scene(Objects):
         packed = arrays.table(packed, "<f4", 4, "radii")
         start = {"spheres": self._next(ObjectKind.SPHERES), "sphere_count": len(points), "arrays": [self.blob(packed.data)],
                  "ranges": self._ranges(material, materials, len(points))}
-        return self.set(make(messages.SetSpheres, {**start, **values}))
+        return self._placed(self.set(make(messages.SetSpheres, {**start, **values})), place)
 
     def add_disc(self, centre: Numbers, normal: Numbers, radius: float, *, material: Object | None = None,
                  **values: Any) -> Object:
