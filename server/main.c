@@ -12,6 +12,7 @@
 #include "engine/engine.h"
 #include "session/daemon.h"
 #include "session/keeper.h"
+#include "protocol/common/standard.h"
 #include "protocol/plain_text.h"
 #include "protocol/version.h"
 #include "store/store.h"
@@ -286,6 +287,7 @@ int main(int argc, char **argv)
     struct config config;
     struct error error = {0};
     argp_err_exit_status = 2;
+    open_standard_descriptors();
     argp_parse(&argp, argc, argv, 0, NULL, &arguments);
     if (!read_config(&config, &arguments, &error))
         return fail(&error);

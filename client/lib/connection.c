@@ -369,6 +369,7 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
             "the socket's path has characters with a meaning for the shell; use letters, digits and /._-+@%%,=");
     snprintf(host, sizeof(host), "%.*s", (int)host_bytes, where);
     const char *const arguments[] = {"-T", "--", host, "farlight", "bridge", socket_address, NULL};
+    connection->process.keeps_environment = true; /* its agent's among them */
     return fl_process_start(&connection->process, "ssh", FL_WIRING_STANDARD, arguments, fd, error);
 }
 
@@ -385,6 +386,7 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
     int fd = -1;
     if (!options->server) {
         connection->local = true;
+        connection->process.keeps_environment = true; /* drivers have many variables */
         if (!fl_process_start(&connection->process, "farlightd", FL_WIRING_DESCRIPTOR, arguments, &fd, error))
             return false;
     } else if (strncmp(options->server, "ssh:", 4) == 0) {

@@ -18,6 +18,8 @@ struct fl_process {
     int input_fd;          /* > 0: its standard input, set by the caller; it stays the caller's. 0: none */
     int talk_fd;           /* a memory file with its standard output and error; -1: none */
     bool has_large_arrays; /* set by the caller: its memory comes in huge pages, where the C library can do that */
+    bool keeps_environment; /* set by the caller: it gets all variables, as a program that reads no files of others
+                             */
     char name[32];
 };
 

@@ -5,6 +5,7 @@
 #include "lib/text.h"
 #include "viewer/input.h"
 #include "viewer/viewer.h"
+#include "protocol/common/standard.h"
 #include "protocol/version.h"
 
 #include <errno.h>
@@ -401,6 +402,7 @@ int main(int argc, char **argv)
                                      .help_filter = help_filter};
     static struct command_line line;
     argp_err_exit_status = CLI_USAGE;
+    open_standard_descriptors();
     if (!read_all(&line, &argp, argc, argv))
         return cli_report(&line.job.error);
     struct fl_error error = {0};

@@ -4,6 +4,8 @@ import contextlib
 import fcntl
 import json
 import os
+import pathlib
+import os
 import pty
 import re
 import shutil
@@ -261,6 +263,34 @@ class BadInput(Case):
         self.assertEqual(child.returncode, 130, errors)
         for name in self.leftovers():
             read_png(self.folder / name)  # complete, or it would not be here
+
+    def test_a_hang_up_that_is_ignored_ends_nothing(self):
+        """As nohup starts a program."""
+        pattern = self.folder / "%04d.png"
+        with subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--frames", "1-8", "--orbit",
+                               "--size", "96x72", "-o", pattern], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                              preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as child:
+            deadline = time.monotonic() + farlight_test.TIMEOUT_S
+            while not any(self.folder.iterdir()) and time.monotonic() < deadline and child.poll() is None:
+                time.sleep(0.02)
+            self.assertIsNone(child.poll(), "it has ended before the signal came")
+            for process in (child.pid, *(pathlib.Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split())):
+                os.kill(int(process), signal.SIGHUP)
+            _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(child.returncode, 0, errors)
+        self.assertEqual(len(self.leftovers()), 8)
+
+    def test_programs_go_on_without_standard_descriptors(self):
+        for closed in ("<&- >&- 2>&-", "<&- 2>&-", ">&-"):
+            for name in ("a.%d.png", "a.gif"):
+                result = subprocess.run(["sh", "-c", f'exec "$0" "$@" {closed}', BIN / "farlight", "animate",
+                                         bundled_scenes() / "teapot.glb", "--frames", "1-2", "--size", "32x24", "-o",
+                                         self.folder / name], check=False, timeout=farlight_test.TIMEOUT_S,
+                                        stderr=subprocess.DEVNULL)
+                self.assertEqual(result.returncode, 0, (closed, name))
+            self.assertEqual(self.leftovers(), ["a.1.png", "a.2.png", "a.gif"])
+            for file in self.folder.iterdir():
+                file.unlink()
 
 
 class ThroughADaemon(Case):

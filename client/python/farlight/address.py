@@ -17,6 +17,8 @@ from .errors import ConnectionLost, Error, FileFailed, InvalidValue, TimedOut
 
 REMOTE_SOCKET = "/run/farlight/farlight.sock"
 TRY_AGAIN_STATUS, FIRST_SIGNAL_STATUS = 75, 128  # of our programs; ssh has 255
+# What a program needs that reads files of others; tokens and passwords are not for it (client/lib/process.c).
+PASSED = re.compile("PATH|LANG|LANGUAGE|LC_.*|TZ|TZDIR|LD_.*|GLIBC_.*|GCOV_.*|LLVM_PROFILE_FILE|(A|L|UB)SAN_OPTIONS|FARLIGHT_UNCONFINED")
 TALK_BYTES = 16 << 20  # that ssh may say before it is ended: another host chooses part of it
 
 
@@ -100,9 +102,11 @@ def start_program(name: str, arguments: list[str], remote: tuple[str, str] = (""
             process = subprocess.Popen([path, *arguments], stdin=theirs.fileno(), stdout=theirs.fileno(), stderr=talk)
             _bound_talk(process.pid)
         else:
+            environment = {variable: value for variable, value in os.environ.items() if PASSED.fullmatch(variable)}
             # In a process group of its own: a Ctrl-C is for us, and we end it properly.
             process = subprocess.Popen([path, "--fd", str(theirs.fileno()), *arguments], pass_fds=[theirs.fileno()],
-                                       stdin=subprocess.DEVNULL, stdout=talk, stderr=talk, process_group=0)
+                                       stdin=subprocess.DEVNULL, stdout=talk, stderr=talk, process_group=0,
+                                       env=None if name == "farlightd" else environment)
     except OSError as why:
         ours.close()
         talk.close()
