@@ -57,7 +57,7 @@ static const struct argp_option option_table[] = {
      "Let clients with the key of FILE come in from everywhere, on sealed connections ('farlight key' makes one)",
      0},
     {"reader-key-file", KEY_READER_KEY, "FILE", 0, "The same for clients who may look, but change nothing", 0},
-    {"insecure", KEY_INSECURE, NULL, 0, "Let TCP listen beyond loopback, open to everybody and unencrypted", 0},
+    {"insecure", KEY_INSECURE, NULL, 0, "Let TCP be open to everybody and unencrypted, also beyond loopback", 0},
     {"dump-config", KEY_DUMP, NULL, 0, "Print all options with their values as a configuration file, and exit", 0},
     {0},
 };
