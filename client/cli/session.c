@@ -78,13 +78,32 @@ static bool settle(struct session *session, struct fl_error *error)
            cli_settle(session->job, scene, session->is_series, error);
 }
 
+/* Without a number of attempts a duration is the limit. */
+static double seconds_left(const struct session *session)
+{
+    const struct cli_retries *retries = &session->job->retries;
+    const double for_s = retries->has_duration ? retries->for_s : retries->has_count ? INFINITY : DEFAULT_RETRY_S;
+    return for_s - (double)(monotonic_now_ns() - session->lost_ns) * 1e-9;
+}
+
+/* A daemon that does not answer takes no longer than it is to be tried; one of our own has its time to start. */
+static unsigned connect_timeout_ms(const struct session *session)
+{
+    const struct cli_job *job = session->job;
+    if (!job->server || (session->failures == 0 && !job->retries.has_duration))
+        return 0;
+    return cli_connect_timeout_ms(session->failures > 0 ? seconds_left(session) : job->retries.for_s);
+}
+
 /* The importer loads its libraries while the daemon starts, and the exporter while the importer runs: once the
  * scene is loaded the daemon uses all processors. */
 static bool load_scene(struct session *session, struct fl_error *error)
 {
     struct cli_loading *loading = &session->loading;
-    *loading =
-        (struct cli_loading){.job = session->job, .progress = &session->progress, .again = session->was_loaded};
+    *loading = (struct cli_loading){.job = session->job,
+                                    .progress = &session->progress,
+                                    .again = session->was_loaded,
+                                    .timeout_ms = connect_timeout_ms(session)};
     if (!cli_loading_begin(loading, error))
         return false;
     session->was_reached = true;
@@ -324,14 +343,6 @@ static bool may_be_retried(const struct session *session, const struct fl_error 
            (session->was_reached || error->retryable || job->retries.has_duration);
 }
 
-/* Without a number of attempts a duration is the limit. */
-static double seconds_left(const struct session *session)
-{
-    const struct cli_retries *retries = &session->job->retries;
-    const double for_s = retries->has_duration ? retries->for_s : retries->has_count ? INFINITY : DEFAULT_RETRY_S;
-    return for_s - (double)(monotonic_now_ns() - session->lost_ns) * 1e-9;
-}
-
 /* Longer each time, and no longer than is left. False: interrupted. */
 static bool pause_before_retry(const struct session *session, uint32_t min_ms, struct fl_error *error)
 {
@@ -358,8 +369,8 @@ static bool recover(struct session *session, struct fl_error *error)
     const struct cli_retries *retries = &session->job->retries;
     if (!may_be_retried(session, error))
         return false;
-    if (session->failures == 0)
-        session->lost_ns = monotonic_now_ns();
+    if (session->failures == 0) /* a daemon that does not answer is lost from the beginning of the attempt */
+        session->lost_ns = session->loading.connection ? monotonic_now_ns() : session->loading.connect_begin_ns;
     if ((retries->has_count && session->failures >= retries->count) || seconds_left(session) <= 0) {
         if (session->failures > 0 && !session->job->quiet)
             fprintf(stderr, "farlight: given up after %u attempt%s in %.0f s\n", session->failures,

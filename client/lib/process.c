@@ -276,25 +276,56 @@ int fl_process_end(struct fl_process *process, unsigned grace_ms)
     return status;
 }
 
-/* The last non-empty line of the child's log. */
-static void last_line(int fd, char *line, size_t line_bytes)
+/* Where the line begins that ends before `end`. */
+static size_t line_start(const char *text, size_t end)
 {
-    char tail[2048];
-    line[0] = '\0';
+    while (end > 0 && text[end - 1] != '\n')
+        end--;
+    return end;
+}
+
+/* How many bytes of "NAME: " a line begins with, as our programs say what is wrong. */
+static size_t name_bytes(const char *name, const char *line, size_t bytes)
+{
+    const size_t count = strlen(name);
+    return bytes > count + 2 && memcmp(line, name, count) == 0 && line[count] == ':' ? count + 2 : 0;
+}
+
+/* The last non-empty line of the child's log; of several that have the program's name in front, which are an error
+ * and its remedy, all, without the name. */
+static void last_lines(const struct fl_process *process, char *words, size_t words_bytes)
+{
+    char tail[2049];
+    const int fd = process->talk_fd;
+    words[0] = '\0';
     const off_t size = fd >= 0 ? lseek(fd, 0, SEEK_END) : 0;
     if (size <= 0)
         return;
-    const off_t from = size > (off_t)sizeof(tail) ? size - (off_t)sizeof(tail) : 0;
-    const ssize_t got = pread(fd, tail, sizeof(tail), from);
+    const off_t most = sizeof(tail) - 1, from = size > most ? size - most : 0;
+    const ssize_t got = pread(fd, tail, sizeof(tail) - 1, from);
     size_t end = got > 0 ? (size_t)got : 0;
+    tail[end] = '\0';
     while (end > 0 && (tail[end - 1] == '\n' || tail[end - 1] == ' '))
         end--;
-    size_t start = end;
-    while (start > 0 && tail[start - 1] != '\n')
-        start--;
-    const bool is_greeting =
-        end - start >= 5 && memcmp(tail + start, "READY", 5) == 0; /* of a daemon that starts */
-    snprintf(line, line_bytes, "%.*s", is_greeting ? 0 : (int)(end - start), tail + start);
+    size_t start = line_start(tail, end);
+    if (end - start >= 5 && memcmp(tail + start, "READY", 5) == 0) /* of a daemon that starts */
+        return;
+    for (size_t before = start; before > 0 && name_bytes(process->name, tail + start, end - start) > 0;) {
+        before = line_start(tail, before - 1);
+        if (name_bytes(process->name, tail + before, start - before) == 0)
+            break;
+        start = before;
+    }
+    size_t used = 0;
+    while (start < end && used < words_bytes) {
+        size_t bytes = strcspn(tail + start, "\n");
+        bytes = bytes < end - start ? bytes : end - start;
+        const size_t skipped = name_bytes(process->name, tail + start, bytes);
+        const int written = snprintf(words + used, words_bytes - used, "%s%.*s", used > 0 ? "; " : "",
+                                     (int)(bytes - skipped), tail + start + skipped);
+        used += written > 0 ? (size_t)written : words_bytes;
+        start += bytes + 1;
+    }
 }
 
 bool fl_process_has_refused(const struct fl_process *process)
@@ -308,11 +339,11 @@ bool fl_process_has_refused(const struct fl_process *process)
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes)
 {
     char line[400], how[80] = "";
-    last_line(process->talk_fd, line, sizeof(line));
+    last_lines(process, line, sizeof(line));
     if (process->pid > 0 && fl_process_has_ended(process, grace_ms)) {
         siginfo_t info = {0};
         waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT);
-        last_line(process->talk_fd, line, sizeof(line));
+        last_lines(process, line, sizeof(line));
         if (info.si_code == CLD_EXITED)
             snprintf(how, sizeof(how), "%s ended with status %d", process->name, info.si_status);
         else

@@ -330,6 +330,8 @@ static void fill(struct command_line *line)
     viewer->has_framing = job->has_framing;
     viewer->clip = job->clip_count > 0 ? job->clips[0].which : NULL;
     viewer->speed = job->clip_count > 0 ? job->clips[0].speed : 1;
+    viewer->has_retry_for = job->retries.has_duration;
+    viewer->retry_for_s = job->retries.for_s;
     viewer->interrupt_fd = cli_interrupt_fd();
     viewer->interrupt_signal = cli_interrupt_signal;
     viewer->note = job->quiet ? NULL : on_note;

@@ -43,9 +43,9 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
         snprintf(text, sizeof(text), "rendering the first picture");
         return;
     }
-    state->status = was_live ? HUD_LOST : HUD_LOADING;
     const struct fl_error *error = session_error(viewer->session);
-    if (was_live && error->code != FL_ERROR_NONE) {
+    state->status = was_live ? HUD_LOST : HUD_LOADING;
+    if (error->code != FL_ERROR_NONE) {
         const uint64_t retry_ns = session_retry_ns(viewer->session), now_ns = state->now_ns;
         const double left_s = retry_ns > now_ns ? (double)(retry_ns - now_ns) * 1e-9 : 0;
         snprintf(text, sizeof(text), "%.80s; trying again in %.1f s", error->text, left_s);

@@ -282,7 +282,7 @@ class Lies(Case):
 
     def test_a_program_that_cannot_start_says_why(self):
         fake = self.folder / "farlightd"
-        fake.write_text("#!/bin/sh\necho 'no device gives OpenGL 4.5' >&2\nexit 1\n")
+        fake.write_text("#!/bin/sh\necho log >&2\necho 'farlightd: no device gives OpenGL 4.5\nfarlightd: install one' >&2\nexit 1\n")
         fake.chmod(0o755)
         environment = {**os.environ, "FARLIGHT_LIBEXEC": str(self.folder)}
         environment.pop("FARLIGHT_SERVER", None)
@@ -290,7 +290,7 @@ class Lies(Case):
             for connect in (farlight.connect, lambda: asyncio.run(farlight.aio.connect())):
                 with self.assertRaises(farlight.ConnectionLost) as raised:
                     connect()
-                self.assertIn("farlightd ended with status 1: no device gives OpenGL 4.5", str(raised.exception))
+                self.assertIn("farlightd ended with status 1: no device gives OpenGL 4.5; install one", str(raised.exception))
                 self.assertFalse(raised.exception.retryable)
         with unittest.mock.patch.dict(os.environ, {"FARLIGHT_LIBEXEC": "", "PATH": str(self.folder / "none")}):
             with self.assertRaises(farlight.FileFailed) as raised:

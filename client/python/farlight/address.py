@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import re
 import shlex
@@ -29,6 +30,7 @@ class Link:
     process: Optional["subprocess.Popen[bytes]"] = None
     talk: Optional[IO[bytes]] = None  # what the program says
     remote: tuple[str, str] = ("", "")  # of ssh: the host, and the daemon's address there
+    name: str = ""  # of the program
     server: str = "farlightd"  # the address, where there is one
     is_final: bool = False
     words: str = ""  # how it ended, once that was asked
@@ -40,7 +42,9 @@ class Link:
         number = self.talk.fileno()  # whose place the program shares
         end = os.pread(number, 2048, max(0, os.fstat(number).st_size - 2048))
         lines = [one for one in end.strip().splitlines() if not one.startswith(b"READY")]
-        line = lines[-1][:400] if lines else b""
+        name = self.name.encode() + b": "  # in front of an error and, in the next line, its remedy
+        told = [one.removeprefix(name) for one in itertools.takewhile(lambda one: one.startswith(name), reversed(lines))]
+        line = b"; ".join(reversed(told or lines[-1:]))[:400]
         return "".join(one if one.isprintable() else "?" for one in line.decode("utf-8", "replace"))
 
     def last_words(self) -> tuple[str, bool]:
@@ -113,7 +117,7 @@ def start_program(name: str, arguments: list[str], remote: tuple[str, str] = (""
         raise FileFailed(f"cannot be started: {why.strerror}", field=path) from None
     finally:
         theirs.close()
-    return Link(ours, process, talk, remote)
+    return Link(ours, process, talk, remote, name)
 
 
 def _connect(server: str, family: int, where: object, timeout: float) -> socket.socket:
