@@ -179,14 +179,15 @@ static json_t *edit_json(const struct viewer_edit *edit)
 {
     const struct fl_object_state *state = &edit->state;
     json_t *fields = json_object();
-    for (size_t i = 0; i < state->count; i++) {
+    for (size_t i = 0; edit->has_state && i < state->count; i++) {
         json_t *values = json_array();
         for (unsigned k = 0; k < state->fields[i].field.count; k++)
             json_array_append_new(values, json_real(state->fields[i].values[k]));
         json_object_set_new(fields, state->fields[i].field.name, values);
     }
-    return json_pack("{s:s, s:i, s:s, s:s, s:o}", "kind", edit->hud.tabs[edit->tab], "object", (int)state->id,
-                     "name", state->name, "row", edit->hud.rows[edit->chosen].name, "fields", fields);
+    return json_pack("{s:s, s:s, s:i, s:s, s:s, s:o}", "kind", edit->hud.tabs[edit->tab], "title", edit->hud.title,
+                     "object", edit->has_state ? (int)state->id : 0, "name", edit->has_state ? state->name : "",
+                     "row", edit->hud.rows[edit->chosen].name, "fields", fields);
 }
 
 void viewer_print_state(struct viewer *viewer, const char *name)
@@ -219,7 +220,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",
                                       viewer->heat_figures.max, "beyond", viewer->heat_figures.beyond));
-    if (line && viewer->edit.shown && viewer->edit.has_state)
+    if (line && viewer->edit.shown)
         json_object_set_new(line, "edit", edit_json(&viewer->edit));
     if (line && viewer->notice_ns > state.now_ns)
         json_object_set_new(line, "notice", json_string(viewer->notice));
