@@ -377,14 +377,19 @@ static bool listen_at(struct gateway *gateway, const struct web_address *address
     return true;
 }
 
+/* Of several links each says what it gives, behind a blank, where neither terminals nor scripts take it for a part
+ * of the link. */
 static void announce(const struct gateway *gateway)
 {
+    static const char *const gives[WEB_RIGHT_COUNT] = {
+        [WEB_LOOKS] = "  to look", [WEB_EDITS] = "  to look and edit"};
+    const bool has_several = gateway->options->allow_edit;
     const struct web_address *address = gateway->options->listens;
     char host[NAME_BYTES];
     web_address_print(address, host, sizeof(host));
-    for (int right = 0; right <= (gateway->options->allow_edit ? WEB_EDITS : WEB_LOOKS); right++)
-        printf("http://%s:%d/%s/\n", address->is_any ? gateway->machine : host, gateway->port,
-               gateway->links.tokens[right]);
+    for (int right = 0; right <= (has_several ? WEB_EDITS : WEB_LOOKS); right++)
+        printf("http://%s:%d/%s/%s\n", address->is_any ? gateway->machine : host, gateway->port,
+               gateway->links.tokens[right], has_several ? gives[right] : "");
     fflush(stdout);
 }
 

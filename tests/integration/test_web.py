@@ -377,6 +377,7 @@ class Edit(Case):
 
     def test_other_link_may_not_edit(self):
         self.assertNotEqual(self.gateway.path, self.gateway.edit_path)
+        self.assertEqual((self.gateway.link_gives, self.gateway.edit_link_gives), ("to look", "to look and edit"))
         for message in ({"list": {"kind": "node", "match": ""}}, {"undo": True}):
             view = self.view(self.gateway.path)
             with self.assertRaises(ConnectionError, msg=f"{message} is answered"):
