@@ -251,6 +251,23 @@ class BadInput(Case):
         self.assertIn("x.exr", result.stderr)
         self.assertEqual(self.leftovers(), [])
 
+    def test_no_space_may_be_there_later(self):
+        """On a disk of 4 KB; the status asks a queue for another try."""
+        full = self.folder / "full"
+        full.mkdir()
+        alone = ["unshare", "--map-root-user", "--mount", "sh", "-c", 'mount -t tmpfs -o size=4k none "$0" && exec "$@"', full]
+        if subprocess.run([*alone, "true"], check=False, capture_output=True).returncode != 0:
+            self.skipTest("no file system can be mounted here")
+        for name in ("x.png", "x.exr", "x.tiff", "%d.png", "x.mp4", "x.y4m"):
+            what = ["render", "--size", "96x80"] if name.startswith("x.") and name[2:] in ("png", "exr", "tiff") else \
+                ["animate", "--frames", "1-9", "--orbit", "--size", "240x160", "--integrator", "distributed"]
+            with self.subTest(name):
+                result = subprocess.run([*alone, BIN / "farlight", *what, bundled_scenes() / "teapot.glb", "-o", full / name],
+                                        check=False, capture_output=True, text=True, timeout=farlight_test.TIMEOUT_S)
+                self.assertEqual(result.returncode, 75, result.stderr)
+                self.assertIn("No space left", result.stderr)
+                self.assertNotIn("trying again", result.stderr)
+
     def test_an_interrupt_ends_an_animation_cleanly(self):
         pattern = self.folder / "%04d.png"
         child = subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--frames", "1-500",
