@@ -169,6 +169,9 @@ struct cli_noise {
     uint32_t held, total;
 };
 void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *noise);
+/* A line in the log for a picture that is complete: its number, seconds, the memory of the command and of what it
+ * has started, and its file. Nothing where a bar is drawn. */
+void cli_progress_frame(const struct cli_progress *progress, uint32_t frame, double seconds, const char *path);
 /* Removes the bar, so that other output can be written. */
 void cli_progress_clear(struct cli_progress *progress);
 /* The bar of a finished command stays; any other is removed. */

@@ -42,6 +42,11 @@ struct session {
     struct cli_timings *timings;
     struct cli_trace_file *trace; /* NULL: none is wanted */
     struct cli_progress progress;
+    bool is_being_written; /* a picture of a series: */
+    uint32_t written_frame;
+    uint64_t frame_ns;      /* when the picture before it had come */
+    double written_seconds; /* from then until it had */
+    char written_path[4352];
     uint64_t begin_ns, export_ns;
 };
 
@@ -184,11 +189,34 @@ static bool write_frame(struct session *session, const struct fl_frame *frame, s
     return written;
 }
 
+/* The picture that was being written is complete: another one is, or the sinks are finished. */
+static void log_frame(struct session *session)
+{
+    if (session->is_being_written)
+        cli_progress_frame(&session->progress, session->written_frame, session->written_seconds,
+                           session->written_path);
+    session->is_being_written = false;
+}
+
+static void note_frame(struct session *session, const struct fl_frame *frame)
+{
+    const uint64_t now_ns = monotonic_now_ns();
+    log_frame(session);
+    session->is_being_written = session->is_series;
+    session->written_frame = frame->frame;
+    session->written_seconds =
+        (double)(now_ns - (session->frame_ns > 0 ? session->frame_ns : session->begin_ns)) * 1e-9;
+    session->frame_ns = now_ns;
+    cli_sinks_path(&session->sinks, session->written_path, sizeof(session->written_path));
+}
+
 static bool finish_sinks(struct session *session, struct fl_error *error)
 {
     const uint64_t begin_ns = monotonic_now_ns();
     session->sink_failed = !cli_sinks_finish(&session->sinks, error);
     add_export(session, -1, begin_ns);
+    if (!session->sink_failed)
+        log_frame(session);
     return !session->sink_failed;
 }
 
@@ -206,6 +234,8 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
         const bool written = write_frame(session, frame, error), wanted = is_wanted(session, frame);
         session->noise = frame->noise;
         session->failures = 0;
+        if (written && wanted)
+            note_frame(session, frame);
         fl_frame_destroy(frame);
         if (!written)
             return false;

@@ -250,6 +250,13 @@ static bool write_part(struct cli_sink *sink, const struct fl_frame *frame, stru
     return written;
 }
 
+void cli_sinks_path(const struct cli_sinks *sinks, char *path, size_t path_bytes)
+{
+    const struct cli_sink *sink = &sinks->items[0];
+    const bool is_series = !sink->to_stdout && sink->y4m_fd == 0 && !sink->video && sink->path[0] != '\0';
+    snprintf(path, path_bytes, "%s", is_series ? sink->path : sink->output.path);
+}
+
 bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, struct fl_error *error)
 {
     for (size_t i = 0; i < sinks->count; i++) {

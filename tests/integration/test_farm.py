@@ -64,12 +64,26 @@ class Digests(Case):
 
 
 class Progress(Case):
+    def each_frame_has_a_line(self, result):
+        told = re.findall(r"^frame (\d+): \d+\.\d\d s, (\d+) MB, (.*)$", self.expect(result, 0).stderr, re.M)
+        self.assertEqual([(number, path) for number, _, path in told], [(str(i), f"{self.folder}/{i}.png") for i in range(1, 5)])
+        for _, megabytes, _ in told:  # of the command and the daemon that it has started
+            self.assertGreater(int(megabytes), 10)
+
+    def test_a_log_has_a_line_for_each_frame_that_is_complete(self):
+        output = ["--frames", "1-4", "-o", self.folder / "%d.png"]
+        self.each_frame_has_a_line(animate(*output))
+        self.assertNotIn("frame 1", self.expect(animate(*output, "-q"), 0).stderr)
+        video = self.expect(animate("--frames", "1-2", "-o", self.folder / "x.y4m"), 0).stderr
+        self.assertEqual(re.findall(r"^frame (\d+): .* MB, (.*)$", video, re.M), [(str(i), f"{self.folder}/x.y4m") for i in (1, 2)])
+
     def test_open_job_description_reads_it_on_standard_output(self):
         output = ["--frames", "1-4", "-o", self.folder / "%d.png"]
         lines = self.expect(animate(*output, "--progress", "openjd"), 0).stdout.splitlines()
         shares = [float(line.split(": ")[1]) for line in lines if line.startswith("openjd_progress: ")]
         self.assertEqual((shares, shares[-1]), (sorted(shares), 100))
         self.assertTrue(all(re.match(r"openjd_(progress: \d+\.\d|status: .+)$", line) for line in lines), lines)
+        self.each_frame_has_a_line(animate(*output, "--progress", "openjd"))
         result = self.expect(farlight("render", "x.glb", "-o", "-", "--progress", "openjd"), 2)
         self.assertIn("--progress", result.stderr)
         self.assertIn("bar, lines and openjd", self.expect(animate(*output, "--progress", "loud"), 2).stderr)
