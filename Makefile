@@ -303,7 +303,7 @@ $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode e
   warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp) $(SERVING_WRAP)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(addprefix $(B)/client/web/,address.o callers.o links.o outage.o queue.o) $(MODEL_OBJ)
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ)
 # Measurements of the benchmark register themselves (tests/bench/bench.h).
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c,$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
@@ -332,7 +332,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libexif-dev libopenexr-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libstb-dev libassimp-dev libexpat1-dev libminizip-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
+TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-yaml python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
 STACK_PACKAGES := mesa-vulkan-drivers

@@ -48,11 +48,13 @@ static const struct option options[] = {
      "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT. A path may have blanks"},
     {"server", "readers", ANYTIME, OPTION_TEXT, AT(readers), "", 0, 0, "",
      "Read-only users of the Unix socket: names or numbers, separated by blanks. They attach to shared scenes and "
-     "render them, but change nothing. This does not apply to TCP on loopback, where users are not identified"},
+     "render them, but change nothing. This does not apply to TCP on loopback, where users are not identified: a key "
+     "closes it"},
     {"server", "insecure", START, OPTION_BOOL, AT(insecure), "no", 0, 1, "",
-     "Let TCP listen beyond loopback without a key: nothing is encrypted, no client is authenticated"},
+     "Let TCP clients connect without a key, from beyond loopback too: nothing is encrypted, no client is authenticated"},
     {"server", "key_file", ANYTIME, OPTION_TEXT, AT(key_file), "", 0, 0, "",
-     "File of a key, created by 'farlight key': clients with the key may connect from everywhere, over a sealed link"},
+     "File of a key, created by 'farlight key': clients with the key may connect from everywhere, over a sealed link, "
+     "and TCP needs it, on loopback too"},
     {"server", "reader_key_file", ANYTIME, OPTION_TEXT, AT(reader_key_file), "", 0, 0, "",
      "The same for read-only clients"},
     {"server", "log_level", ANYTIME, OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},

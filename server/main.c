@@ -12,6 +12,7 @@
 #include "engine/engine.h"
 #include "session/daemon.h"
 #include "session/keeper.h"
+#include "protocol/common/standard.h"
 #include "protocol/plain_text.h"
 #include "protocol/version.h"
 #include "store/store.h"
@@ -56,7 +57,7 @@ static const struct argp_option option_table[] = {
      "Let clients with the key of FILE come in from everywhere, on sealed connections ('farlight key' makes one)",
      0},
     {"reader-key-file", KEY_READER_KEY, "FILE", 0, "The same for clients who may look, but change nothing", 0},
-    {"insecure", KEY_INSECURE, NULL, 0, "Let TCP listen beyond loopback, open to everybody and unencrypted", 0},
+    {"insecure", KEY_INSECURE, NULL, 0, "Let TCP be open to everybody and unencrypted, also beyond loopback", 0},
     {"dump-config", KEY_DUMP, NULL, 0, "Print all options with their values as a configuration file, and exit", 0},
     {0},
 };
@@ -286,6 +287,7 @@ int main(int argc, char **argv)
     struct config config;
     struct error error = {0};
     argp_err_exit_status = 2;
+    open_standard_descriptors();
     argp_parse(&argp, argc, argv, 0, NULL, &arguments);
     if (!read_config(&config, &arguments, &error))
         return fail(&error);

@@ -169,6 +169,9 @@ struct cli_noise {
     uint32_t held, total;
 };
 void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *noise);
+/* A line in the log for a picture that is complete: its number, seconds, the memory of the command and of what it
+ * has started, and its file. Nothing where a bar is drawn. */
+void cli_progress_frame(const struct cli_progress *progress, uint32_t frame, double seconds, const char *path);
 /* Removes the bar, so that other output can be written. */
 void cli_progress_clear(struct cli_progress *progress);
 /* The bar of a finished command stays; any other is removed. */
@@ -356,6 +359,7 @@ struct cli_loading {
     enum protocol_sharing sharing;
     const char *scene_name;              /* NULL: the model's file name */
     const char *const *daemon_arguments; /* of a private one; NULL: none */
+    unsigned timeout_ms;                 /* as of fl_connect */
     struct fl_load_options load;
     struct fl_connection *connection;
     struct fl_scene *scene;
@@ -388,6 +392,11 @@ bool cli_is_temporary(const struct fl_error *error);
  * bounds, and differs by a quarter by chance, so that many clients of one daemon do not come back at once. */
 uint32_t cli_retry_pause_ms(unsigned failures, uint32_t min_ms);
 bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interrupted */
+/* A value of --retry-for; false: the error says what is allowed. */
+bool cli_read_retry_for(const char *value, struct cli_retries *retries, struct fl_error *error);
+/* The time for a connection of which `left_s` are left to retry: at least a second, at most the library's own
+ * time, which 0 stands for. */
+unsigned cli_connect_timeout_ms(double left_s);
 
 /* ---- daemon.c: commands that only query a daemon ---- */
 
@@ -398,11 +407,13 @@ bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interr
 
 struct cli_daemon {
     const char *server, *key_file, *link; /* as typed */
+    struct cli_retries retries;
 };
-/* --server, --key and --link: a child parser; its input is a struct cli_daemon. */
+/* --server, --key, --link and --retry-for: a child parser; its input is a struct cli_daemon. */
 extern const struct argp cli_daemon_argp;
-/* Interruptible from then on. Without --server FARLIGHT_SERVER counts; if neither names a daemon, a private one is
- * started, or (`must_be_named`) it is FL_ERROR_ARGUMENT. */
+/* Interruptible from then on. Tries again for the time of --retry-for, if that was given. Without --server
+ * FARLIGHT_SERVER counts; if neither names a daemon, a private one is started, or (`must_be_named`) it is
+ * FL_ERROR_ARGUMENT. */
 struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const char *name, bool must_be_named,
                                          struct fl_error *error);
 

@@ -148,7 +148,7 @@ bool cli_write_text(const char *path, const char *text, mode_t rights, struct fl
         return fl_error_set(error, FL_ERROR_FILE, "", "the path of the file is too long");
     const int fd = mkostemp(unfinished, O_CLOEXEC);
     if (fd < 0)
-        return fl_error_set(error, FL_ERROR_FILE, path, "cannot be written: %s", strerror(errno));
+        return fl_text_write_error(error, path, "cannot be written", errno);
     FILE *file = fdopen(fd, "w");
     bool done = file && fputs(text, file) >= 0 && fchmod(fd, rights) == 0;
     if (file)
@@ -157,7 +157,7 @@ bool cli_write_text(const char *path, const char *text, mode_t rights, struct fl
         close(fd);
     if (done && rename(unfinished, path) == 0)
         return true;
-    fl_error_set(error, FL_ERROR_FILE, path, "cannot be written: %s", strerror(errno));
+    fl_text_write_error(error, path, "cannot be written", errno);
     unlink(unfinished);
     return false;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "protocol/common/standard.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -31,7 +32,8 @@ bool cli_interrupt_begin(struct fl_error *error)
     struct sigaction action = {.sa_handler = handle, .sa_flags = (int)SA_RESETHAND};
     sigemptyset(&action.sa_mask);
     for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)
-        sigaction(numbers[i], &action, NULL);
+        if (!signal_is_ignored(numbers[i]))
+            sigaction(numbers[i], &action, NULL);
     signal(SIGPIPE, SIG_IGN);
     return true;
 }

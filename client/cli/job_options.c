@@ -16,7 +16,6 @@
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define TURN_DEGREES 360.0
 #define OPTIONS_MAX 160
-#define RETRY_MAX_S 2592000.0 /* 30 days */
 
 enum key {
     KEY_SERVER = 's',
@@ -84,7 +83,8 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"link", KEY_LINK, "RATE,ROUND-TRIP,RESETS", 0, CLI_LINK_HELP, CLI_GROUP_OUTPUT},
     {"retry-for", KEY_RETRY_FOR, "DURATION", 0,
-     "Reconnect to a lost daemon for this long, in seconds or as 5m or 2h (default 5m; 0: never)",
+     "Reconnect to a lost daemon for this long, in seconds or as 5m or 2h (default 5m, view: until it ends; 0: "
+     "never)",
      CLI_GROUP_OUTPUT},
     {"retries", KEY_RETRIES, "N", 0, "Reconnect at most N times in a row, 0 to 1000 (default: no limit)",
      CLI_GROUP_OUTPUT},
@@ -321,8 +321,7 @@ static error_t set_retries(struct cli_job *job, const char *field, const char *v
 
 static error_t set_retry_duration(struct cli_job *job, const char *field, const char *value)
 {
-    job->retries.has_duration = true;
-    return fl_text_duration(value, RETRY_MAX_S, &job->retries.for_s, &job->error) ? 0 : name_field(job, field);
+    return cli_read_retry_for(value, &job->retries, &job->error) ? 0 : name_field(job, field);
 }
 
 static error_t set_option(struct cli_job *job, int key, const char *field, const char *value)
@@ -572,10 +571,10 @@ const struct argp *cli_thumbnail_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {"output",      "format",   "half",       "float",   "samples",
-                                           "integrator",  "timings",  "trace-file", "layers",  "clip-once",
-                                           "clip-start",  "encoding", "retry-for",  "retries", "metadata",
-                                           "light-field", "baseline", "views",      "crop",    NULL};
+    static const char *const left_out[] = {"output",     "format",   "half",       "float",    "samples",
+                                           "integrator", "timings",  "trace-file", "layers",   "clip-once",
+                                           "clip-start", "encoding", "retries",    "metadata", "light-field",
+                                           "baseline",   "views",    "crop",       NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

@@ -127,13 +127,15 @@ static bool complete_eyes(struct cli_job *job)
     return true;
 }
 
-/* Where it is not said, views and frames are made of layers, and a lens is not. */
+/* Where it is not said, views and frames are made of layers, and a lens is not. Layers are not filtered: views of
+ * a picture that is to be are rendered as they are. */
 static bool complete_source(struct cli_job *job)
 {
     const struct cli_views *views = &job->views;
     struct message_render *wanted = &job->options;
     const bool has_views = views->has_stereo || views->has_light_field || wanted->upsample > 1;
     const bool has_lens = wanted->aperture > 0 || job->lens_changes;
+    const bool is_filtered = wanted->denoise == PROTOCOL_DENOISE_ON;
     if (views->has_views && !has_views)
         return refuse(job, "--views", "the picture has a single view",
                       "add --stereo 0.065; a picture may have --light-field 5x5, an animation --upsample 4");
@@ -147,10 +149,16 @@ static bool complete_source(struct cli_job *job)
     else if (views->has_lens)
         wanted->view_source = views->lens;
     else
-        wanted->view_source = has_views ? PROTOCOL_VIEW_SOURCE_LAYERS : PROTOCOL_VIEW_SOURCE_RAYS;
+        wanted->view_source = has_views && (!is_filtered || wanted->upsample > 1) ? PROTOCOL_VIEW_SOURCE_LAYERS
+                                                                                  : PROTOCOL_VIEW_SOURCE_RAYS;
     if (wanted->view_source == PROTOCOL_VIEW_SOURCE_RAYS && wanted->upsample > 1)
         return refuse(job, "--upsample", "frames between those that are rendered are not made of rays",
                       views->has_views ? "add --views quadtree" : "leave out --lens rays");
+    if (wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS && is_filtered)
+        return refuse(job, "--denoise", "pictures that are made of depth layers are not filtered",
+                      wanted->upsample > 1 ? "leave out --denoise or --upsample"
+                      : has_views          ? "leave it out, or add --views rays"
+                                           : "leave it out, or add --lens rays");
     if (wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS && wanted->shutter > 0)
         return refuse(job, "--shutter", "depth layers show the scene at one time",
                       wanted->upsample > 1 ? "leave out --shutter or --upsample"

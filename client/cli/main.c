@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
 #include "lib/text.h"
+#include "protocol/common/standard.h"
 #include "protocol/version.h"
 
 #include <stdio.h>
@@ -90,6 +91,7 @@ static int help(int argc, char **argv)
 int main(int argc, char **argv)
 {
     argp_err_exit_status = CLI_USAGE;
+    open_standard_descriptors();
     if (argc < 2) {
         print_help(stderr);
         return CLI_USAGE;

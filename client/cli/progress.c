@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
 #include "protocol/common/clock.h"
+#include "protocol/plain_text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -181,6 +182,42 @@ void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *n
         strncat(text, " left", sizeof(text) - strlen(text) - 1);
     }
     show(progress, (uint32_t)(1000 * seconds / (seconds + left_s)), is_known ? 1000 : 0, text);
+}
+
+/* Resident bytes of a process; 0: it is gone. */
+static uint64_t resident_of(const char *process)
+{
+    char path[64];
+    unsigned long long pages = 0;
+    snprintf(path, sizeof(path), "/proc/%s/statm", process);
+    FILE *file = fopen(path, "re");
+    if (file && fscanf(file, "%*u %llu", &pages) != 1)
+        pages = 0;
+    if (file)
+        fclose(file);
+    return (uint64_t)pages * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+static uint64_t resident_bytes(void)
+{
+    char path[64], child[24];
+    uint64_t bytes = resident_of("self");
+    snprintf(path, sizeof(path), "/proc/self/task/%d/children", (int)getpid());
+    FILE *file = fopen(path, "re");
+    while (file && fscanf(file, "%23s", child) == 1)
+        bytes += resident_of(child);
+    if (file)
+        fclose(file);
+    return bytes;
+}
+
+void cli_progress_frame(const struct cli_progress *progress, uint32_t frame, double seconds, const char *path)
+{
+    if (progress->silent || progress->form == CLI_PROGRESS_BAR)
+        return;
+    fprintf(stderr, "frame %u: %.2f s, %.0f MB, ", frame, seconds, (double)resident_bytes() * 1e-6);
+    plain_text_print(stderr, path);
+    fputc('\n', stderr);
 }
 
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total)

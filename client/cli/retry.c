@@ -2,12 +2,16 @@
 /* Daemons that are lost, and may come back. */
 #include "cli/cli.h"
 
+#include "lib/text.h"
+
 #include <poll.h>
 #include <sys/random.h>
 
 #define FIRST_PAUSE_MS 500u
 #define LONGEST_PAUSE_MS 30000u
 #define DOUBLINGS_MAX 6u
+#define RETRY_MAX_S 2592000.0 /* 30 days */
+#define USUAL_TIMEOUT_S 30.0  /* of fl_connect */
 
 bool cli_is_temporary(const struct fl_error *error)
 {
@@ -23,6 +27,17 @@ uint32_t cli_retry_pause_ms(unsigned failures, uint32_t min_ms)
         pause_ms = pause_ms * 3 / 4 + chance % (pause_ms / 2);
     pause_ms = pause_ms > min_ms ? pause_ms : min_ms;
     return pause_ms < LONGEST_PAUSE_MS ? pause_ms : LONGEST_PAUSE_MS;
+}
+
+bool cli_read_retry_for(const char *value, struct cli_retries *retries, struct fl_error *error)
+{
+    retries->has_duration = true;
+    return fl_text_duration(value, RETRY_MAX_S, &retries->for_s, error);
+}
+
+unsigned cli_connect_timeout_ms(double left_s)
+{
+    return left_s >= USUAL_TIMEOUT_S ? 0 : left_s > 1 ? (unsigned)(left_s * 1e3) : 1000u;
 }
 
 bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error)

@@ -42,6 +42,11 @@ struct session {
     struct cli_timings *timings;
     struct cli_trace_file *trace; /* NULL: none is wanted */
     struct cli_progress progress;
+    bool is_being_written; /* a picture of a series: */
+    uint32_t written_frame;
+    uint64_t frame_ns;      /* when the picture before it had come */
+    double written_seconds; /* from then until it had */
+    char written_path[4352];
     uint64_t begin_ns, export_ns;
 };
 
@@ -78,13 +83,32 @@ static bool settle(struct session *session, struct fl_error *error)
            cli_settle(session->job, scene, session->is_series, error);
 }
 
+/* Without a number of attempts a duration is the limit. */
+static double seconds_left(const struct session *session)
+{
+    const struct cli_retries *retries = &session->job->retries;
+    const double for_s = retries->has_duration ? retries->for_s : retries->has_count ? INFINITY : DEFAULT_RETRY_S;
+    return for_s - (double)(monotonic_now_ns() - session->lost_ns) * 1e-9;
+}
+
+/* A daemon that does not answer takes no longer than it is to be tried; one of our own has its time to start. */
+static unsigned connect_timeout_ms(const struct session *session)
+{
+    const struct cli_job *job = session->job;
+    if (!job->server || (session->failures == 0 && !job->retries.has_duration))
+        return 0;
+    return cli_connect_timeout_ms(session->failures > 0 ? seconds_left(session) : job->retries.for_s);
+}
+
 /* The importer loads its libraries while the daemon starts, and the exporter while the importer runs: once the
  * scene is loaded the daemon uses all processors. */
 static bool load_scene(struct session *session, struct fl_error *error)
 {
     struct cli_loading *loading = &session->loading;
-    *loading =
-        (struct cli_loading){.job = session->job, .progress = &session->progress, .again = session->was_loaded};
+    *loading = (struct cli_loading){.job = session->job,
+                                    .progress = &session->progress,
+                                    .again = session->was_loaded,
+                                    .timeout_ms = connect_timeout_ms(session)};
     if (!cli_loading_begin(loading, error))
         return false;
     session->was_reached = true;
@@ -165,11 +189,34 @@ static bool write_frame(struct session *session, const struct fl_frame *frame, s
     return written;
 }
 
+/* The picture that was being written is complete: another one is, or the sinks are finished. */
+static void log_frame(struct session *session)
+{
+    if (session->is_being_written)
+        cli_progress_frame(&session->progress, session->written_frame, session->written_seconds,
+                           session->written_path);
+    session->is_being_written = false;
+}
+
+static void note_frame(struct session *session, const struct fl_frame *frame)
+{
+    const uint64_t now_ns = monotonic_now_ns();
+    log_frame(session);
+    session->is_being_written = session->is_series;
+    session->written_frame = frame->frame;
+    session->written_seconds =
+        (double)(now_ns - (session->frame_ns > 0 ? session->frame_ns : session->begin_ns)) * 1e-9;
+    session->frame_ns = now_ns;
+    cli_sinks_path(&session->sinks, session->written_path, sizeof(session->written_path));
+}
+
 static bool finish_sinks(struct session *session, struct fl_error *error)
 {
     const uint64_t begin_ns = monotonic_now_ns();
     session->sink_failed = !cli_sinks_finish(&session->sinks, error);
     add_export(session, -1, begin_ns);
+    if (!session->sink_failed)
+        log_frame(session);
     return !session->sink_failed;
 }
 
@@ -187,6 +234,8 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
         const bool written = write_frame(session, frame, error), wanted = is_wanted(session, frame);
         session->noise = frame->noise;
         session->failures = 0;
+        if (written && wanted)
+            note_frame(session, frame);
         fl_frame_destroy(frame);
         if (!written)
             return false;
@@ -324,14 +373,6 @@ static bool may_be_retried(const struct session *session, const struct fl_error 
            (session->was_reached || error->retryable || job->retries.has_duration);
 }
 
-/* Without a number of attempts a duration is the limit. */
-static double seconds_left(const struct session *session)
-{
-    const struct cli_retries *retries = &session->job->retries;
-    const double for_s = retries->has_duration ? retries->for_s : retries->has_count ? INFINITY : DEFAULT_RETRY_S;
-    return for_s - (double)(monotonic_now_ns() - session->lost_ns) * 1e-9;
-}
-
 /* Longer each time, and no longer than is left. False: interrupted. */
 static bool pause_before_retry(const struct session *session, uint32_t min_ms, struct fl_error *error)
 {
@@ -358,8 +399,8 @@ static bool recover(struct session *session, struct fl_error *error)
     const struct cli_retries *retries = &session->job->retries;
     if (!may_be_retried(session, error))
         return false;
-    if (session->failures == 0)
-        session->lost_ns = monotonic_now_ns();
+    if (session->failures == 0) /* a daemon that does not answer is lost from the beginning of the attempt */
+        session->lost_ns = session->loading.connection ? monotonic_now_ns() : session->loading.connect_begin_ns;
     if ((retries->has_count && session->failures >= retries->count) || seconds_left(session) <= 0) {
         if (session->failures > 0 && !session->job->quiet)
             fprintf(stderr, "farlight: given up after %u attempt%s in %.0f s\n", session->failures,

@@ -4,6 +4,7 @@
 #include "lib/frame_part.h"
 #include "lib/image_size.h"
 #include "lib/rate.h"
+#include "lib/text.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -101,7 +102,7 @@ static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
     if (sink->y4m_fd >= 0)
         return true;
     sink->y4m_fd = 0;
-    return fl_error_set(error, FL_ERROR_FILE, sink->output.path, "cannot be written: %s", strerror(errno));
+    return fl_text_write_error(error, sink->output.path, "cannot be written", errno);
 }
 
 /* A path tells where the file lay, which differs from host to host. */
@@ -249,6 +250,13 @@ static bool write_part(struct cli_sink *sink, const struct fl_frame *frame, stru
     return written;
 }
 
+void cli_sinks_path(const struct cli_sinks *sinks, char *path, size_t path_bytes)
+{
+    const struct cli_sink *sink = &sinks->items[0];
+    const bool is_series = !sink->to_stdout && sink->y4m_fd == 0 && !sink->video && sink->path[0] != '\0';
+    snprintf(path, path_bytes, "%s", is_series ? sink->path : sink->output.path);
+}
+
 bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, struct fl_error *error)
 {
     for (size_t i = 0; i < sinks->count; i++) {
@@ -271,8 +279,7 @@ static bool finish_y4m(struct cli_sink *sink, struct fl_error *error)
         unlink(sink->path);
     close(sink->y4m_fd);
     sink->y4m_fd = 0;
-    return good ||
-           fl_error_set(error, FL_ERROR_FILE, sink->output.path, "cannot be written: %s", strerror(failure));
+    return good || fl_text_write_error(error, sink->output.path, "cannot be written", failure);
 }
 
 static bool finish(struct cli_sink *sink, struct fl_error *error)

@@ -37,6 +37,8 @@ bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool 
 bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error);
 /* Whether the frame's picture already exists, complete and of the wanted size, in every sink. */
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame);
+/* The path of the picture that was passed on last, of the first sink. */
+void cli_sinks_path(const struct cli_sinks *sinks, char *path, size_t path_bytes);
 /* Passes the frame on; the files of the previous frame are complete when this returns true. */
 bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, struct fl_error *error);
 /* Waits until all is written. */

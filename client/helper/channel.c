@@ -51,18 +51,18 @@ bool channel_send(const struct channel *channel, uint32_t request, const struct 
     return message_write(&writer, request, 0, message) && send_all(channel->fd, bytes, writer.used_bytes);
 }
 
-bool channel_send_failure(const struct channel *channel, uint32_t request, const char *field, const char *reason,
-                          const char *remedy)
+bool channel_send_failure(const struct channel *channel, uint32_t request, const struct channel_failure *failure)
 {
     char short_field[FIELD_BYTES], short_reason[TEXT_BYTES], short_remedy[REMEDY_BYTES];
     struct message message = {.type = MESSAGE_ERROR};
-    copy_text(short_field, sizeof(short_field), field);
-    copy_text(short_reason, sizeof(short_reason), reason);
-    copy_text(short_remedy, sizeof(short_remedy), remedy ? remedy : "");
+    copy_text(short_field, sizeof(short_field), failure->field);
+    copy_text(short_reason, sizeof(short_reason), failure->reason);
+    copy_text(short_remedy, sizeof(short_remedy), failure->remedy ? failure->remedy : "");
     message.error.code = PROTOCOL_ERROR_INVALID;
     message.error.field = short_field;
     message.error.text = short_reason;
     message.error.remedy = short_remedy;
+    message.error.retryable = failure->retryable;
     if (channel_send(channel, request, &message))
         return true;
     /* The library's text was no UTF-8. */

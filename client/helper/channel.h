@@ -22,8 +22,12 @@ struct channel {
 bool channel_run(struct channel *channel);
 /* Blocks until the kernel has it. False: the other side has closed. */
 bool channel_send(const struct channel *channel, uint32_t request, const struct message *message);
-/* Answers with an error. The texts are shortened to fit into a message; `remedy` may be NULL. */
-bool channel_send_failure(const struct channel *channel, uint32_t request, const char *field, const char *reason,
-                          const char *remedy);
+struct channel_failure {
+    const char *field, *reason;
+    const char *remedy; /* may be NULL */
+    bool retryable;     /* the same request may succeed later */
+};
+/* Answers with an error. The texts are shortened to fit into a message. */
+bool channel_send_failure(const struct channel *channel, uint32_t request, const struct channel_failure *failure);
 
 #endif

@@ -13,8 +13,21 @@
 
 #define FILE_BYTES_MAX (UINT64_C(1) << 36)
 
+static bool lacked_space;
+
+bool file_is_lack_of_space(int number)
+{
+    return number == ENOSPC || number == EDQUOT;
+}
+
+bool file_lacked_space(void)
+{
+    return lacked_space;
+}
+
 static bool fail(char *reason, size_t reason_bytes, int number)
 {
+    lacked_space = file_is_lack_of_space(number);
     snprintf(reason, reason_bytes, "cannot be written: %s", strerror(number));
     return false;
 }
@@ -60,6 +73,7 @@ uint64_t file_bytes_limit(void)
 
 int file_begin(const char *path, char *reason, size_t reason_bytes)
 {
+    lacked_space = false;
     const char *slash = strrchr(path, '/');
     const size_t folder_bytes = slash ? (size_t)(slash - path) + 1 : 0;
     const int length = snprintf(unfinished, sizeof(unfinished), "%.*s.farlight-XXXXXX", (int)folder_bytes, path);

@@ -25,6 +25,11 @@ bool file_finish(int fd, const char *path, char *reason, size_t reason_bytes);
 /* Closes it and takes it away. */
 void file_abandon(int fd);
 
+/* Whether the errno value says that there is no space, which may be there later. */
+bool file_is_lack_of_space(int number);
+/* Whether the last file that was begun failed by that. */
+bool file_lacked_space(void);
+
 /* The maximum size of a file: 64 GiB, or the process's own limit if that is lower (the sandbox would raise it to
  * ours).
  */

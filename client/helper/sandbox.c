@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "sandbox.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/landlock.h>
@@ -64,6 +65,35 @@ static bool set_limits(const struct sandbox_options *options)
     signal(SIGXFSZ, SIG_IGN); /* a write beyond the limit then fails instead of ending the process */
     /* A sanitizer's report goes to stderr, which may be a file. */
     return set_limit(RLIMIT_CORE, 0) && (SANITIZED || set_limit(RLIMIT_FSIZE, options->file_bytes));
+}
+
+/* Landlock binds the thread that enters it and those that it starts. Code in a bound thread runs in any other
+ * thread of the process by a signal, or by what it writes into the shared memory. 0: not known. */
+static unsigned count_threads(void)
+{
+    DIR *tasks = opendir("/proc/self/task");
+    unsigned count = 0;
+
+    if (!tasks)
+        return 0;
+    for (const struct dirent *task; (task = readdir(tasks));)
+        count += task->d_name[0] != '.';
+    closedir(tasks);
+    return count;
+}
+
+static bool is_alone(char *reason, size_t reason_bytes)
+{
+    const unsigned threads = count_threads();
+
+    if (threads == 0)
+        snprintf(reason, reason_bytes, "cannot count the threads of this process: /proc/self/task: %s",
+                 strerror(errno));
+    else if (threads > 1)
+        snprintf(reason, reason_bytes,
+                 "this process has %u threads, and Landlock would bind one: a library has started threads before",
+                 threads);
+    return threads == 1;
 }
 
 /* ---- Landlock ---- */
@@ -154,9 +184,8 @@ static const char *const allowed_calls[] = {
     "getdents64", "dup", "poll", "ppoll", "sendto", "sendmsg", "recvfrom", "recvmsg", "shutdown", "fadvise64",
     "getcwd", "statfs", "fstatfs", "select", "pselect6",
     /* the process itself */
-    "exit", "exit_group", "rt_sigaction", "rt_sigprocmask", "rt_sigreturn", "sigaltstack", "getpid", "gettid",
-    "getuid", "geteuid", "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage", "times",
-    "getrlimit"};
+    "exit", "exit_group", "rt_sigprocmask", "rt_sigreturn", "sigaltstack", "getpid", "gettid", "getuid", "geteuid",
+    "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage", "times", "getrlimit"};
 static const char *const write_calls[] = {"fsync", "fdatasync", "ftruncate", "fallocate", "fchmod", "umask"};
 static const char *const rename_calls[] = {"rename", "renameat", "renameat2", "unlink", "unlinkat", "linkat"};
 
@@ -197,7 +226,8 @@ static bool allow_memory(scmp_filter_ctx filter)
 }
 
 /* Threads, but no processes and no namespaces. The flags of clone3 lie in memory, where no filter sees them: the C
- * library falls back to clone. Signals only to threads of this process. */
+ * library falls back to clone. Signals only to threads of this process, all of which are bound: abort() raises its
+ * own by tgkill. Signal handlers are those of before; they can be asked for. */
 static bool allow_threads(scmp_filter_ctx filter)
 {
     const uint64_t of_threads = CLONE_VM | CLONE_SIGHAND | CLONE_THREAD;
@@ -206,7 +236,8 @@ static bool allow_threads(scmp_filter_ctx filter)
 
     return allow_masked(filter, SCMP_SYS(clone), 0, of_threads | of_others, of_threads) &&
            seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0) == 0 &&
-           allow_with_argument(filter, SCMP_SYS(tgkill), 0, (uint64_t)getpid());
+           allow_with_argument(filter, SCMP_SYS(tgkill), 0, (uint64_t)getpid()) &&
+           allow_with_argument(filter, SCMP_SYS(rt_sigaction), 1, 0);
 }
 
 /* fcntl and ioctl only with the requests of a reader of files, so that no descriptor gains abilities. */
@@ -234,9 +265,7 @@ static bool enter_seccomp(const struct sandbox_options *options)
 
     if (!filter)
         return false;
-    /* Libraries may have started threads before main(): the filter applies to them, too. Landlock cannot. */
-    entered = seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1) == 0 &&
-              allow_calls(filter, allowed_calls, sizeof(allowed_calls) / sizeof(allowed_calls[0])) &&
+    entered = allow_calls(filter, allowed_calls, sizeof(allowed_calls) / sizeof(allowed_calls[0])) &&
               allow_arguments(filter) && allow_memory(filter) && allow_threads(filter);
     if (entered && options->write_folder_count > 0)
         entered = allow_calls(filter, write_calls, sizeof(write_calls) / sizeof(write_calls[0]));
@@ -260,6 +289,8 @@ bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t r
 
     if (reason_bytes > 0)
         reason[0] = '\0';
+    if (!is_alone(reason, reason_bytes))
+        return false;
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 || !set_limits(options)) {
         snprintf(reason, reason_bytes, "cannot set resource limits: %s", strerror(errno));
         return false;

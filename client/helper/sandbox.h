@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Drops a helper program's rights before it reads hostile input: files beneath the named
  * folders only (Landlock), few system calls (seccomp: no processes,
- * no signals to others, no memory that is both writable and executable), bounded memory, time and file sizes, no
- * new privileges. Cannot be undone. Also used by farlight-export.
+ * no signals to others, no new handlers, no memory that is both writable and executable), bounded memory, time and
+ * file sizes, no new privileges. Cannot be undone.
  *
- * Threads that libraries have started before get the filter and the limits; Landlock binds the calling thread and
- * those that it starts. */
+ * Landlock binds the calling thread and those that it starts, so the process must have no other: libraries that
+ * start threads when they are loaded are loaded afterwards (helper/module.h). */
 #ifndef FARLIGHT_CLIENT_HELPER_SANDBOX_H
 #define FARLIGHT_CLIENT_HELPER_SANDBOX_H
 
@@ -29,9 +29,10 @@ struct sandbox_options {
     uint64_t file_bytes;          /* maximum size of a written file; 0: files cannot grow at all */
 };
 
-/* False, with `reason` set, if a protection that every supported kernel has (limits, no new privileges, system
- * call filter, Landlock) fails: then nothing may be parsed. If the kernel lacks Landlock and the environment
- * variable FARLIGHT_UNCONFINED is 1, the result is true and `reason` says so; else `reason` is empty. */
+/* False, with `reason` set, if the process has more than one thread, or a protection that every supported kernel
+ * has (limits, no new privileges, system call filter, Landlock) fails: then nothing may be parsed. If the kernel
+ * lacks Landlock and the environment variable FARLIGHT_UNCONFINED is 1, the result is true and `reason` says so;
+ * else `reason` is empty. */
 bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t reason_bytes);
 
 #ifdef __cplusplus

@@ -4,6 +4,7 @@
 #include "protocol/sealed/key.h"
 #include "protocol/sealed/secret.h"
 #include "protocol/common/clock.h"
+#include "protocol/plain_text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,10 +32,15 @@ bool fl_connection_break(struct fl_connection *connection, struct fl_error *erro
         char words[520];
         fl_process_last_words(&connection->process, LAST_WORDS_MS, words, sizeof(words));
         const bool is_final = fl_process_has_refused(&connection->process);
+        const bool was_there = connection->start_ns > 0;
         if (words[0] != '\0')
-            fl_error_set(error, is_final ? FL_ERROR_SYSTEM : FL_ERROR_CONNECTION, "", "the connection is lost: %s",
+            fl_error_set(error, is_final ? FL_ERROR_SYSTEM : FL_ERROR_CONNECTION, "", "%s: %s",
+                         was_there           ? "the connection is lost"
+                         : connection->local ? "the daemon did not start"
+                                             : "no daemon can be reached",
                          words);
-        error->retryable = !is_final;
+        /* An ssh that has never reached a daemon is refused again: wrong host, user, key or command. */
+        error->retryable = !is_final && (was_there || connection->local);
     }
     connection->broken = *error;
     return false;
@@ -286,6 +292,24 @@ static bool read_key(struct sealed_key *key, const char *key_file, struct fl_err
                    : "a key file has 32 bytes; 'farlight key FILE' creates one");
 }
 
+/* Shows the first line of what came, which says who has answered. */
+static void tell_other_server(const struct fl_connection *connection, const struct decode_error *why,
+                              struct fl_error *error)
+{
+    const struct fl_stream *stream = &connection->stream;
+    char came[61], shown[sizeof(came)];
+    const size_t bytes = stream->in_end - stream->in_start;
+    snprintf(came, sizeof(came), "%.*s", (int)(bytes < sizeof(came) ? bytes : sizeof(came) - 1),
+             (const char *)stream->in + stream->in_start);
+    came[strcspn(came, "\r\n")] = '\0';
+    plain_text_copy(shown, sizeof(shown), came);
+    fl_error_set(error, FL_ERROR_PROTOCOL, connection->address,
+                 "the server there is not a farlight daemon: %s, but '%s'", why->text, shown);
+    if (strncmp(connection->address, "ssh:", 4) == 0)
+        fl_error_remedy(error, "'ssh HOST true' must print nothing: keep .bashrc and other login scripts quiet "
+                               "where there is no terminal");
+}
+
 static bool shake_hands(struct fl_connection *connection, const char *name, uint64_t deadline_ns,
                         struct fl_error *error)
 {
@@ -315,9 +339,10 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
         size_t consumed = 0;
         const enum handshake_result result = handshake_reply_parse(
             &reply, stream->in + stream->in_start, stream->in_end - stream->in_start, &consumed, &why);
-        if (result == HANDSHAKE_FATAL)
-            return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address,
-                                "the server there is not a farlight daemon: %s", why.text);
+        if (result == HANDSHAKE_FATAL) {
+            tell_other_server(connection, &why, error);
+            return false;
+        }
         if (result == HANDSHAKE_CONSUMED) {
             stream->in_start += consumed;
             if (reply.version == 0 && (reply.capabilities & HANDSHAKE_NEEDS_KEY) != 0)
@@ -369,6 +394,7 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
             "the socket's path has characters with a meaning for the shell; use letters, digits and /._-+@%%,=");
     snprintf(host, sizeof(host), "%.*s", (int)host_bytes, where);
     const char *const arguments[] = {"-T", "--", host, "farlight", "bridge", socket_address, NULL};
+    connection->process.keeps_environment = true; /* its agent's among them */
     return fl_process_start(&connection->process, "ssh", FL_WIRING_STANDARD, arguments, fd, error);
 }
 
@@ -385,6 +411,7 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
     int fd = -1;
     if (!options->server) {
         connection->local = true;
+        connection->process.keeps_environment = true; /* drivers have many variables */
         if (!fl_process_start(&connection->process, "farlightd", FL_WIRING_DESCRIPTOR, arguments, &fd, error))
             return false;
     } else if (strncmp(options->server, "ssh:", 4) == 0) {

@@ -8,7 +8,7 @@
 bool fl_json_load(struct fl_json *json, const char *path, size_t max_bytes, struct fl_error *error)
 {
     *json = (struct fl_json){0};
-    FILE *file = fopen(path, "rb");
+    FILE *file = fopen(path, "rbe");
     if (!file)
         return fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %m");
     json->text = malloc(max_bytes + 1);

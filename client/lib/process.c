@@ -54,14 +54,15 @@ bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_
         error, "put it into this program's folder or into PATH, or name its folder in FARLIGHT_LIBEXEC");
 }
 
-/* What the child's descriptors shall be. */
+/* What the child's descriptors shall be, and no other: whoever started us may have left some open. */
 static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, const struct fl_process *process,
                  int socket_fd)
 {
     const int talk_fd = process->talk_fd, input_fd = process->input_fd;
     if (wiring == FL_WIRING_STANDARD)
         return posix_spawn_file_actions_adddup2(actions, socket_fd, STDIN_FILENO) == 0 &&
-               posix_spawn_file_actions_adddup2(actions, socket_fd, STDOUT_FILENO) == 0;
+               posix_spawn_file_actions_adddup2(actions, socket_fd, STDOUT_FILENO) == 0 &&
+               posix_spawn_file_actions_addclosefrom_np(actions, CHILD_SOCKET) == 0;
     /* What is given over was moved to where it cannot be overwritten: our descriptors may be 0..3 themselves. The
      * input was not, and is the first. */
     const int has_input = input_fd > 0
@@ -69,20 +70,20 @@ static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, con
                               : posix_spawn_file_actions_addopen(actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     return has_input == 0 && posix_spawn_file_actions_adddup2(actions, talk_fd, STDOUT_FILENO) == 0 &&
            posix_spawn_file_actions_adddup2(actions, talk_fd, STDERR_FILENO) == 0 &&
-           posix_spawn_file_actions_adddup2(actions, socket_fd, CHILD_SOCKET) == 0;
+           posix_spawn_file_actions_adddup2(actions, socket_fd, CHILD_SOCKET) == 0 &&
+           posix_spawn_file_actions_addclosefrom_np(actions, CHILD_SOCKET + 1) == 0;
 }
 
-/* The child starts with default signals and, unless it may need the terminal, in a process group of its own: a
- * Ctrl-C is for us, and we end the child properly. */
+/* The child starts, unless it may need the terminal, in a process group of its own: a Ctrl-C is for us, and we end
+ * the child properly. Signals that we handle are the child's to end by; those that were ignored when we were
+ * started, as by nohup, stay ignored, but for the one with which we end it. */
 static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
 {
     sigset_t none, reset;
     sigemptyset(&none);
     sigemptyset(&reset);
     sigaddset(&reset, SIGPIPE);
-    sigaddset(&reset, SIGINT);
     sigaddset(&reset, SIGTERM);
-    sigaddset(&reset, SIGHUP);
     int flags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF;
     if (wiring == FL_WIRING_DESCRIPTOR)
         flags |= POSIX_SPAWN_SETPGROUP;
@@ -91,8 +92,37 @@ static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
            posix_spawnattr_setflags(attributes, (short)flags) == 0;
 }
 
-/* Ours and, of a program with large arrays, what glibc reads when it starts: a page of 4 KB costs a fault, and
- * faults were a fifth of an import's time. NULL: no memory. */
+/* What a program needs that reads files of others: the language of messages, the time zone, where libraries lie,
+ * and the settings of the C library and of sanitizers. A name that ends with * stands for all that begin so. */
+static const char *const passed_names[] = {"PATH",
+                                           "LANG",
+                                           "LANGUAGE",
+                                           "LC_*",
+                                           "TZ",
+                                           "TZDIR",
+                                           "LD_*",
+                                           "GLIBC_*",
+                                           "GCOV_*",
+                                           "LLVM_PROFILE_FILE",
+                                           "ASAN_OPTIONS",
+                                           "LSAN_OPTIONS",
+                                           "UBSAN_OPTIONS",
+                                           "FARLIGHT_UNCONFINED"};
+
+static bool is_passed(const char *variable)
+{
+    for (size_t i = 0; i < sizeof(passed_names) / sizeof(passed_names[0]); i++) {
+        const char *name = passed_names[i];
+        const size_t bytes = strcspn(name, "*");
+        if (strncmp(variable, name, bytes) == 0 && (name[bytes] == '*' || variable[bytes] == '='))
+            return true;
+    }
+    return false;
+}
+
+/* Of ours what the program needs: tokens and passwords are not for one that reads files of others. One with large
+ * arrays gets what glibc reads when it starts: a page of 4 KB costs a fault, and faults were a fifth of an
+ * import's time. NULL: no memory. */
 static char **make_environment(const struct fl_process *process)
 {
     size_t count = 0;
@@ -101,7 +131,10 @@ static char **make_environment(const struct fl_process *process)
     char **made = malloc((count + 2) * sizeof(*made));
     if (!made)
         return NULL;
-    memcpy(made, environ, count * sizeof(*made));
+    count = 0;
+    for (char **variable = environ; *variable; variable++)
+        if (process->keeps_environment || is_passed(*variable))
+            made[count++] = *variable;
     if (process->has_large_arrays && !getenv("GLIBC_TUNABLES"))
         made[count++] = (char *)(uintptr_t) "GLIBC_TUNABLES=glibc.malloc.hugetlb=1";
     made[count] = NULL;
@@ -161,8 +194,10 @@ static size_t fill_arguments(char *argv[ARGUMENTS_MAX], const char *path, enum f
 bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiring wiring,
                       const char *const *arguments, int *socket_fd, struct fl_error *error)
 {
-    *process = (struct fl_process){
-        .talk_fd = -1, .input_fd = process->input_fd, .has_large_arrays = process->has_large_arrays};
+    *process = (struct fl_process){.talk_fd = -1,
+                                   .input_fd = process->input_fd,
+                                   .has_large_arrays = process->has_large_arrays,
+                                   .keeps_environment = process->keeps_environment};
     snprintf(process->name, sizeof(process->name), "%s", name);
     char path[4096];
     if (!fl_find_program(name, path, sizeof(path), error))
@@ -241,25 +276,56 @@ int fl_process_end(struct fl_process *process, unsigned grace_ms)
     return status;
 }
 
-/* The last non-empty line of the child's log. */
-static void last_line(int fd, char *line, size_t line_bytes)
+/* Where the line begins that ends before `end`. */
+static size_t line_start(const char *text, size_t end)
 {
-    char tail[2048];
-    line[0] = '\0';
+    while (end > 0 && text[end - 1] != '\n')
+        end--;
+    return end;
+}
+
+/* How many bytes of "NAME: " a line begins with, as our programs say what is wrong. */
+static size_t name_bytes(const char *name, const char *line, size_t bytes)
+{
+    const size_t count = strlen(name);
+    return bytes > count + 2 && memcmp(line, name, count) == 0 && line[count] == ':' ? count + 2 : 0;
+}
+
+/* The last non-empty line of the child's log; of several that have the program's name in front, which are an error
+ * and its remedy, all, without the name. */
+static void last_lines(const struct fl_process *process, char *words, size_t words_bytes)
+{
+    char tail[2049];
+    const int fd = process->talk_fd;
+    words[0] = '\0';
     const off_t size = fd >= 0 ? lseek(fd, 0, SEEK_END) : 0;
     if (size <= 0)
         return;
-    const off_t from = size > (off_t)sizeof(tail) ? size - (off_t)sizeof(tail) : 0;
-    const ssize_t got = pread(fd, tail, sizeof(tail), from);
+    const off_t most = sizeof(tail) - 1, from = size > most ? size - most : 0;
+    const ssize_t got = pread(fd, tail, sizeof(tail) - 1, from);
     size_t end = got > 0 ? (size_t)got : 0;
+    tail[end] = '\0';
     while (end > 0 && (tail[end - 1] == '\n' || tail[end - 1] == ' '))
         end--;
-    size_t start = end;
-    while (start > 0 && tail[start - 1] != '\n')
-        start--;
-    const bool is_greeting =
-        end - start >= 5 && memcmp(tail + start, "READY", 5) == 0; /* of a daemon that starts */
-    snprintf(line, line_bytes, "%.*s", is_greeting ? 0 : (int)(end - start), tail + start);
+    size_t start = line_start(tail, end);
+    if (end - start >= 5 && memcmp(tail + start, "READY", 5) == 0) /* of a daemon that starts */
+        return;
+    for (size_t before = start; before > 0 && name_bytes(process->name, tail + start, end - start) > 0;) {
+        before = line_start(tail, before - 1);
+        if (name_bytes(process->name, tail + before, start - before) == 0)
+            break;
+        start = before;
+    }
+    size_t used = 0;
+    while (start < end && used < words_bytes) {
+        size_t bytes = strcspn(tail + start, "\n");
+        bytes = bytes < end - start ? bytes : end - start;
+        const size_t skipped = name_bytes(process->name, tail + start, bytes);
+        const int written = snprintf(words + used, words_bytes - used, "%s%.*s", used > 0 ? "; " : "",
+                                     (int)(bytes - skipped), tail + start + skipped);
+        used += written > 0 ? (size_t)written : words_bytes;
+        start += bytes + 1;
+    }
 }
 
 bool fl_process_has_refused(const struct fl_process *process)
@@ -273,11 +339,11 @@ bool fl_process_has_refused(const struct fl_process *process)
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes)
 {
     char line[400], how[80] = "";
-    last_line(process->talk_fd, line, sizeof(line));
+    last_lines(process, line, sizeof(line));
     if (process->pid > 0 && fl_process_has_ended(process, grace_ms)) {
         siginfo_t info = {0};
         waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT);
-        last_line(process->talk_fd, line, sizeof(line));
+        last_lines(process, line, sizeof(line));
         if (info.si_code == CLD_EXITED)
             snprintf(how, sizeof(how), "%s ended with status %d", process->name, info.si_status);
         else

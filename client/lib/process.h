@@ -18,6 +18,8 @@ struct fl_process {
     int input_fd;          /* > 0: its standard input, set by the caller; it stays the caller's. 0: none */
     int talk_fd;           /* a memory file with its standard output and error; -1: none */
     bool has_large_arrays; /* set by the caller: its memory comes in huge pages, where the C library can do that */
+    bool keeps_environment; /* set by the caller: it gets all variables, as a program that reads no files of others
+                             */
     char name[32];
 };
 
@@ -34,7 +36,7 @@ int fl_process_end(struct fl_process *process, unsigned grace_ms);
 bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms);
 void fl_process_kill(struct fl_process *process); /* at once; fl_process_end must follow */
 /* Waits up to `grace_ms` for its end, then writes how it ended and its last line into `text`: "farlightd was ended
- * by signal 11: ..."; still running: its last line alone. */
+ * by signal 11: ..."; still running: its last line alone. An error and its remedy are in lines of their own. */
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes);
 /* Whether it has ended by itself with a status after which another start would end the same way: neither success,
  * nor 75, nor that of a signal or of ssh without a connection (255). */

@@ -82,6 +82,13 @@ bool fl_text_real(const char *text, double minimum, double maximum, double *valu
     return true;
 }
 
+bool fl_text_write_error(struct fl_error *error, const char *field, const char *what, int number)
+{
+    fl_error_set(error, FL_ERROR_FILE, field, "%s: %s", what, strerror(number));
+    error->retryable = number == ENOSPC || number == EDQUOT;
+    return false;
+}
+
 bool fl_text_duration(const char *text, double max_s, double *seconds, struct fl_error *error)
 {
     static const struct {

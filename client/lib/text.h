@@ -15,6 +15,8 @@ bool fl_text_integer(const char *text, uint64_t minimum, uint64_t maximum, uint6
 /* Finite decimal number, within [minimum, maximum]. */
 bool fl_text_real(const char *text, double minimum, double maximum, double *value, struct fl_error *error);
 /* Seconds: "90", "1.5s", "5m" or "2h"; at most `max_s`. */
+/* "WHAT: why" of a file that cannot be written, by errno. Space that is lacking may be there later. */
+bool fl_text_write_error(struct fl_error *error, const char *field, const char *what, int number);
 bool fl_text_duration(const char *text, double max_s, double *seconds, struct fl_error *error);
 /* "1280x720", each edge 1..8192. */
 bool fl_text_size(const char *text, uint32_t *width, uint32_t *height, struct fl_error *error);

@@ -33,6 +33,7 @@ static bool take_failure(struct fl_video *video, const struct message *message, 
     fl_error_from_message(&why, &message->error);
     /* Whichever field the writer names, the caller learns that the file is not written. */
     fl_error_set(error, FL_ERROR_FILE, video->path, "%s", why.text);
+    error->retryable = why.retryable;
     return fl_error_remedy(error, "%s", why.remedy);
 }
 

@@ -3,6 +3,7 @@
  * each. */
 #include "lib/rate.h"
 #include "lib/stream.h"
+#include "lib/text.h"
 #include "protocol/pixels/ycbcr.h"
 
 #include <errno.h>
@@ -75,8 +76,7 @@ static bool write_all(struct fl_y4m *y4m, const uint8_t *bytes, size_t count, st
         const size_t piece = y4m->never_blocks || count < PIPE_BUF ? count : PIPE_BUF;
         const ssize_t written = write_quietly(y4m->options.fd, bytes, piece);
         if (written < 0 && errno != EINTR && errno != EAGAIN)
-            return fl_error_set(error, FL_ERROR_FILE, "", "the video stream cannot be written: %s",
-                                strerror(errno));
+            return fl_text_write_error(error, "", "the video stream cannot be written", errno);
         if (written > 0) {
             bytes += written;
             count -= (size_t)written;

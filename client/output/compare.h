@@ -25,8 +25,9 @@ struct compare_result {
     const char *remedy; /* may be NULL */
 };
 
-/* Where fonts are, for titles; nothing else has to be read after the sandbox is entered. */
+/* Where fonts are, for titles; nothing else has to be read within the sandbox. */
 #define COMPARE_FONT_FOLDER "/usr/share/fonts"
+#define COMPARE_LOCAL_FONT_FOLDER "/usr/local/share/fonts"
 /* Reads the files, writes the picture that is wanted. False: `field` and `reason` are set, and there is no
  * picture. */
 bool compare_images(const struct message_compare_images *wanted, const struct compare_file *a,

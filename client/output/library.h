@@ -31,7 +31,7 @@ struct library_host {
 
 /* Exported under the name `image_library`. */
 struct image_library {
-    /* Makes the libraries load their plug-ins while that is still allowed. */
+    /* Sets the libraries up, and tries those that encode. */
     bool (*prepare)(bool draws_text, char *reason, size_t reason_bytes);
     /* *file is malloc'ed. False: `reason` says why. */
     bool (*encode)(const struct library_image *image, uint8_t **file, size_t *file_bytes, char *reason,
@@ -46,7 +46,9 @@ struct image_library {
 };
 extern const struct image_library image_library __attribute__((visibility("default")));
 
-/* Loads the module, to be called before the sandbox is entered; `draws_text`: with a font. */
+/* The folder of the module, which the sandbox must let it read; the caller frees it. NULL: as module_folder. */
+char *library_folder(void);
+/* Loads the module, to be called within the sandbox, as its libraries start threads; `draws_text`: with a font. */
 void library_load(bool draws_text);
 /* NULL: `reason` says why. */
 const struct image_library *library_loaded(char *reason, size_t reason_bytes);

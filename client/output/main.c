@@ -88,24 +88,27 @@ static void open_files(struct options *options)
     }
 }
 
-/* Loads what libraries load late, while that is still allowed. */
-static void prepare(const struct options *options)
+static bool draws_text(const struct options *options)
 {
-    const bool writes = options->folder != NULL, compares = options->serve.file_count > 0;
-    tzset(); /* for dates */
-    const bool draws_text = compares || options->draws_text;
-    if (draws_text || (writes && image_needs_library(options->format)))
-        library_load(draws_text);
+    return options->draws_text || options->serve.file_count > 0;
 }
 
+static bool needs_library(const struct options *options)
+{
+    return draws_text(options) || (options->folder && image_needs_library(options->format));
+}
+
+/* The module's libraries start threads, so it is loaded within the sandbox. */
 static bool enter_sandbox(struct options *options)
 {
     const char *const write_folders[] = {options->folder};
-    const bool draws_text = options->draws_text || options->serve.file_count > 0;
-    const char *const read_folders[] = {draws_text ? COMPARE_FONT_FOLDER : NULL};
+    char *modules = needs_library(options) ? library_folder() : NULL;
+    const bool draws = draws_text(options);
+    const char *const read_folders[] = {modules, draws ? COMPARE_FONT_FOLDER : NULL,
+                                        draws ? COMPARE_LOCAL_FONT_FOLDER : NULL};
     const bool writes = options->folder != NULL;
     const struct sandbox_options sandbox = {.read_folders = read_folders,
-                                            .read_folder_count = 1,
+                                            .read_folder_count = sizeof(read_folders) / sizeof(read_folders[0]),
                                             .write_folders = write_folders,
                                             .write_folder_count = writes ? 1 : 0,
                                             .allow_rename = writes,
@@ -113,11 +116,15 @@ static bool enter_sandbox(struct options *options)
                                             .address_space_bytes = UINT64_C(16) << 30};
     char reason[TEXT_MAX] = "";
     open_files(options);
-    prepare(options);
-    if (!sandbox_enter(&sandbox, reason, sizeof(reason))) {
+    tzset(); /* for dates; within the sandbox it could not read the time zone */
+    const bool entered = sandbox_enter(&sandbox, reason, sizeof(reason));
+    free(modules);
+    if (!entered) {
         fprintf(stderr, "farlight-export: %s\n", reason);
         return false;
     }
+    if (needs_library(options))
+        library_load(draws);
     return true;
 }
 

@@ -127,7 +127,9 @@ static bool answer(struct exporter *exporter)
 {
     const struct request *request = &exporter->request;
     if (request->reason[0] != '\0')
-        return channel_send_failure(&exporter->channel, request->number, "", request->reason, NULL);
+        return channel_send_failure(
+            &exporter->channel, request->number,
+            &(struct channel_failure){.field = "", .reason = request->reason, .retryable = file_lacked_space()});
     return channel_send(&exporter->channel, request->number, &(struct message){.type = MESSAGE_OK});
 }
 
@@ -163,7 +165,11 @@ static bool compare(struct exporter *exporter, uint32_t number, const struct mes
     if (!a || !b)
         return false;
     if (!compare_images(wanted, a, b, &result))
-        return channel_send_failure(&exporter->channel, number, result.field, result.reason, result.remedy);
+        return channel_send_failure(&exporter->channel, number,
+                                    &(struct channel_failure){.field = result.field,
+                                                              .reason = result.reason,
+                                                              .remedy = result.remedy,
+                                                              .retryable = file_lacked_space()});
     const struct message message = {.type = MESSAGE_IMAGES_COMPARED, .images_compared = result.answer};
     return channel_send(&exporter->channel, number, &message);
 }

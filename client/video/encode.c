@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "encode.h"
+#include "helper/file.h"
 #include "protocol/pixels/ycbcr.h"
 #include "log.h"
 #include "palette.h"
@@ -143,7 +144,9 @@ static bool fail_file(const struct video_encoder *encoder, int number, struct vi
 {
     if (encoder->sink.failure == 0)
         return video_fail_library(failure, "path", "cannot be written", number);
-    return video_fail(failure, "path", NULL, "cannot be written: %s", strerror(encoder->sink.failure));
+    video_fail(failure, "path", NULL, "cannot be written: %s", strerror(encoder->sink.failure));
+    failure->lacks_space = file_is_lack_of_space(encoder->sink.failure);
+    return false;
 }
 
 static bool begin_file(struct video_encoder *encoder, const struct video_source *source,

@@ -10,6 +10,7 @@ struct video_failure {
     const char *field;
     char reason[512];
     const char *remedy;
+    bool lacks_space; /* on the disk */
 };
 /* Returns false. */
 bool video_fail(struct video_failure *failure, const char *field, const char *remedy, const char *format, ...)

@@ -34,6 +34,7 @@ bool video_fail(struct video_failure *failure, const char *field, const char *re
     va_list arguments;
     failure->field = field;
     failure->remedy = remedy;
+    failure->lacks_space = false;
     va_start(arguments, format);
     vsnprintf(failure->reason, sizeof(failure->reason), format, arguments);
     va_end(arguments);

@@ -58,16 +58,25 @@ static error_t parse(int key, char *value, struct argp_state *state)
 static bool enter_sandbox(const struct options *options)
 {
     const char *const write_folders[] = {options->folder};
-    const struct sandbox_options sandbox = {.write_folders = write_folders,
+    char *modules = options->gif ? palette_folder() : NULL;
+    const char *const read_folders[] = {modules};
+    const struct sandbox_options sandbox = {.read_folders = read_folders,
+                                            .read_folder_count = 1,
+                                            .write_folders = write_folders,
                                             .write_folder_count = 1,
                                             .allow_rename = true,
                                             .file_bytes = file_bytes_limit(),
                                             .address_space_bytes = UINT64_C(16) << 30};
     char reason[TEXT_MAX] = "";
-    if (sandbox_enter(&sandbox, reason, sizeof(reason)))
-        return true;
-    fprintf(stderr, "farlight-video: %s\n", reason);
-    return false;
+    const bool entered = sandbox_enter(&sandbox, reason, sizeof(reason));
+    free(modules);
+    if (!entered) {
+        fprintf(stderr, "farlight-video: %s\n", reason);
+        return false;
+    }
+    if (options->gif)
+        palette_load();
+    return true;
 }
 
 int main(int argc, char **argv)
@@ -87,7 +96,5 @@ int main(int argc, char **argv)
     signal(SIGXFSZ, SIG_IGN);
     file_clean_up_on_end();
     video_keep_log();
-    if (options.gif)
-        palette_load();
     return enter_sandbox(&options) && video_serve(options.fd) ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -20,7 +20,9 @@ struct palette_maker {
 };
 extern const struct palette_maker palette_maker __attribute__((visibility("default")));
 
-/* Loads the module, to be called before the sandbox is entered. */
+/* The folder of the module, which the sandbox must let it read; the caller frees it. NULL: as module_folder. */
+char *palette_folder(void);
+/* Loads the module, to be called within the sandbox, as its libraries may start threads. */
 void palette_load(void);
 /* NULL: `reason` says why. */
 const struct palette_maker *palette_loaded(char *reason, size_t reason_bytes);

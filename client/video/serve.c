@@ -44,8 +44,12 @@ static bool fail(struct session *session, const struct video_failure *failure)
 {
     drop_video(session);
     session->state = STATE_FAILED;
-    return channel_send_failure(&session->channel, session->number, failure->field, failure->reason,
-                                failure->remedy);
+    return channel_send_failure(
+        &session->channel, session->number,
+        &(struct channel_failure){.field = failure->field,
+                                  .reason = failure->reason,
+                                  .remedy = failure->remedy,
+                                  .retryable = failure->lacks_space || file_lacked_space()});
 }
 
 /* ---- beginning ---- */
@@ -92,7 +96,7 @@ static bool check_frame(const struct session *session, const struct message_fram
 
 static bool begin_frame(struct session *session, const struct message_frame_begin *begin)
 {
-    struct video_failure failure;
+    struct video_failure failure = {.field = ""};
     const bool is_open = session->state == STATE_OPEN;
     const bool is_good = is_open && check_frame(session, begin, &failure);
     if (!incoming_begin(&session->incoming, begin, is_good))

@@ -5,6 +5,7 @@
 #include "lib/text.h"
 #include "viewer/input.h"
 #include "viewer/viewer.h"
+#include "protocol/common/standard.h"
 #include "protocol/version.h"
 
 #include <errno.h>
@@ -329,6 +330,8 @@ static void fill(struct command_line *line)
     viewer->has_framing = job->has_framing;
     viewer->clip = job->clip_count > 0 ? job->clips[0].which : NULL;
     viewer->speed = job->clip_count > 0 ? job->clips[0].speed : 1;
+    viewer->has_retry_for = job->retries.has_duration;
+    viewer->retry_for_s = job->retries.for_s;
     viewer->interrupt_fd = cli_interrupt_fd();
     viewer->interrupt_signal = cli_interrupt_signal;
     viewer->note = job->quiet ? NULL : on_note;
@@ -401,6 +404,7 @@ int main(int argc, char **argv)
                                      .help_filter = help_filter};
     static struct command_line line;
     argp_err_exit_status = CLI_USAGE;
+    open_standard_descriptors();
     if (!read_all(&line, &argp, argc, argv))
         return cli_report(&line.job.error);
     struct fl_error error = {0};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/session.h"
+#include "cli/cli.h"
 #include "cli/watch.h"
 
 #include <inttypes.h>
@@ -24,6 +25,7 @@ struct session {
     unsigned times_live, times_read;
     struct fl_error error;
     uint64_t retry_ns, pause_ns;
+    uint64_t lost_ns; /* since when it is tried; 0: it is live */
 
     /* Of the thread while it runs, ours else. */
     pthread_t thread;
@@ -119,6 +121,14 @@ static struct fl_scene *come_to_scene(struct session *session, struct fl_error *
     return load(session, error);
 }
 
+static unsigned connect_timeout_ms(const struct session *session)
+{
+    const struct session_options *options = &session->options;
+    if (session->times_live > 0)
+        return AGAIN_TIMEOUT_MS;
+    return options->server && options->has_retry_for ? cli_connect_timeout_ms(options->retry_for_s) : 0;
+}
+
 static void *open_all(void *argument)
 {
     struct session *session = argument;
@@ -129,7 +139,7 @@ static void *open_all(void *argument)
                                                .name = "farlight view",
                                                .can_h264 = true,
                                                .interrupt_fd = options->interrupt_fd,
-                                               .timeout_ms = session->times_live > 0 ? AGAIN_TIMEOUT_MS : 0};
+                                               .timeout_ms = connect_timeout_ms(session)};
     set_progress(session, options->server ? options->server : "starting a daemon", 0);
     session->connection = fl_connect(&connect, &session->open_error);
     if (session->connection)
@@ -186,11 +196,23 @@ static void close_all(struct session *session)
     session->connection = NULL;
 }
 
+/* Where no daemon has answered yet, the address may be misspelt. */
+static bool may_be_tried_again(const struct session *session, uint64_t now_ns)
+{
+    const struct session_options *options = &session->options;
+    if (!options->has_retry_for)
+        return session->times_live > 0;
+    return (session->times_live > 0 || cli_is_temporary(&session->error)) &&
+           (double)(now_ns - session->lost_ns) * 1e-9 < options->retry_for_s;
+}
+
 static void lose(struct session *session, const struct fl_error *error, uint64_t now_ns)
 {
     session->error = *error;
     close_all(session);
-    if (session->times_live == 0) {
+    if (session->lost_ns == 0)
+        session->lost_ns = now_ns;
+    if (!may_be_tried_again(session, now_ns)) {
         session->state = SESSION_FAILED;
         return;
     }
@@ -241,6 +263,7 @@ static void end_opening(struct session *session, uint64_t now_ns)
         return;
     }
     session->times_live++;
+    session->lost_ns = 0;
     session->pause_ns = FIRST_PAUSE_NS;
     session->state = SESSION_LIVE;
 }

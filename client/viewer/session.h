@@ -20,6 +20,10 @@ struct session_options {
     size_t edit_count;
     const char *scene_name; /* .. or, not NULL, the scene to attach to */
     bool watch;             /* the files are read again when they change */
+    /* How long a daemon is tried that is lost, or not there at first. Without has_retry_for: for ever, and not at
+     * all. */
+    bool has_retry_for;
+    double retry_for_s;
     int interrupt_fd;
     void (*note)(void *user, const struct fl_note *note); /* of the first load; called from another thread */
     /* Why changed files could not be loaded: the scene stays as it was. */
@@ -31,7 +35,7 @@ enum session_state {
     SESSION_OPENING,
     SESSION_LIVE,
     SESSION_LOST,  /* it is tried again in a while */
-    SESSION_FAILED /* it never was there, and will not be */
+    SESSION_FAILED /* it never was there, and will not be; or it was tried for as long as wanted */
 };
 
 /* The strings and lists must live until it is destroyed. */

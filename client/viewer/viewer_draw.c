@@ -43,9 +43,9 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
         snprintf(text, sizeof(text), "rendering the first picture");
         return;
     }
-    state->status = was_live ? HUD_LOST : HUD_LOADING;
     const struct fl_error *error = session_error(viewer->session);
-    if (was_live && error->code != FL_ERROR_NONE) {
+    state->status = was_live ? HUD_LOST : HUD_LOADING;
+    if (error->code != FL_ERROR_NONE) {
         const uint64_t retry_ns = session_retry_ns(viewer->session), now_ns = state->now_ns;
         const double left_s = retry_ns > now_ns ? (double)(retry_ns - now_ns) * 1e-9 : 0;
         snprintf(text, sizeof(text), "%.80s; trying again in %.1f s", error->text, left_s);
@@ -209,14 +209,15 @@ static json_t *edit_json(const struct viewer_edit *edit)
 {
     const struct fl_object_state *state = &edit->state;
     json_t *fields = json_object();
-    for (size_t i = 0; i < state->count; i++) {
+    for (size_t i = 0; edit->has_state && i < state->count; i++) {
         json_t *values = json_array();
         for (unsigned k = 0; k < state->fields[i].field.count; k++)
             json_array_append_new(values, json_real(state->fields[i].values[k]));
         json_object_set_new(fields, state->fields[i].field.name, values);
     }
-    return json_pack("{s:s, s:i, s:s, s:s, s:o}", "kind", edit->hud.tabs[edit->tab], "object", (int)state->id,
-                     "name", state->name, "row", edit->hud.rows[edit->chosen].name, "fields", fields);
+    return json_pack("{s:s, s:s, s:i, s:s, s:s, s:o}", "kind", edit->hud.tabs[edit->tab], "title", edit->hud.title,
+                     "object", edit->has_state ? (int)state->id : 0, "name", edit->has_state ? state->name : "",
+                     "row", edit->hud.rows[edit->chosen].name, "fields", fields);
 }
 
 void viewer_print_state(struct viewer *viewer, const char *name)
@@ -249,7 +250,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",
                                       viewer->heat_figures.max, "beyond", viewer->heat_figures.beyond));
-    if (line && viewer->edit.shown && viewer->edit.has_state)
+    if (line && viewer->edit.shown)
         json_object_set_new(line, "edit", edit_json(&viewer->edit));
     if (line && viewer->notice_ns > state.now_ns)
         json_object_set_new(line, "notice", json_string(viewer->notice));

@@ -361,6 +361,12 @@ const struct hud_edit *viewer_edit_hud(struct viewer *viewer)
     *hud = (struct hud_edit){.shown = edit->shown, .tab = edit->tab, .chosen = edit->chosen};
     memcpy(hud->tabs, tab_names, sizeof(hud->tabs));
     hud->hint = "Ctrl + click on it";
+    /* Of what cannot be picked the first one is chosen, if there is one. */
+    if (edit->tab >= EDIT_LIGHT && edit->ids[edit->tab] == 0) {
+        snprintf(hud->title, sizeof(hud->title), "the scene has no %s", tab_names[edit->tab]);
+        hud->hint = edit->tab == EDIT_LIGHT ? "Tab: the environment, which lights it" : "";
+        return hud;
+    }
     if (!edit->has_state) {
         snprintf(hud->title, sizeof(hud->title), "no %s is chosen", tab_names[edit->tab]);
         return hud;

@@ -38,6 +38,8 @@ struct session *viewer_open_session(struct viewer *viewer, const char *dropped, 
                                             .edit_count = dropped ? 0 : options->edit_count,
                                             .point_size = options->point_size,
                                             .scene_name = dropped ? NULL : options->scene_name,
+                                            .has_retry_for = options->has_retry_for && !dropped,
+                                            .retry_for_s = options->retry_for_s,
                                             .interrupt_fd = options->interrupt_fd,
                                             .note = options->note};
     return session_create(&session, error);

@@ -145,7 +145,11 @@ char *web_editing_answer(struct edit_history *history, struct fl_scene *scene, c
         return read_one(scene, request, error);
     case WEB_EDIT:
         return edit(history, scene, request, error);
-    default:
+    case WEB_UNDO:
+    case WEB_REDO:
         return undo(history, scene, request->kind == WEB_REDO, error);
+    default:
+        fl_error_set(error, FL_ERROR_ARGUMENT, "edit", "this request changes and reads nothing of the scene");
+        return NULL;
     }
 }

@@ -3,6 +3,7 @@
 #include "web/callers.h"
 #include "web/page.h"
 #include "protocol/common/clock.h"
+#include "protocol/plain_text.h"
 
 #include <libwebsockets.h>
 #include <stdio.h>
@@ -31,6 +32,7 @@ struct gateway {
     struct web_callers callers;
     struct web_links links;
     unsigned viewers;
+    bool has_told_origin;
     lws_sorted_usec_list_t check;
 };
 
@@ -72,6 +74,22 @@ static bool is_own_origin(struct lws *wsi)
            (strncmp(origin, "http://", 7) == 0 || strncmp(origin, "https://", 8) == 0);
 }
 
+/* The page itself has the right name where a proxy has changed it for its socket. Once: a foreign page may ask as
+ * often as it likes. */
+static void tell_other_origin(struct gateway *gateway, struct lws *wsi)
+{
+    char origin[NAME_BYTES] = "", host[NAME_BYTES] = "";
+    if (gateway->has_told_origin || lws_hdr_copy(wsi, origin, sizeof(origin), WSI_TOKEN_ORIGIN) <= 0 ||
+        lws_hdr_copy(wsi, host, sizeof(host), WSI_TOKEN_HOST) <= 0)
+        return;
+    gateway->has_told_origin = true;
+    fputs("farlight: a page with the link was refused: its Origin is ", stderr);
+    plain_text_print(stderr, origin);
+    fputs(", but its Host ", stderr);
+    plain_text_print(stderr, host);
+    fputs(" (a proxy has to pass the Host on; nginx: proxy_set_header Host $http_host)\n", stderr);
+}
+
 /* The HTTP status with which a WebSocket is turned away; 0: it may come in. */
 static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web_right *right)
 {
@@ -82,8 +100,10 @@ static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web
     const char *name = length > 0 ? web_links_find(&gateway->links, path, right) : NULL;
     if (!name || strcmp(name, "view") != 0)
         return HTTP_STATUS_UNAUTHORIZED;
-    if (!is_own_origin(wsi))
+    if (!is_own_origin(wsi)) {
+        tell_other_origin(gateway, wsi);
         return HTTP_STATUS_FORBIDDEN;
+    }
     return gateway->viewers < gateway->options->viewers ? 0 : HTTP_STATUS_SERVICE_UNAVAILABLE;
 }
 
@@ -119,6 +139,27 @@ static int begin_page(struct lws *wsi, struct visitor *visitor, const struct pag
     return 0;
 }
 
+/* A link whose last slash was lost. The address is relative, as a proxy may have put more in front. */
+static int add_slash(struct lws *wsi, const char *path)
+{
+    unsigned char buffer[LWS_PRE + HEADERS_BYTES], *at = buffer + LWS_PRE;
+    char to[WEB_TOKEN_LENGTH + 2];
+    const int length = snprintf(to, sizeof(to), "%s/", path + 1);
+    return lws_http_redirect(wsi, HTTP_STATUS_MOVED_PERMANENTLY, (const unsigned char *)to, length, &at,
+                             buffer + sizeof(buffer) - 1) < 0 ||
+                   lws_http_transaction_completed(wsi)
+               ? -1
+               : 0;
+}
+
+static bool lacks_slash(const struct gateway *gateway, const char *path)
+{
+    char whole[WEB_TOKEN_LENGTH + 3];
+    enum web_right right;
+    return strlen(path) == WEB_TOKEN_LENGTH + 1 && snprintf(whole, sizeof(whole), "%s/", path) > 0 &&
+           web_links_find(&gateway->links, whole, &right);
+}
+
 static int on_page(struct gateway *gateway, struct lws *wsi, struct visitor *visitor, const char *path)
 {
     if (!is_own_host(gateway, wsi))
@@ -126,6 +167,8 @@ static int on_page(struct gateway *gateway, struct lws *wsi, struct visitor *vis
     const bool is_get = lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0;
     enum web_right right;
     const char *name = web_links_find(&gateway->links, path, &right);
+    if (!name && is_get && lacks_slash(gateway, path))
+        return add_slash(wsi, path);
     if (!name)
         return begin_page(wsi, visitor, &page_denied, HTTP_STATUS_UNAUTHORIZED);
     const struct page_file *file = page_find(name);
@@ -377,14 +420,19 @@ static bool listen_at(struct gateway *gateway, const struct web_address *address
     return true;
 }
 
+/* Of several links each says what it gives, behind a blank, where neither terminals nor scripts take it for a part
+ * of the link. */
 static void announce(const struct gateway *gateway)
 {
+    static const char *const gives[WEB_RIGHT_COUNT] = {
+        [WEB_LOOKS] = "  to look", [WEB_EDITS] = "  to look and edit"};
+    const bool has_several = gateway->options->allow_edit;
     const struct web_address *address = gateway->options->listens;
     char host[NAME_BYTES];
     web_address_print(address, host, sizeof(host));
-    for (int right = 0; right <= (gateway->options->allow_edit ? WEB_EDITS : WEB_LOOKS); right++)
-        printf("http://%s:%d/%s/\n", address->is_any ? gateway->machine : host, gateway->port,
-               gateway->links.tokens[right]);
+    for (int right = 0; right <= (has_several ? WEB_EDITS : WEB_LOOKS); right++)
+        printf("http://%s:%d/%s/%s\n", address->is_any ? gateway->machine : host, gateway->port,
+               gateway->links.tokens[right], has_several ? gives[right] : "");
     fflush(stdout);
 }
 

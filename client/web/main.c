@@ -4,6 +4,7 @@
 #include "cli/watch.h"
 #include "lib/text.h"
 #include "web/gateway.h"
+#include "protocol/common/standard.h"
 #include "protocol/version.h"
 
 #include <errno.h>
@@ -328,6 +329,7 @@ int main(int argc, char **argv)
     static struct command_line line;
     struct fl_error error = {0};
     argp_err_exit_status = CLI_USAGE;
+    open_standard_descriptors();
     line.gateway.viewers = VIEWERS_DEFAULT;
     web_outage_init(&line.outage);
     if (!cli_job_begin(&line.job, fl_view_defaults()) || cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &line) != 0)

@@ -11,6 +11,7 @@
 #define WEB_HEIGHT_MAX 2160u
 
 enum web_request_kind {
+    WEB_NONE,    /* no request */
     WEB_SHOW,    /* {"show": {"width", "height", "h264", "tracer", "integrator", "clip"}} */
     WEB_LOOK,    /* {"look": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
     WEB_SHOWN,   /* {"shown": N}: another N frames are on the screen */

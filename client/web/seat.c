@@ -3,6 +3,7 @@
 #include "web/describe.h"
 #include "web/editing.h"
 #include "web/error_map.h"
+#include "web/inbox.h"
 #include "protocol/common/clock.h"
 
 #include <errno.h>
@@ -25,8 +26,7 @@ struct seat {
     int wake_fd, end_fd; /* events: there is something to do; it is over */
 
     pthread_mutex_t lock; /* guards what follows */
-    bool wants_show, wants_look, wants_key, wants_compare, wants_edit;
-    struct web_request show, look, compare, edit;
+    struct web_inbox inbox;
     bool has_ended;
     struct web_queue queue;
 
@@ -228,30 +228,26 @@ static bool answer_edit(struct seat *seat, const struct web_request *request, st
 static bool do_what_came(struct seat *seat, struct fl_error *error)
 {
     pthread_mutex_lock(&seat->lock);
-    const bool wants_show = seat->wants_show, wants_look = seat->wants_look, wants_key = seat->wants_key;
     /* Each answer is a parcel, and those that wait are counted. */
-    const bool wants_compare = seat->wants_compare && seat->view && web_queue_has_room_for_text(&seat->queue);
-    const bool wants_edit = seat->wants_edit && seat->view && web_queue_has_room_for_text(&seat->queue);
-    const bool wants_scene =
-        seat->shown_revision > seat->described_revision && web_queue_has_room_for_text(&seat->queue);
-    const struct web_request shown = seat->show, looked = seat->look, compared = seat->compare,
-                             edited = seat->edit;
-    seat->wants_edit = seat->wants_edit && !wants_edit;
-    seat->wants_compare = seat->wants_compare && !wants_compare;
-    seat->wants_show = seat->wants_key = false;
-    seat->wants_look = wants_look && !seat->view && !wants_show;
+    const bool may_answer = web_queue_has_room_for_text(&seat->queue);
+    const bool wants_scene = seat->shown_revision > seat->described_revision && may_answer;
+    const struct web_request shown = web_inbox_take(&seat->inbox.show, true),
+                             key = web_inbox_take(&seat->inbox.key, true),
+                             looked = web_inbox_take(&seat->inbox.look, seat->view || shown.kind != WEB_NONE),
+                             compared = web_inbox_take(&seat->inbox.compare, seat->view && may_answer),
+                             edited = web_inbox_take(&seat->inbox.edit, seat->view && may_answer);
     pthread_mutex_unlock(&seat->lock);
-    if (wants_show && !show(seat, &shown.show, error))
+    if (shown.kind != WEB_NONE && !show(seat, &shown.show, error))
         return false;
-    if (wants_look && seat->view && !look(seat, &looked, error))
+    if (looked.kind != WEB_NONE && !look(seat, &looked, error))
         return false;
-    if (wants_compare && !compare(seat, compared.id, error))
+    if (compared.kind != WEB_NONE && !compare(seat, compared.id, error))
         return false;
-    if (wants_edit && !answer_edit(seat, &edited, error))
+    if (edited.kind != WEB_NONE && !answer_edit(seat, &edited, error))
         return false;
     if (wants_scene && !describe(seat, error))
         return false;
-    return !wants_key || !seat->view || fl_view_want_key_frame(seat->view, error);
+    return key.kind == WEB_NONE || !seat->view || fl_view_want_key_frame(seat->view, error);
 }
 
 /* Until there is something to do; false: it is over. */
@@ -275,7 +271,7 @@ static bool wait_for_work(struct seat *seat)
 static bool has_show(struct seat *seat)
 {
     pthread_mutex_lock(&seat->lock);
-    const bool has = seat->wants_show;
+    const bool has = seat->inbox.show.kind != WEB_NONE;
     pthread_mutex_unlock(&seat->lock);
     return has;
 }
@@ -398,26 +394,13 @@ bool seat_tell(struct seat *seat, const struct web_request *request)
 {
     bool is_taken = true;
     pthread_mutex_lock(&seat->lock);
-    if (request->kind == WEB_SHOW) {
-        seat->show = *request;
-        seat->wants_show = true;
-    } else if (request->kind == WEB_LOOK) {
-        seat->look = *request;
-        seat->wants_look = true;
-    } else if (request->kind == WEB_KEY) {
-        seat->wants_key = true;
-    } else if (request->kind == WEB_COMPARE) {
-        seat->compare = *request;
-        seat->wants_compare = true;
-    } else if (web_request_edits(request->kind)) {
-        is_taken = seat->options.may_edit && !seat->wants_edit;
-        seat->edit = is_taken ? *request : seat->edit;
-        seat->wants_edit = true;
-    } else {
+    if (request->kind == WEB_SHOWN)
         web_queue_shown(&seat->queue, request->shown);
-    }
+    else
+        is_taken = web_inbox_put(&seat->inbox, request, seat->options.may_edit);
     pthread_mutex_unlock(&seat->lock);
-    signal_event(seat->wake_fd);
+    if (is_taken)
+        signal_event(seat->wake_fd);
     return is_taken;
 }
 

@@ -78,9 +78,9 @@ bool auth_keys_have(const struct auth_keys *keys, const struct auth_identity *id
     return false;
 }
 
-bool auth_is_beyond_loopback(const struct address *own, const struct address *peer)
+bool auth_needs_key(const struct address *own, const struct address *peer, const struct auth_keys *keys)
 {
-    return !address_is_unix(peer) && !(address_is_loopback(own) && address_is_loopback(peer));
+    return !address_is_unix(peer) && (keys || !address_is_loopback(own) || !address_is_loopback(peer));
 }
 
 bool auth_identify(struct auth_identity *identity, int fd, const struct address *peer, bool beyond_loopback,

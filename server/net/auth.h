@@ -43,7 +43,8 @@ bool auth_identify(struct auth_identity *identity, int fd, const struct address 
                    struct error *error);
 /* The client has proved that it holds the key of that index, which is its identity from now on. */
 void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index);
-/* Whether a connection between the daemon's own address and the peer's leaves this host, or could. */
-bool auth_is_beyond_loopback(const struct address *own, const struct address *peer);
+/* Whether a connection between the daemon's own address and the peer's needs a key: TCP that leaves this host, or
+ * could; and all TCP where the daemon has keys, as every user of this host reaches loopback. */
+bool auth_needs_key(const struct address *own, const struct address *peer, const struct auth_keys *keys);
 
 #endif

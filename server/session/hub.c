@@ -245,7 +245,7 @@ static void make_place(struct hub *hub, const struct owner *owner, bool is_tcp)
 bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
                     struct error *error)
 {
-    bool sealed_only = !hub->options.insecure && auth_is_beyond_loopback(own, peer);
+    bool sealed_only = !hub->options.insecure && auth_needs_key(own, peer, hub->options.keys);
     struct auth_identity identity;
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");

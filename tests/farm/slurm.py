@@ -112,7 +112,7 @@ class Slurm:
 
     def submit(self, script, array, *arguments, **variables):
         """The number of the job; `variables` are of its environment."""
-        answer = self.ask("sbatch", "--parsable", f"--chdir={self.folder}", f"--array={array}", script, *arguments, **variables)
+        answer = self.ask("sbatch", "--parsable", f"--chdir={self.folder}", f"--array={array}", "--gres=none", script, *arguments, **variables)
         return int(answer.split(";")[0])
 
     def queue(self):

@@ -25,6 +25,10 @@ long_test = unittest.skipUnless(LONG, "left to make test-all")
 # A picture has one sample where a test says nothing, in place of 16 and more of what is noisy (Case.default_samples).
 os.environ.setdefault("FARLIGHT_SAMPLES", "1")
 
+# A shell's background commands ignore SIGINT, and so would all programs that tests start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 _bundled = None
 
 

@@ -64,15 +64,69 @@ class Digests(Case):
 
 
 class Progress(Case):
+    def each_frame_has_a_line(self, result):
+        told = re.findall(r"^frame (\d+): \d+\.\d\d s, (\d+) MB, (.*)$", self.expect(result, 0).stderr, re.M)
+        self.assertEqual([(number, path) for number, _, path in told], [(str(i), f"{self.folder}/{i}.png") for i in range(1, 5)])
+        for _, megabytes, _ in told:  # of the command and the daemon that it has started
+            self.assertGreater(int(megabytes), 10)
+
+    def test_a_log_has_a_line_for_each_frame_that_is_complete(self):
+        output = ["--frames", "1-4", "-o", self.folder / "%d.png"]
+        self.each_frame_has_a_line(animate(*output))
+        self.assertNotIn("frame 1", self.expect(animate(*output, "-q"), 0).stderr)
+        video = self.expect(animate("--frames", "1-2", "-o", self.folder / "x.y4m"), 0).stderr
+        self.assertEqual(re.findall(r"^frame (\d+): .* MB, (.*)$", video, re.M), [(str(i), f"{self.folder}/x.y4m") for i in (1, 2)])
+
     def test_open_job_description_reads_it_on_standard_output(self):
         output = ["--frames", "1-4", "-o", self.folder / "%d.png"]
         lines = self.expect(animate(*output, "--progress", "openjd"), 0).stdout.splitlines()
         shares = [float(line.split(": ")[1]) for line in lines if line.startswith("openjd_progress: ")]
         self.assertEqual((shares, shares[-1]), (sorted(shares), 100))
         self.assertTrue(all(re.match(r"openjd_(progress: \d+\.\d|status: .+)$", line) for line in lines), lines)
+        self.each_frame_has_a_line(animate(*output, "--progress", "openjd"))
         result = self.expect(farlight("render", "x.glb", "-o", "-", "--progress", "openjd"), 2)
         self.assertIn("--progress", result.stderr)
         self.assertIn("bar, lines and openjd", self.expect(animate(*output, "--progress", "loud"), 2).stderr)
+
+
+class OpenJobDescription(unittest.TestCase):
+    """The template, by the fields of the published schema and the names of its format strings."""
+
+    def setUp(self):
+        try:
+            import jsonschema  # pylint: disable=import-outside-toplevel
+            import yaml  # pylint: disable=import-outside-toplevel
+        except ImportError as why:
+            self.skipTest(f"python3-{why.name} is not installed")
+        schema = json.loads((pathlib.Path(__file__).parents[1] / "farm/openjd.schema.json").read_text())
+        self.validator = jsonschema.Draft7Validator(schema)
+        self.template = yaml.safe_load((NODE.parent / "openjd.yaml").read_text())
+
+    def faults(self):
+        return [f"{'.'.join(map(str, one.absolute_path))}: {one.message}" for one in self.validator.iter_errors(self.template)]
+
+    def test_the_template_has_fields_that_there_are(self):
+        self.assertEqual(self.faults(), [])
+        self.template["parameterDefinitions"][1]["allowedPattern"] = "[0-9]+-[0-9]+"  # of no version
+        self.assertEqual(len(self.faults()), 1)
+
+    def test_each_parameter_has_a_control_and_rendering_asks_for_a_gpu(self):
+        for parameter in self.template["parameterDefinitions"]:
+            self.assertIn("control", parameter["userInterface"], parameter["name"])
+        render, verify = self.template["steps"]
+        self.assertEqual(render["hostRequirements"]["amounts"], [{"name": "amount.worker.gpu", "min": 1}])
+        self.assertNotIn("amounts", verify["hostRequirements"])
+
+    def test_format_strings_name_what_there_is(self):
+        parameters = {one["name"] for one in self.template["parameterDefinitions"]}
+        names = {f"{kind}.{name}" for name in parameters for kind in ("Param", "RawParam")} | {"Session.WorkingDirectory"}
+        for step in self.template["steps"]:
+            known = names | {f"Task.Param.{one['name']}" for one in step.get("parameterSpace", {}).get("taskParameterDefinitions", ())}
+            known |= {f"Task.File.{one['name']}" for one in step["script"].get("embeddedFiles", ())}
+            for environment in step.get("stepEnvironments", ()):
+                known |= {f"Env.File.{one['name']}" for one in environment["script"]["embeddedFiles"]}
+            for name in re.findall(r"{{\s*([\w.]+)\s*}}", json.dumps(step)):
+                self.assertIn(name, known, step["name"])
 
 
 class OneDaemonForManyTasks(Case):
@@ -114,6 +168,38 @@ class OneDaemonForManyTasks(Case):
             result = self.expect(self.node("true", FARLIGHT_START="1"), 75)
             self.assertEqual(result.stderr, "farlight-node: the daemon does not start: farlightd --listen "
                              f"unix:{folder}/gpu-software.sock --device software {words}farlight-node: it said nothing; its log, {log}, is empty\n")
+
+    def test_the_gpu_that_the_queue_gave_is_taken(self):
+        listed = "".join(f"{number}  {name}  (vendor, OpenGL 4.6{end})\n" for number, name, end in
+                         ((0, "llvmpipe", ", software"), (1, "A40", ""), (2, "A40", ""), (4, "A40", ""), (5, "A40", "")))
+        fake = self.folder / "farlightd"
+        for given, hidden, gpu in (({}, False, "auto"), ({"SLURM_JOB_GPUS": "2"}, False, "4"), ({"CUDA_VISIBLE_DEVICES": "0"}, False, "1"),
+                                   ({"SLURM_JOB_GPUS": "1,3", "SLURM_LOCALID": "1"}, False, "5"),
+                                   ({"SLURM_JOB_GPUS": "1,3", "SLURM_LOCALID": "2"}, False, "2"),
+                                   ({"SLURM_JOB_GPUS": "3", "CUDA_VISIBLE_DEVICES": "0"}, True, "1"), ({"SLURM_JOB_GPUS": "9"}, False, "auto"),
+                                   ({"CUDA_VISIBLE_DEVICES": ""}, False, "software"), ({"CUDA_VISIBLE_DEVICES": "GPU-8932"}, False, "auto"),
+                                   ({"SLURM_JOB_GPUS": "2", "FARLIGHT_GPU": "7"}, False, "7")):
+            with self.subTest(given):
+                shown = "\n".join(listed.splitlines()[:2]) if hidden else listed
+                fake.write_text(f"#!/bin/sh\n[ \"$1\" != --list-devices ] || {{ cat <<'E'\n{shown}\nE\nexit; }}\nexit 3\n")
+                fake.chmod(0o755)
+                variables = {"FARLIGHT_GPU": "", **given}
+                for name in ("SLURM_STEP_GPUS", "SLURM_JOB_GPUS", "SLURM_LOCALID", "CUDA_VISIBLE_DEVICES"):
+                    os.environ.pop(name, None)
+                self.assertIn(f" --device {gpu} ended", self.expect(self.node("true", **variables), 75).stderr)
+
+    def test_an_element_of_an_array_alone_is_no_part_without_their_number(self):
+        script = NODE.parent / "slurm.sbatch"
+        fake = self.folder / "farlight-node"
+        fake.write_text("#!/bin/sh\necho \"$@\"\n")
+        fake.chmod(0o755)
+        for low, high, count, parts, wanted in ((1, 4, 4, "", "3/4"), (3, 3, 1, "", None), (1, 5, 3, "", None), (3, 3, 1, "4", "3/4")):
+            environment = {**os.environ, "PATH": f"{self.folder}:{os.environ['PATH']}", "MODEL": "m.glb", "FRAMES": "1-8", "OUTPUT": "%d.png",
+                           "PARTS": parts, "SLURM_ARRAY_JOB_ID": "1", "SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_MIN": str(low),
+                           "SLURM_ARRAY_TASK_MAX": str(high), "SLURM_ARRAY_TASK_COUNT": str(count)}
+            result = subprocess.run(["bash", script], env=environment, capture_output=True, text=True, check=False)
+            self.assertEqual(result.returncode, 0 if wanted else 2, result.stderr)
+            self.assertIn(f"--shard {wanted} " if wanted else "give PARTS", result.stdout + result.stderr)
 
     def test_what_cannot_be_a_value_is_named(self):
         for command, environment, status, words in (

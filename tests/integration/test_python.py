@@ -272,9 +272,18 @@ class Lies(Case):
         async with await farlight.aio.connect(address, timeout=0.3) as client:
             await client.stats()
 
+    def test_an_importer_gets_no_secrets(self):
+        program = self.folder / "farlight-import"
+        program.write_text("#!/bin/sh\necho \"secret ${TOKEN-unset}, zone $TZ\"\nexit 3\n")
+        program.chmod(0o700)
+        with unittest.mock.patch.dict(os.environ, {"FARLIGHT_LIBEXEC": str(self.folder), "TOKEN": "x", "TZ": "UTC"}):
+            with self.assertRaises(farlight.Error) as raised:
+                farlight.load(program)
+        self.assertIn("secret unset, zone UTC", str(raised.exception))
+
     def test_a_program_that_cannot_start_says_why(self):
         fake = self.folder / "farlightd"
-        fake.write_text("#!/bin/sh\necho 'no device gives OpenGL 4.5' >&2\nexit 1\n")
+        fake.write_text("#!/bin/sh\necho log >&2\necho 'farlightd: no device gives OpenGL 4.5\nfarlightd: install one' >&2\nexit 1\n")
         fake.chmod(0o755)
         environment = {**os.environ, "FARLIGHT_LIBEXEC": str(self.folder)}
         environment.pop("FARLIGHT_SERVER", None)
@@ -282,7 +291,7 @@ class Lies(Case):
             for connect in (farlight.connect, lambda: asyncio.run(farlight.aio.connect())):
                 with self.assertRaises(farlight.ConnectionLost) as raised:
                     connect()
-                self.assertIn("farlightd ended with status 1: no device gives OpenGL 4.5", str(raised.exception))
+                self.assertIn("farlightd ended with status 1: no device gives OpenGL 4.5; install one", str(raised.exception))
                 self.assertFalse(raised.exception.retryable)
         with unittest.mock.patch.dict(os.environ, {"FARLIGHT_LIBEXEC": "", "PATH": str(self.folder / "none")}):
             with self.assertRaises(farlight.FileFailed) as raised:

@@ -4,10 +4,13 @@ import contextlib
 import fcntl
 import json
 import os
+import pathlib
+import os
 import pty
 import re
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import tempfile
@@ -248,6 +251,23 @@ class BadInput(Case):
         self.assertIn("x.exr", result.stderr)
         self.assertEqual(self.leftovers(), [])
 
+    def test_no_space_may_be_there_later(self):
+        """On a disk of 4 KB; the status asks a queue for another try."""
+        full = self.folder / "full"
+        full.mkdir()
+        alone = ["unshare", "--map-root-user", "--mount", "sh", "-c", 'mount -t tmpfs -o size=4k none "$0" && exec "$@"', full]
+        if subprocess.run([*alone, "true"], check=False, capture_output=True).returncode != 0:
+            self.skipTest("no file system can be mounted here")
+        for name in ("x.png", "x.exr", "x.tiff", "%d.png", "x.mp4", "x.y4m"):
+            what = ["render", "--size", "96x80"] if name.startswith("x.") and name[2:] in ("png", "exr", "tiff") else \
+                ["animate", "--frames", "1-9", "--orbit", "--size", "240x160", "--integrator", "distributed"]
+            with self.subTest(name):
+                result = subprocess.run([*alone, BIN / "farlight", *what, bundled_scenes() / "teapot.glb", "-o", full / name],
+                                        check=False, capture_output=True, text=True, timeout=farlight_test.TIMEOUT_S)
+                self.assertEqual(result.returncode, 75, result.stderr)
+                self.assertIn("No space left", result.stderr)
+                self.assertNotIn("trying again", result.stderr)
+
     def test_an_interrupt_ends_an_animation_cleanly(self):
         pattern = self.folder / "%04d.png"
         child = subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--frames", "1-500",
@@ -261,6 +281,86 @@ class BadInput(Case):
         self.assertEqual(child.returncode, 130, errors)
         for name in self.leftovers():
             read_png(self.folder / name)  # complete, or it would not be here
+
+    def test_a_hang_up_that_is_ignored_ends_nothing(self):
+        """As nohup starts a program."""
+        pattern = self.folder / "%04d.png"
+        with subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--frames", "1-8", "--orbit",
+                               "--size", "96x72", "-o", pattern], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                              preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as child:
+            deadline = time.monotonic() + farlight_test.TIMEOUT_S
+            while not any(self.folder.iterdir()) and time.monotonic() < deadline and child.poll() is None:
+                time.sleep(0.02)
+            self.assertIsNone(child.poll(), "it has ended before the signal came")
+            for process in (child.pid, *(pathlib.Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split())):
+                os.kill(int(process), signal.SIGHUP)
+            _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(child.returncode, 0, errors)
+        self.assertEqual(len(self.leftovers()), 8)
+
+    def test_programs_go_on_without_standard_descriptors(self):
+        for closed in ("<&- >&- 2>&-", "<&- 2>&-", ">&-"):
+            for name in ("a.%d.png", "a.gif"):
+                result = subprocess.run(["sh", "-c", f'exec "$0" "$@" {closed}', BIN / "farlight", "animate",
+                                         bundled_scenes() / "teapot.glb", "--frames", "1-2", "--size", "32x24", "-o",
+                                         self.folder / name], check=False, timeout=farlight_test.TIMEOUT_S,
+                                        stderr=subprocess.DEVNULL)
+                self.assertEqual(result.returncode, 0, (closed, name))
+            self.assertEqual(self.leftovers(), ["a.1.png", "a.2.png", "a.gif"])
+            for file in self.folder.iterdir():
+                file.unlink()
+
+
+class NoDaemon(Case):
+    """The daemon is not there, or answers with something else."""
+
+    def program(self, name, text):
+        """Puts a script into a folder; returns the folder."""
+        folder = self.folder / "programs"
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text("#!/bin/sh\n" + text)
+        (folder / name).chmod(0o755)
+        return folder
+
+    def ping(self, *arguments, status=75, **variables):
+        begin = time.monotonic()
+        result = self.expect(farlight("ping", "--count", "1", *arguments, env=farlight_test.private_daemon(**variables)), status)
+        return result.stderr, time.monotonic() - begin
+
+    def test_a_private_daemon_that_does_not_start_says_its_whole_reason(self):
+        folder = self.program("farlightd", "echo log >&2\necho 'farlightd: device: no OpenGL\nfarlightd: install one' >&2\nexit 1\n")
+        said, _ = self.ping(status=1, FARLIGHT_LIBEXEC=str(folder))
+        self.assertIn("the daemon did not start: farlightd ended with status 1: device: no OpenGL; install one\n", said)
+
+    def test_an_ssh_that_refuses_is_tried_once_unless_more_is_wanted(self):
+        folder = self.program("ssh", f"echo >>{self.folder}/logins\necho 'Permission denied (publickey).' >&2\nexit 255\n")
+        environment = farlight_test.private_daemon(PATH=f"{folder}:{os.environ['PATH']}")
+        for more, logins in (((), 1), (("--retry-for", "10m", "--retries", "1"), 3)):
+            result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", "--server", "ssh:host",
+                                          *more, env=environment), 75)
+            self.assertIn("Permission denied", result.stderr)
+            self.assertEqual(len((self.folder / "logins").read_text().splitlines()), logins)
+
+    def test_a_login_script_that_prints_is_named(self):
+        folder = self.program("ssh", "echo 'Welcome to \033[1mfarm07'\nsleep 1\n")
+        said, _ = self.ping("--server", "ssh:host", status=1, PATH=f"{folder}:{os.environ['PATH']}")
+        self.assertIn("Welcome to", said)
+        self.assertIn(".bashrc", said)
+        self.assertNotIn("\033", said)
+
+    def test_a_daemon_that_comes_late_is_waited_for(self):
+        folder = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+        address = f"unix:{folder}/late"
+        self.ping("--server", address)
+        with subprocess.Popen([BIN / "farlight", "ping", "--count", "1", "--server", address, "--retry-for", "10m"],
+                              stdout=subprocess.DEVNULL) as waiting, Daemon(listen=address):
+            self.assertEqual(waiting.wait(farlight_test.TIMEOUT_S), 0)
+
+    def test_a_server_that_is_silent_takes_no_longer_than_it_is_to_be_tried(self):
+        with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as silent:
+            said, seconds = self.ping("--server", f"tcp:127.0.0.1:{silent.getsockname()[1]}", "--retry-for", "1")
+        self.assertIn("does not answer the handshake", said)
+        self.assertLess(seconds, 25)  # the usual time is 30 s, and a second of it is wanted
 
 
 class ThroughADaemon(Case):

@@ -160,12 +160,14 @@ class Keys(Case):
             stats = self.expect(farlight("stats", "--server", daemon.reached, "--key", self.folder / "key"), 0)
             self.assertIn("farlightd", stats.stdout)
 
-    def test_on_this_host_both_are_accepted(self):
+    def test_on_this_host_tcp_needs_the_key_and_sockets_do_not(self):
         with Daemon("--key-file", self.folder / "key", "--listen", "tcp:127.0.0.1:0") as daemon:
             loopback = daemon.process.stdout.readline().split()[1]
+            self.expect(farlight("ping", "--server", daemon.address), 0)
             for address in (daemon.address, loopback):
-                self.expect(farlight("ping", "--server", address), 0)
                 self.expect(farlight("ping", "--server", address, "--key", self.folder / "key"), 0)
+            refused = self.expect(farlight("ping", "--server", loopback), 1)
+            self.assertIn("--key", refused.stderr)
 
     def test_a_daemon_without_a_key_says_so(self):
         with Daemon() as daemon:

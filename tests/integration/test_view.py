@@ -463,6 +463,15 @@ class OnADaemon(Viewer):
         self.assertNotEqual(rows["before"][size[1] // 2], rows["lost"][size[1] // 2])
         self.assertLess(difference(self.folder / "before.png", self.folder / "after.png"), 2)
 
+    def test_a_daemon_that_comes_late_is_waited_for_if_that_is_wanted(self):
+        address = f"unix:{self.folder}/late"
+        self.replay([rest()], "--server", address, status=75)
+        self.assertIn("No such file", self.errors)
+        self.replay([rest()], "--server", address, "--retry-for", "0.1", status=75)
+        process = self.start([rest(), {"state": "there"}], "--headless", "--server", address, "--retry-for", "10m")
+        with Daemon(listen=address):
+            self.assertEqual(self.end(process)["there"]["times_live"], 1)
+
     @long_test
     def test_over_tcp_pictures_travel_encoded_and_rest_without_loss(self):
         # On a busy machine the first frame in motion may take longer than the key is held at first.

@@ -76,6 +76,18 @@ class Editing(Viewer):
         self.assertEqual(before, undone)
         self.assertEqual(red, redone)
 
+    def test_a_scene_without_lights_says_so(self):
+        def darken(model):
+            for node in model["nodes"]:
+                node.get("extensions", {}).pop("KHR_lights_punctual", None)
+
+        change_model(bundled_scenes() / "teapot.glb", self.folder / "dark.glb", darken)
+        states = self.replay([rest(1), *pick(*POT), rest(1), {"key": "tab"}, {"state": "light"}, {"key": "tab", "shift": True},
+                              {"state": "material"}], scene=self.folder / "dark.glb")
+        self.assertEqual((states["light"]["edit"]["title"], states["light"]["edit"]["fields"]), ("the scene has no light", {}))
+        self.assertEqual(states["material"]["edit"]["kind"], "material")
+        self.assertNotEqual(states["material"]["edit"]["fields"], {})
+
     @long_test
     def test_what_is_changed_has_an_outline_at_rest_while_the_panel_is_open(self):
         """What the line goes around is tested in unit/viewer."""

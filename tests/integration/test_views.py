@@ -41,6 +41,13 @@ class Views(OneDaemon):
                     self.expect_eye(pair, i, 0, (i - 0.5) * APART, 0, options)
                 self.assertNotEqual(self.part(pair, 0, 0), self.part(pair, 1, 0))
 
+    def test_two_views_are_filtered_each_by_itself(self):
+        options = [*NOISY, "--denoise"]
+        pair = self.render("pair.png", "--stereo", APART, *options)
+        self.assertNotEqual(self.part(pair, 0, 0), self.part(self.render("noisy.png", "--stereo", APART, "--views", "rays", *NOISY), 0, 0))
+        for i in range(2):
+            self.expect_eye(pair, i, 0, (i - 0.5) * APART, 0, options)
+
     def test_the_left_view_may_lie_above_the_other_or_in_a_file_of_its_own(self):
         over, *files = (self.folder / name for name in ("over.png", "pair-left.png", "pair-right.png"))
         for name, layout in (("over.png", "over"), ("pair.png", "files")):
@@ -100,7 +107,9 @@ class Views(OneDaemon):
                 (["--lens", "quadtree"], "--lens", "add --aperture"),
                 (["--stereo", "1", "--aperture", "1", "--views", "rays", "--lens", "quadtree"], "--lens",
                  "leave out one"),
-                (["--stereo", "1", "--shutter", "0.5"], "--shutter", "--views rays")):
+                (["--stereo", "1", "--shutter", "0.5"], "--shutter", "--views rays"),
+                (["--stereo", "1", "--denoise", "--views", "quadtree"], "--denoise", "--views rays"),
+                (["--aperture", "1", "--denoise", "--lens", "quadtree"], "--denoise", "--lens rays")):
             with self.subTest(options=options):
                 result = self.render("x.png", *options, status=2)
                 self.assertTrue(result.stderr.startswith(f"farlight: {field}: "), result.stderr)

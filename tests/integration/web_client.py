@@ -27,8 +27,9 @@ class Gateway:
     def __enter__(self):
         self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                         env=self.environment)
-        self.link = self.process.stdout.readline().strip()
-        self.edit_link = self.process.stdout.readline().strip() if "--allow-edit" in self.command else ""
+        self.link, _, self.link_gives = self.process.stdout.readline().strip().partition("  ")
+        edit_line = self.process.stdout.readline().strip() if "--allow-edit" in self.command else ""
+        self.edit_link, _, self.edit_link_gives = edit_line.partition("  ")
         if not self.link:
             raise AssertionError(f"farlight-web printed no link, but: {self.process.communicate()[1]}")
         self.host = urllib.parse.urlsplit(self.link).netloc

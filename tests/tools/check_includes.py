@@ -47,7 +47,7 @@ MAY_INCLUDE = {
     "server/engine": ("protocol/common", BASE, GPU, SCENE, "server/render", "server/check", "server/encode"),
     "server/store": (BASE, "protocol"),
     "server/session": (BASE, SCENE, "server/encode", "server/net", "server/store", "server/engine", "protocol", "protocol/common"),
-    "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session"),
+    "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session", "protocol/common"),
     "client/warp": ("shaders/quadtree",),  # no protocol, GL, window or socket
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
     "client/edit": ("protocol", "protocol/common", "client/lib"),  # a part of the library

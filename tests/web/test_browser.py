@@ -164,6 +164,8 @@ class Page(unittest.TestCase):
 
     def test_change_is_seen_by_another_viewer_and_undone(self):
         looker, editor = self.open(), self.open(link=self.gateway.edit_link)
+        for page, may_edit in ((looker, False), (editor, True)):
+            page.wait(f"document.getElementById('right').hidden !== {str(may_edit).lower()}")
         self.assertTrue(looker.value("document.getElementById('editing').hidden"))
         editor.wait("!document.getElementById('editing').hidden && document.getElementById('edit-fields').children.length > 0")
         self.choose(editor, "edit-kind", "environment")
@@ -189,6 +191,17 @@ class Page(unittest.TestCase):
         self.choose(editor, "field-rotation-0", "1e9")
         editor.wait("document.getElementById('edit-state').textContent.includes('rotation')")
         self.assertEqual((looker.faults, editor.faults), ([], []))
+
+    def test_a_page_without_a_picture_says_that_the_first_one_is_rendered(self):
+        page = self.open()
+        page.call("Page.addScriptToEvaluateOnNewDocument", source="""window.said = [];
+            document.addEventListener('DOMContentLoaded', () => {
+                const status = document.getElementById('status');
+                new MutationObserver(() => said.push(status.textContent)).observe(status, {childList: true});
+            });""")
+        page.call("Page.reload")
+        page.wait(f"{DATASET}?.frame && said.length > 1 && said")
+        self.assertEqual(page.value("said"), ["the first picture is being rendered", ""])
 
     def test_colours_are_shown_as_the_scene_keeps_them(self):
         model = self.folder / "kept.nff"  # its colours are a display's values

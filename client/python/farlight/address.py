@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import re
 import shlex
@@ -17,6 +18,8 @@ from .errors import ConnectionLost, Error, FileFailed, InvalidValue, TimedOut
 
 REMOTE_SOCKET = "/run/farlight/farlight.sock"
 TRY_AGAIN_STATUS, FIRST_SIGNAL_STATUS = 75, 128  # of our programs; ssh has 255
+# What a program needs that reads files of others; tokens and passwords are not for it (client/lib/process.c).
+PASSED = re.compile("PATH|LANG|LANGUAGE|LC_.*|TZ|TZDIR|LD_.*|GLIBC_.*|GCOV_.*|LLVM_PROFILE_FILE|(A|L|UB)SAN_OPTIONS|FARLIGHT_UNCONFINED")
 TALK_BYTES = 16 << 20  # that ssh may say before it is ended: another host chooses part of it
 
 
@@ -27,6 +30,7 @@ class Link:
     process: Optional["subprocess.Popen[bytes]"] = None
     talk: Optional[IO[bytes]] = None  # what the program says
     remote: tuple[str, str] = ("", "")  # of ssh: the host, and the daemon's address there
+    name: str = ""  # of the program
     server: str = "farlightd"  # the address, where there is one
     is_final: bool = False
     words: str = ""  # how it ended, once that was asked
@@ -38,7 +42,9 @@ class Link:
         number = self.talk.fileno()  # whose place the program shares
         end = os.pread(number, 2048, max(0, os.fstat(number).st_size - 2048))
         lines = [one for one in end.strip().splitlines() if not one.startswith(b"READY")]
-        line = lines[-1][:400] if lines else b""
+        name = self.name.encode() + b": "  # in front of an error and, in the next line, its remedy
+        told = [one.removeprefix(name) for one in itertools.takewhile(lambda one: one.startswith(name), reversed(lines))]
+        line = b"; ".join(reversed(told or lines[-1:]))[:400]
         return "".join(one if one.isprintable() else "?" for one in line.decode("utf-8", "replace"))
 
     def last_words(self) -> tuple[str, bool]:
@@ -100,16 +106,18 @@ def start_program(name: str, arguments: list[str], remote: tuple[str, str] = (""
             process = subprocess.Popen([path, *arguments], stdin=theirs.fileno(), stdout=theirs.fileno(), stderr=talk)
             _bound_talk(process.pid)
         else:
+            environment = {variable: value for variable, value in os.environ.items() if PASSED.fullmatch(variable)}
             # In a process group of its own: a Ctrl-C is for us, and we end it properly.
             process = subprocess.Popen([path, "--fd", str(theirs.fileno()), *arguments], pass_fds=[theirs.fileno()],
-                                       stdin=subprocess.DEVNULL, stdout=talk, stderr=talk, process_group=0)
+                                       stdin=subprocess.DEVNULL, stdout=talk, stderr=talk, process_group=0,
+                                       env=None if name == "farlightd" else environment)
     except OSError as why:
         ours.close()
         talk.close()
         raise FileFailed(f"cannot be started: {why.strerror}", field=path) from None
     finally:
         theirs.close()
-    return Link(ours, process, talk, remote)
+    return Link(ours, process, talk, remote, name)
 
 
 def _connect(server: str, family: int, where: object, timeout: float) -> socket.socket:

@@ -12,6 +12,7 @@ const REFUSED = 1008; // the status with which the gateway closes a connection t
 const TURN = Math.PI; // radians for a drag over the picture's height
 const NARROW = 0.0015; // of a wheel's notch of 100: 14 %
 const COMPARED_SAMPLES = 4; // the view has so many before its tracer is compared, which takes the daemon a while
+const FIRST = "the first picture is being rendered";
 const WIDE = 1000; // pixels of a window that has room for the controls beside the scene
 
 const $ = (id) => document.getElementById(id);
@@ -84,10 +85,11 @@ function takeScene(told) {
   scene = told;
   document.title = `${told.name} - farlight`;
   $("name").textContent = told.name;
+  $("right").hidden = !told.edit;
   canvas.setAttribute("aria-label", `Picture of ${told.name}`);
   if (isNew) {
     editing.begin(told.edit);
-    say(isClipGone ? "the clip is gone: choose another one, if there is one" : "");
+    say(isClipGone ? "the clip is gone: choose another one, if there is one" : lastFrame ? "" : FIRST);
   }
   isNew = isClipGone = false;
   editing.list();
@@ -155,7 +157,7 @@ const picture = new Picture(canvas, (header) => {
   const latency = canvas.dataset.latency ? `, input to picture ${Number(canvas.dataset.latency).toFixed(0)} ms` : "";
   $("figures").textContent = `${header.width} x ${header.height}, ${tracer}, ${integrator}, ${samples} sample${samples === 1 ? "" : "s"}, `
     + `${encoding}${latency}`;
-  if ($("status").classList.contains("lost")) say("");
+  if ($("status").classList.contains("lost") || $("status").textContent === FIRST) say("");
   askForErrors();
 }, (isGone) => {
   if (isGone) {
@@ -337,9 +339,9 @@ $("share").addEventListener("click", async () => {
   history.replaceState(null, "", `#${parts}`);
   try {
     await navigator.clipboard.writeText(location.href);
-    say("the link is copied; who has it can look");
+    say(`the link is copied; who has it can ${scene.edit ? "look and edit" : "look"}`);
   } catch {
-    say("the link is in the address line; who has it can look");
+    say(`the link is in the address line; who has it can ${scene.edit ? "look and edit" : "look"}`);
   }
 });
 new ResizeObserver(tellShow).observe(canvas);

@@ -8,6 +8,7 @@
 #include "protocol/framing.h"
 #include "tests/harness/test.h"
 
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -88,6 +89,24 @@ TEST(a_program_that_ends_or_crashes_is_reported_with_its_last_words)
     check_error(FL_ERROR_SYSTEM, "farlight-export ended with status 3: no more memory");
     assert_false(compare_with("#!/bin/sh\nkill -SEGV $$\n", 60000));
     check_error(FL_ERROR_SYSTEM, "farlight-export was ended by signal 11");
+}
+
+TEST(a_program_that_reads_files_gets_no_secrets_and_no_descriptors)
+{
+    const int open_fd = fcntl(STDIN_FILENO, F_DUPFD, 17);
+    char text[300];
+    assert_true(open_fd >= 17);
+    setenv("AWS_SECRET_ACCESS_KEY", "secret", 1);
+    setenv("LC_TEST", "passed", 1);
+    snprintf(text, sizeof(text),
+             "#!/bin/sh\n[ -e /proc/$$/fd/%d ] && f=open\n"
+             "echo \"secret ${AWS_SECRET_ACCESS_KEY-unset}, LC $LC_TEST, fd ${f-closed}\" >&2\nexit 3\n",
+             open_fd);
+    assert_false(compare_with(text, 60000));
+    check_error(FL_ERROR_SYSTEM, "secret unset, LC passed, fd closed");
+    close(open_fd);
+    unsetenv("AWS_SECRET_ACCESS_KEY");
+    unsetenv("LC_TEST");
 }
 
 TEST(a_program_that_hangs_is_ended_at_its_deadline)

@@ -4,9 +4,11 @@
 #include "helper/sandbox.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
 #include <seccomp.h>
+#include <semaphore.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -87,16 +89,49 @@ static int signal_parent(void)
     return syscall(SYS_tgkill, getppid(), getppid(), 0) != 0 ? errno : 0;
 }
 
-static void *nothing(void *context)
+static int queue_signal_for_itself(void)
 {
-    return context;
+    siginfo_t info = {.si_code = SI_QUEUE};
+    return syscall(SYS_rt_tgsigqueueinfo, getpid(), syscall(SYS_gettid), SIGUSR1, &info) != 0 ? errno : 0;
 }
 
-static int start_thread(void)
+static void handle(int number)
+{
+    (void)number;
+}
+
+static int set_handler(void)
+{
+    const struct sigaction action = {.sa_handler = handle};
+    return sigaction(SIGUSR1, &action, NULL) != 0 ? errno : 0;
+}
+
+static int ask_for_handler(void)
+{
+    struct sigaction action;
+    return sigaction(SIGUSR1, NULL, &action) != 0 ? errno : 0;
+}
+
+static int open_file(void)
+{
+    return open("/etc/passwd", O_RDONLY | O_CLOEXEC) < 0 ? errno : 0;
+}
+
+static void *open_in_thread(void *failure)
+{
+    *(int *)failure = open_file();
+    return NULL;
+}
+
+/* The file's error, after the thread was started and has ended. */
+static int open_file_in_thread(void)
 {
     pthread_t thread;
-    int failure = pthread_create(&thread, NULL, nothing, NULL);
-    return failure ? failure : pthread_join(thread, NULL);
+    int opened = 0;
+    int failure = pthread_create(&thread, NULL, open_in_thread, &opened);
+    if (failure == 0)
+        failure = pthread_join(thread, NULL);
+    return failure != 0 ? failure : opened;
 }
 
 static int start_process(void)
@@ -130,7 +165,11 @@ static const struct {
     {"make memory executable with a key", make_executable_with_key, EPERM},
     {"signal itself", signal_itself, 0},
     {"signal the parent", signal_parent, EPERM},
-    {"start a thread", start_thread, 0},
+    {"queue a signal for itself", queue_signal_for_itself, EPERM},
+    {"set a signal's handler", set_handler, EPERM},
+    {"ask for a signal's handler", ask_for_handler, 0},
+    {"open a file", open_file, EACCES},
+    {"open a file in a thread", open_file_in_thread, EACCES},
     {"start a process", start_process, EPERM},
     {"start a process with clone3", start_process_with_clone3, ENOSYS},
 };
@@ -162,6 +201,56 @@ TEST(only_threads_and_memory_that_is_not_both_are_to_be_had)
         if (result != attempts[i].expected)
             fail_msg("%s: %d in place of %d", attempts[i].name, result, attempts[i].expected);
     }
+}
+
+/* The library's abort() raises the signal by tgkill, and sets its handler where that fails. */
+TEST(a_failed_assertion_still_ends_the_process)
+{
+    int status = 0;
+    const pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        const struct sandbox_options options = {0};
+        char reason[256];
+        if (!sandbox_enter(&options, reason, sizeof(reason)))
+            _exit(NOT_ENTERED);
+        abort();
+    }
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFSIGNALED(status));
+    assert_int_equal(WTERMSIG(status), SIGABRT);
+}
+
+/* ---- threads of before ---- */
+
+static sem_t never;
+
+static void *wait_for_ever(void *context)
+{
+    sem_wait(&never);
+    return context;
+}
+
+/* Landlock would not bind the first thread, which code in the second one reaches. */
+TEST(a_process_with_a_second_thread_is_refused)
+{
+    int status = 0;
+    const pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        const struct sandbox_options options = {0};
+        char reason[256];
+        pthread_t thread;
+        sem_init(&never, 0, 0);
+        if (pthread_create(&thread, NULL, wait_for_ever, NULL) != 0)
+            _exit(NOT_ENTERED);
+        if (sandbox_enter(&options, reason, sizeof(reason)))
+            _exit(1);
+        _exit(strstr(reason, "2 threads") && open_file() == 0 ? 0 : 2); /* no right is lost */
+    }
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 0);
 }
 
 /* ---- kernels without Landlock ---- */

@@ -227,22 +227,23 @@ static struct address parsed(const char *text)
     return address;
 }
 
-TEST(only_connections_within_loopback_need_no_key)
+TEST(only_connections_within_loopback_to_a_daemon_without_keys_need_no_key)
 {
     static const struct {
         const char *own, *peer;
-        bool beyond;
+        bool needed, needed_with_keys;
     } cases[] = {
-        {"unix:/a", "unix:/b", false},
-        {"tcp:127.0.0.1:1", "tcp:127.0.0.1:2", false},
-        {"tcp:[::1]:1", "tcp:[::1]:2", false},
-        {"tcp:0.0.0.0:1", "tcp:127.0.0.1:2", true}, /* whoever else comes there has to have one as well */
-        {"tcp:10.0.0.1:1", "tcp:10.0.0.1:2", true},
-        {"tcp:127.0.0.1:1", "tcp:10.0.0.7:2", true},
+        {"unix:/a", "unix:/b", false, false},
+        {"tcp:127.0.0.1:1", "tcp:127.0.0.1:2", false, true},
+        {"tcp:[::1]:1", "tcp:[::1]:2", false, true},
+        {"tcp:0.0.0.0:1", "tcp:127.0.0.1:2", true, true}, /* whoever else comes there has to have one as well */
+        {"tcp:10.0.0.1:1", "tcp:10.0.0.1:2", true, true},
+        {"tcp:127.0.0.1:1", "tcp:10.0.0.7:2", true, true},
     };
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct address own = parsed(cases[i].own), peer = parsed(cases[i].peer);
-        assert_int_equal(auth_is_beyond_loopback(&own, &peer), cases[i].beyond);
+        assert_int_equal(auth_needs_key(&own, &peer, NULL), cases[i].needed);
+        assert_int_equal(auth_needs_key(&own, &peer, &(struct auth_keys){0}), cases[i].needed_with_keys);
     }
     struct auth_identity identity;
     struct error error = {0};
