@@ -158,14 +158,16 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     if (cli_image_is_video(sink->output.image))
         return start_video(sink, error);
     const struct cli_job *job = sink->job;
+    const struct message_render *wanted = &job->options;
     /* An interruption is the normal end of progressive pictures: a file that has begun is finished. */
-    const struct fl_exporter_options options = {.folder = sink->folder,
-                                                .model = model_name(job),
-                                                .full_metadata = job->full_metadata,
-                                                .frames_per_second =
-                                                    sink->is_series ? job->options.frames_per_second : 0,
-                                                .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd(),
-                                                .format = cli_image_name(sink->output.image)};
+    const struct fl_exporter_options options = {
+        .folder = sink->folder,
+        .model = model_name(job),
+        .full_metadata = job->full_metadata,
+        .frames_per_second = sink->is_series ? job->options.frames_per_second : 0,
+        .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd(),
+        .format = cli_image_name(sink->output.image),
+        .window = {wanted->crop_x, wanted->crop_y, wanted->crop_width > 0 ? wanted->width : 0, wanted->height}};
     sink->exporter = fl_exporter_start(&options, error);
     return sink->exporter != NULL;
 }

@@ -24,13 +24,19 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     exporter->helper = (struct fl_helper){
         .program = "farlight-export", .what = "the image writer", .interrupt_fd = options->interrupt_fd};
     fl_text_utf8(options->model ? options->model : "", exporter->model, sizeof(exporter->model));
-    char rate[32];
+    char rate[32], window[48];
+    snprintf(window, sizeof(window), "%u,%u,%u,%u", options->window.x, options->window.y, options->window.width,
+             options->window.height);
     snprintf(rate, sizeof(rate), "%.9g", (double)options->frames_per_second);
-    const char *arguments[8] = {"--folder", options->folder};
+    const char *arguments[10] = {"--folder", options->folder};
     size_t count = 2;
     if (options->frames_per_second > 0) {
         arguments[count++] = "--fps";
         arguments[count++] = rate;
+    }
+    if (options->window.width > 0) {
+        arguments[count++] = "--window";
+        arguments[count++] = window;
     }
     if (options->full_metadata)
         arguments[count++] = "--full-metadata";

@@ -61,14 +61,16 @@ matrix multiply(const matrix &a, const matrix &b)
     return product;
 }
 
-// The inverse of a rotation and translation. The camera looks along -z, y is up.
+// OpenEXR's camera space is left-handed: x to the right, y up, z along the view, where ours looks along -z.
 matrix world_to_camera(const float world_from_view[12])
 {
     matrix made = {};
     for (int axis = 0; axis < 3; axis++) {
+        const float sign = axis == 2 ? -1.0f : 1.0f;
         for (int row = 0; row < 3; row++) {
-            made.m[row][axis] = world_from_view[4 * row + axis];
-            made.m[3][axis] -= world_from_view[4 * row + axis] * world_from_view[4 * row + 3];
+            const float element = sign * world_from_view[4 * row + axis];
+            made.m[row][axis] = element;
+            made.m[3][axis] -= element * world_from_view[4 * row + 3];
         }
     }
     made.m[3][3] = 1;
@@ -77,24 +79,23 @@ matrix world_to_camera(const float world_from_view[12])
 
 // Of OpenEXR's worldToNDC: (0,0) is the upper left corner of the picture, (1,1) the lower right one; z is of no
 // meaning and made 1 / distance here.
-matrix camera_to_ndc(const struct message_frame_begin &begin)
+matrix camera_to_ndc(const struct message_frame_begin &begin, float aspect)
 {
-    const float aspect = static_cast<float>(begin.width) / static_cast<float>(begin.height);
     matrix made = {};
     if (begin.fov_y > 0) {
         const float scale = 1 / std::tan(begin.fov_y / 2);
         made.m[0][0] = scale / aspect / 2;
         made.m[1][1] = -scale / 2;
-        made.m[2][0] = -0.5f;
-        made.m[2][1] = -0.5f;
-        made.m[2][3] = -1;
+        made.m[2][0] = 0.5f;
+        made.m[2][1] = 0.5f;
+        made.m[2][3] = 1;
         made.m[3][2] = 1;
         return made;
     }
     const float height = begin.ortho_height > 0 ? begin.ortho_height : 1;
     made.m[0][0] = 1 / (height * aspect);
     made.m[1][1] = -1 / height;
-    made.m[2][2] = -1;
+    made.m[2][2] = 1;
     made.m[3][0] = 0.5f;
     made.m[3][1] = 0.5f;
     made.m[3][3] = 1;
@@ -103,10 +104,16 @@ matrix camera_to_ndc(const struct message_frame_begin &begin)
 
 void add_camera(Imf::Header &header, const struct message_frame_begin &begin)
 {
+    const Imath::Box2i whole = header.displayWindow();
+    const float aspect =
+        static_cast<float>(whole.max.x + 1 - whole.min.x) / static_cast<float>(whole.max.y + 1 - whole.min.y);
     const matrix to_camera = world_to_camera(begin.world_from_view);
-    const matrix to_ndc = multiply(to_camera, camera_to_ndc(begin));
+    const matrix to_ndc = multiply(to_camera, camera_to_ndc(begin, aspect));
     header.insert("worldToCamera", Imf::M44fAttribute(Imath::M44f(to_camera.m)));
     header.insert("worldToNDC", Imf::M44fAttribute(Imath::M44f(to_ndc.m)));
+    // Of the plane at distance 1 for a pinhole, of the picture itself for parallel rays.
+    header.screenWindowWidth() =
+        aspect * (begin.fov_y > 0 ? 2 * std::tan(begin.fov_y / 2) : std::max(begin.ortho_height, 0.0f));
     header.insert("fieldOfView", Imf::FloatAttribute(begin.fov_y * degrees_per_radian));
 }
 
@@ -126,7 +133,12 @@ void add_rate(Imf::Header &header, float frames_per_second)
 
 Imf::Header make_header(const struct image &image, const std::string &date)
 {
-    Imf::Header header(static_cast<int>(image.begin->width), static_cast<int>(image.begin->height));
+    const image_window whole = window_of(image);
+    const Imath::V2i corner(static_cast<int>(whole.x), static_cast<int>(whole.y));
+    const Imath::V2i size(static_cast<int>(image.begin->width), static_cast<int>(image.begin->height));
+    Imf::Header header(
+        Imath::Box2i({0, 0}, {static_cast<int>(whole.width) - 1, static_cast<int>(whole.height) - 1}),
+        Imath::Box2i(corner, corner + size - Imath::V2i(1, 1)));
     header.compression() = Imf::ZIP_COMPRESSION;
     add_channels(header.channels(), image.begin->layers, image.half);
     Imf::addChromaticities(header, Imf::Chromaticities()); // of Rec. 709 with the white D65

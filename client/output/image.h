@@ -26,12 +26,18 @@ enum image_format image_format_of(const char *path, const char *fallback);
 /* Whether it is written by the module of library.h. */
 bool image_needs_library(enum image_format format);
 
+/* Pixels are the part from (x, y) on of a picture of width x height. */
+struct image_window {
+    uint32_t x, y, width, height;
+};
+
 struct image {
     enum image_format format;
     bool half;                               /* EXR: half floats */
     unsigned quality;                        /* JPEG, WebP */
     float frames_per_second;                 /* 0: unknown */
     bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */
+    struct image_window window;              /* EXR; no width: pixels are the whole picture */
     const char *model;                       /* for the metadata; may be empty */
     const struct message_frame_begin *begin; /* encoding raw */
     const struct message_frame_end *end;

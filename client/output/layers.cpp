@@ -113,6 +113,14 @@ bool has_layers(const struct message_frame_begin &begin)
     return begin.layers != 1u << PROTOCOL_LAYER_BEAUTY;
 }
 
+struct image_window window_of(const struct image &image)
+{
+    const struct message_frame_begin &begin = *image.begin;
+    const struct image_window &told = image.window;
+    const bool holds = told.x + begin.width <= told.width && told.y + begin.height <= told.height;
+    return holds ? told : image_window{0, 0, begin.width, begin.height};
+}
+
 std::string layer_names(unsigned layers)
 {
     std::string names;
@@ -133,6 +141,7 @@ void write_rows(Imf::OutputFile &output, const struct image &image)
 {
     const struct message_frame_begin &begin = *image.begin;
     const size_t width = begin.width;
+    const struct image_window whole = window_of(image);
     for (uint32_t top = 0; top < begin.height; top += band_rows) {
         const uint32_t rows = std::min<uint32_t>(band_rows, begin.height - top);
         Imf::FrameBuffer buffer;
@@ -145,7 +154,8 @@ void write_rows(Imf::OutputFile &output, const struct image &image)
             for (size_t y = 0; y < rows; y++)
                 put_row(image, (first_row + y) * width, channel, type, plane.data() + y * row_bytes);
             buffer.insert(channel.name,
-                          Imf::Slice::Make(type, plane.data(), Imath::V2i(0, static_cast<int>(top)),
+                          Imf::Slice::Make(type, plane.data(),
+                                           Imath::V2i(static_cast<int>(whole.x), static_cast<int>(whole.y + top)),
                                            static_cast<int64_t>(width), rows, size_of(type), row_bytes));
             planes.push_back(std::move(plane)); // what the slice points to
         }

@@ -11,6 +11,8 @@
 
 // Whether it is more than the picture, or something else.
 bool has_layers(const struct message_frame_begin &begin);
+// The picture that the frame is a part of; what is told and cannot be is the frame itself.
+struct image_window window_of(const struct image &image);
 // "beauty,depth"
 std::string layer_names(unsigned layers);
 

@@ -22,7 +22,7 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
-enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ, KEY_FULL_METADATA, KEY_TEXT };
+enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ, KEY_FULL_METADATA, KEY_TEXT, KEY_WINDOW };
 
 #define READ_MAX 2u
 
@@ -33,6 +33,14 @@ struct options {
     struct compare_file files[READ_MAX];
     struct serve_options serve;
 };
+
+static bool read_window(const char *value, struct image_window *window)
+{
+    int length = 0;
+    return sscanf(value, "%5u,%5u,%5u,%5u%n", &window->x, &window->y, &window->width, &window->height, &length) ==
+               4 &&
+           value[length] == '\0' && window->width > 0 && window->height > 0;
+}
 
 static error_t parse(int key, char *value, struct argp_state *state)
 {
@@ -64,6 +72,10 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_TEXT:
         options->draws_text = true;
+        return 0;
+    case KEY_WINDOW:
+        if (!read_window(value, &options->serve.window))
+            argp_error(state, "--window: '%s' is no part of a picture", value);
         return 0;
     case KEY_FPS:
         options->serve.frames_per_second = strtof(value, &end);
@@ -140,6 +152,7 @@ int main(int argc, char **argv)
         {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
         {"text", KEY_TEXT, NULL, 0, "Text may be drawn into pictures", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
+        {"window", KEY_WINDOW, "X,Y,W,H", 0, "Pictures are the part from X, Y on of W x H pixels", 0},
         {"full-metadata", KEY_FULL_METADATA, NULL, 0,
          "Store what differs from run to run, too: date, times of stages, revision", 0},
         {0}};

@@ -110,6 +110,7 @@ static void write_image(struct exporter *exporter, const struct message_frame_en
                                 .quality = request->quality,
                                 .frames_per_second = exporter->options->frames_per_second,
                                 .full_metadata = exporter->options->full_metadata,
+                                .window = exporter->options->window,
                                 .model = request->model,
                                 .begin = &request->incoming.begin,
                                 .end = end,

@@ -4,6 +4,7 @@
 #define FARLIGHT_CLIENT_OUTPUT_SERVE_H
 
 #include "compare.h"
+#include "image.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -12,6 +13,7 @@ struct serve_options {
     int fd;                  /* connected stream socket */
     float frames_per_second; /* for the metadata of images; 0: none */
     bool full_metadata;
+    struct image_window window;       /* of EXR files */
     const struct compare_file *files; /* that may be compared: a message opens nothing */
     size_t file_count;
 };

@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import json
+import math
 import os
 import pathlib
 import os
@@ -105,6 +106,24 @@ class Outputs(OneDaemon):
                                (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329), strict=True):
             self.assertAlmostEqual(got, wanted, delta=1e-6)
         self.assertEqual(full["farlight/model"], str(bundled_scenes() / "cornell.glb").encode())
+
+    def test_exr_says_where_its_camera_and_its_pixels_are(self):
+        """As OpenEXR defines it: z grows along the view, (0, 0) is the upper left corner of the whole picture."""
+        path = self.folder / "picture.exr"
+        place = ["--eye", "1,2,5", "--look-at", "1,2,1", "--fov", "40"]
+        self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", path, "--size", "40x30", "--samples", "1", "--crop", "10,4,8,6",
+                             *place), 0)
+        found = farlight_test.exr_attributes(path)
+        self.assertEqual(struct.unpack("<4i", found["displayWindow"]), (0, 0, 39, 29))
+        self.assertEqual(struct.unpack("<4i", found["dataWindow"]), (10, 4, 17, 9))
+        up = 2 * math.tan(math.radians(20))
+        self.assertAlmostEqual(struct.unpack("<f", found["screenWindowWidth"])[0], up * 40 / 30, 5)
+        for name, point, wanted in (("worldToCamera", (1.5, 2.25, 3), (0.5, 0.25, 2, 1)), ("worldToNDC", (1, 2, 1), (0.5, 0.5)),
+                                    ("worldToNDC", (1 - up / 2 * 4 / 3 * 4, 2 + up / 2 * 4, 1), (0, 0))):
+            matrix = struct.unpack("<16f", found[name])
+            mapped = [sum(of * matrix[4 * row + column] for row, of in enumerate((*point, 1))) for column in range(4)]
+            for value, at in zip(mapped, wanted):
+                self.assertAlmostEqual(value / (mapped[3] if name == "worldToNDC" else 1), at, 5)
 
     def test_standard_output_gets_the_picture_and_no_talk(self):
         for output in ("-", "/dev/stdout"):
