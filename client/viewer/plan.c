@@ -30,28 +30,33 @@ bool plan_switch(struct plan_switch *plan, double round_s, uint64_t now_ns)
 #define VELOCITY_NS UINT64_C(100000000) /* over which it is measured: the pointer's steps are uneven */
 #define AHEAD_MAX_NS UINT64_C(400000000)
 
-#define PACE_NS 66666667.0 /* of pictures that are not known yet: what the daemon is asked for */
-#define PACE_LEARN 0.25
+#define PACE_NS UINT64_C(66666667)         /* of pictures that are not known yet: what the daemon is asked for */
 #define PACE_PAUSE_NS UINT64_C(1000000000) /* without a picture: that was another motion */
 
-static void learn(double *known, double seen)
+static void learn(uint64_t last_ns[2], uint64_t seen_ns)
 {
-    *known = *known > 0 ? *known + PACE_LEARN * (seen - *known) : seen;
+    last_ns[0] = last_ns[1];
+    last_ns[1] = seen_ns;
+}
+
+static uint64_t shorter_of(const uint64_t last_ns[2])
+{
+    const uint64_t before_ns = last_ns[0] != 0 ? last_ns[0] : PACE_NS;
+    return last_ns[1] != 0 && last_ns[1] < before_ns ? last_ns[1] : before_ns;
 }
 
 void plan_pace_add(struct plan_pace *pace, uint64_t sent_ns, uint64_t came_ns)
 {
     if (sent_ns != 0)
-        learn(&pace->round_ns, (double)(came_ns - sent_ns));
+        learn(pace->rounds_ns, came_ns - sent_ns);
     if (pace->came_ns != 0 && came_ns - pace->came_ns < PACE_PAUSE_NS)
-        learn(&pace->interval_ns, (double)(came_ns - pace->came_ns));
+        learn(pace->intervals_ns, came_ns - pace->came_ns);
     pace->came_ns = came_ns;
 }
 
 uint64_t plan_pace_ahead_ns(const struct plan_pace *pace)
 {
-    const double round_ns = pace->round_ns > 0 ? pace->round_ns : PACE_NS;
-    return (uint64_t)(round_ns + (pace->interval_ns > 0 ? pace->interval_ns : PACE_NS) / 2);
+    return shorter_of(pace->rounds_ns) + shorter_of(pace->intervals_ns) / 2;
 }
 
 void plan_motion_add(struct plan_motion *motion, const struct viewer_camera *camera, uint64_t at_ns)

@@ -23,9 +23,9 @@
 enum local_views { LOCAL_OFF, LOCAL_AUTO, LOCAL_ON, LOCAL_VIEWS_COUNT };
 extern const char *const local_views_names[LOCAL_VIEWS_COUNT + 1]; /* ends with NULL */
 
-/* LOCAL_AUTO. */
+/* LOCAL_AUTO; all zero at first. */
 struct plan_switch {
-    bool on;          /* at first: else the first drag would find no picture to make views from */
+    bool on;
     uint64_t fast_ns; /* since then pictures come soon enough without; 0: they do not */
 };
 
@@ -46,10 +46,12 @@ struct plan_motion {
     size_t next, count;
 };
 
-/* How pictures of motion come. All zero at first. */
+/* How the last two pictures of motion came. All zero at first. */
 struct plan_pace {
-    double round_ns, interval_ns; /* from a camera to its picture, from picture to picture; 0: unknown */
-    uint64_t came_ns;             /* the last one */
+    /* From a camera to its picture, from picture to picture; 0: unknown. A single late one says nothing of the
+     * next. */
+    uint64_t rounds_ns[2], intervals_ns[2];
+    uint64_t came_ns; /* the last one */
 };
 
 /* A picture of a camera that was sent then has come. */

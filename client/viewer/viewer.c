@@ -308,7 +308,6 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
     viewer->height = (int)options->view.height;
     viewer->scale = 1;
     viewer->edit.tab = EDIT_MATERIAL;
-    viewer->local_switch.on = true;
     viewer->settings = (struct settings){.tracer = options->view.tracer,
                                          .integrator = options->view.integrator,
                                          .tone_map = options->view.tone_map,

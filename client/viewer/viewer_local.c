@@ -30,7 +30,9 @@ void viewer_plan_local(struct viewer *viewer, uint64_t now_ns)
     metrics_summarise(&viewer->metrics, now_ns, &summary);
     if (viewer->frame.moving)
         plan_pace_add(&viewer->pace, viewer->frame.command_sent_ns, now_ns);
-    if (summary.round_frames >= ROUNDS_MIN)
+    if (viewer->frames == 1) /* else the first drag would find no picture to make views from */
+        viewer->local_switch.on = true;
+    else if (summary.round_frames >= ROUNDS_MIN)
         plan_switch(&viewer->local_switch, summary.round_s, now_ns);
 }
 

@@ -106,8 +106,9 @@ static void look(struct viewer *viewer, bool moving, uint64_t now_ns)
 void viewer_tell(struct viewer *viewer, uint64_t now_ns)
 {
     const bool is_moving = viewer->moved_ns + REST_PAUSE_NS > now_ns;
-    /* At rest another stream would begin the picture from new. */
-    if (viewer->must_show || (is_moving && viewer_asks_otherwise(viewer)))
+    /* Another stream begins the picture at rest from new, which matters little while it has its first samples. */
+    const bool is_young = viewer->frame.samples <= viewer->view.pass_samples;
+    if (viewer->must_show || ((is_moving || is_young) && viewer_asks_otherwise(viewer)))
         show(viewer);
     if (!viewer->has_camera)
         return;
