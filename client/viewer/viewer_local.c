@@ -179,7 +179,7 @@ void viewer_take_hidden(struct viewer *viewer, struct fl_frame *frame)
 void viewer_forget_local(struct viewer *viewer)
 {
     viewer->must_draw |= viewer->shows_made;
-    viewer->has_keys = viewer->shows_made = false;
+    viewer->has_keys = viewer->has_made = viewer->shows_made = false;
     viewer->wish = 0;
     if (viewer->views)
         views_forget_keys(viewer->views);
@@ -234,21 +234,39 @@ static void want(struct viewer *viewer)
     viewer->wish = views_want(viewer->views, &wish);
 }
 
-/* One of which too much is unseen gives way to the daemon's own last picture, but for two eyes, which have none.
- */
-static bool is_good(const struct viewer *viewer)
+/* How much else a picture of that camera shows than one of the present camera: the angle between both views, and
+ * that between their eyes as seen from what is looked at. Radians, about. */
+static double off(const struct viewer *viewer, const float world_from_view[12])
 {
-    return viewer->settings.stereo || views_unseen(&viewer->made_of) <= (float)PLAN_UNSEEN_MAX;
+    float now[12];
+    double along = 0, aside = 0;
+    camera_pose(&viewer->camera, now);
+    for (int i = 0; i < 3; i++) {
+        along += (double)(now[i * 4 + 2] * world_from_view[i * 4 + 2]);
+        aside = hypot(aside, (double)(now[i * 4 + 3] - world_from_view[i * 4 + 3]));
+    }
+    return acos(fmax(-1, fmin(1, along))) + aside / camera_distance(&viewer->camera);
+}
+
+/* The view is nearer to the truth than the daemon's own last picture: hardly a hole, and no older camera. Of two
+ * eyes there is no picture of the daemon's own. */
+static bool is_better(const struct viewer *viewer)
+{
+    const struct views_made *made = &viewer->made_of;
+    return viewer->settings.stereo ||
+           (views_unseen(made) <= (float)PLAN_UNSEEN_MAX &&
+            off(viewer, made->camera.world_from_view) <= off(viewer, viewer->frame.world_from_view));
 }
 
 static void show_view(struct viewer *viewer)
 {
-    const uint64_t before = viewer->shows_made ? viewer->made_of.wish : 0;
-    if (!views_take(viewer->views, &viewer->made, &viewer->made_of))
-        return;
-    viewer->must_draw = true;
-    viewer->shows_made = is_good(viewer);
-    if (!viewer->shows_made)
+    const uint64_t before = viewer->has_made ? viewer->made_of.wish : 0;
+    const bool has_come = views_take(viewer->views, &viewer->made, &viewer->made_of),
+               was_shown = viewer->shows_made;
+    viewer->has_made |= has_come;
+    viewer->shows_made = viewer->has_made && is_better(viewer);
+    viewer->must_draw |= viewer->shows_made ? has_come || !was_shown : was_shown;
+    if (!has_come || !viewer->shows_made)
         return;
     /* One from a newer key is no answer to a move. */
     const uint64_t moved_ns = viewer->made_of.wish != before ? viewer->made_of.moved_ns : 0;
@@ -268,7 +286,7 @@ void viewer_step_local(struct viewer *viewer, uint64_t now_ns)
         views_want_none(viewer->views);
         viewer->wish = 0;
         viewer->must_draw |= viewer->shows_made;
-        viewer->shows_made = false;
+        viewer->has_made = viewer->shows_made = false;
         return;
     }
     want(viewer);

@@ -82,6 +82,7 @@ struct viewer {
     uint64_t wish; /* its number; 0: none */
     struct pixmap made;
     struct views_made made_of;
+    bool has_made;        /* since views are wanted */
     bool shows_made;      /* in place of `live` */
     uint64_t local_views; /* so many */
 

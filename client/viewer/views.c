@@ -211,7 +211,8 @@ static bool is_of_now(const struct views *views, const struct views_made *made)
 
 static bool wants_layer(const struct views *views)
 {
-    return views->given_layer_count > 0 && views->current.number == views->keys;
+    return views->given_layer_count > 0 && views->current.number == views->keys &&
+           (views->current.key.is_moving || !views->wants);
 }
 
 static bool wants_view(const struct views *views)
@@ -291,6 +292,7 @@ static void take_wish(struct views *views)
         return;
     }
     views->last.wish = number;
+    views->last.camera = wish.camera;
     views->last.key = views->current.number;
     views->last.layers = views->key_layers;
     pthread_cond_broadcast(&views->changed); /* its holes may be why another key is wanted */
@@ -424,7 +426,7 @@ bool views_is_best(struct views *views, const struct views_made *made, uint64_t 
     pthread_mutex_lock(&views->lock);
     const bool is_newest = made->key == views->keys || (views->given.depth && keeps_key(views));
     const bool is_best = made->wish == wish && is_newest && made->layers == views->key_layers &&
-                         views->given_layer_count == 0 && !views->is_adding && made->quality == FL_WARP_TREE;
+                         !wants_layer(views) && !views->is_adding && made->quality == FL_WARP_TREE;
     pthread_mutex_unlock(&views->lock);
     return is_best;
 }

@@ -38,7 +38,8 @@ struct views_wish {
 /* Of the last view. */
 struct views_made {
     uint64_t wish, key; /* their numbers, counted from 1 */
-    uint32_t layers;    /* of the key, with which it was made */
+    struct fl_warp_camera camera;
+    uint32_t layers; /* of the key, with which it was made */
     uint64_t moved_ns, key_came_ns;
     enum fl_warp_quality quality;
     struct fl_warp_counts counts;
@@ -58,7 +59,8 @@ void views_destroy(struct views *views);
 /* Takes over the picture's pixels and the depths; what came before is outdated. Views go on to be made from a
  * final picture while they are within its radius and no more than PLAN_UNSEEN_LITTLE of them is unseen. */
 void views_give_key(struct views *views, struct views_key *key);
-/* Of the last key that was given; likewise. One that does not fit it is dropped. */
+/* Of the last key that was given; likewise. One that does not fit it is dropped. That of a picture at rest, which
+ * takes longest, waits while views are wanted. */
 void views_give_layer(struct views *views, struct views_layer *layer);
 void views_forget_keys(struct views *views); /* of a connection that is gone */
 /* Views of it are made until another is wanted or none: one for each key; first one in time, then the best.

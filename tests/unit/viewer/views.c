@@ -123,6 +123,8 @@ static bool is_post(int i)
 TEST(what_a_picture_hides_is_seen_once_it_has_come)
 {
     struct views_key key = some_key(100);
+    key.is_moving = true;
+    key.is_final = false;
     for (int i = 0; i < EDGE * EDGE; i++)
         key.depth[i] = is_post(i) ? 0.5f : 2;
     views_give_key(views, &key);
