@@ -1996,7 +1996,7 @@ class Render(Message):
         while the view moves and is denoised; at rest the picture is that of the seed
     last_frame: not before the first
     frames_per_second: frame n is n / fps seconds after frame `time_origin_frame`; view: the maximum rate, at which
-        `adapt` aims; with a margin it aims at ten a second at most, as its client makes views in between
+        `adapt` aims; with a margin it aims at twenty a second at most, as its client makes views in between
     time_origin_frame: the frame at time 0
     tone_map: for rgba8
     exposure_stops: the picture is multiplied by 2 to this power
