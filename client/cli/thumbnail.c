@@ -280,7 +280,8 @@ static bool run(struct thumbnails *wanted, struct fl_error *error)
     if (to_stdout && !cli_check_stdout("a sheet", error))
         return false;
     return (wanted->to_folder || to_stdout ||
-            cli_check_output(wanted->job.outputs[0].path, folder, sizeof(folder), error)) &&
+            (cli_check_output(wanted->job.outputs[0].path, folder, sizeof(folder), error) &&
+             cli_check_folder(wanted->job.outputs[0].path, folder, wanted->job.parents, error))) &&
            (wanted->to_folder ? prepare_folder(wanted, error) : prepare_sheet(wanted, error)) &&
            connect_to(wanted, error) && make_all(wanted, error) && finish(wanted, &wanted->job, error);
 }
