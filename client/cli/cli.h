@@ -202,6 +202,7 @@ struct cli_series {
     bool has_range;
     struct fl_frame_run range;
     uint32_t shard_part, shard_parts; /* 0 parts: all frames */
+    bool is_chunk;                    /* the part is of neighbouring frames */
     bool resume;                      /* frames whose files exist are not rendered again */
     bool digests;                     /* a file with its digest beside each picture */
     struct record_camera_key *keys;   /* of the job's keys_file, once all options are read */
