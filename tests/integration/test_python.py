@@ -389,6 +389,29 @@ esac
         np.testing.assert_allclose(picture.normal[:, 8:], np.broadcast_to((0, 0, 1), (16, 8, 3)), atol=1e-5)
         self.assertFalse(picture.colour.flags.writeable)
 
+    def test_a_forked_process_connects_anew_and_leaves_its_parents_connection(self):
+        scene, _ = triangle()
+        with farlight.connect() as own:  # with a daemon that must not end with the child's client
+            for client in (self.connect(), own):
+                wanted = client.render(scene, STRAIGHT, width=8, height=8).data
+                pipes = [os.pipe() for _ in range(2)]
+                for _, write in pipes:
+                    child = os.fork()
+                    if child == 0:
+                        try:
+                            picture = client.render(scene, STRAIGHT, width=8, height=8).data
+                            client.close()
+                            os.write(write, b"same" if picture == wanted else b"other")
+                        finally:
+                            os._exit(0)
+                    self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data, wanted)
+                    os.waitpid(child, 0)
+                    self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data, wanted)
+                for read, write in pipes:
+                    os.close(write)
+                    self.assertEqual(os.read(read, 9), b"same")
+                    os.close(read)
+
     def test_only_what_has_changed_is_sent(self):
         client, (scene, material) = self.connect(), triangle()
         first = client.render(scene, STRAIGHT, width=16, height=16)
