@@ -7,7 +7,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum key { KEY_SHARD = 0x400, KEY_RESUME, KEY_DIGESTS, KEY_SCRIPT, KEY_LOSSLESS, KEY_DRY_RUN, KEY_SCENE };
+enum key {
+    KEY_SHARD = 0x400,
+    KEY_CHUNK,
+    KEY_RESUME,
+    KEY_DIGESTS,
+    KEY_SCRIPT,
+    KEY_LOSSLESS,
+    KEY_DRY_RUN,
+    KEY_SCENE
+};
 
 struct animation {
     struct cli_job job;
@@ -26,6 +35,7 @@ static const struct argp_option options[] = {
     {"lossless", KEY_LOSSLESS, NULL, 0, "Write a lossless video, for .mkv and .webp", 0},
     {NULL, 0, NULL, 0, "Parts:", -1},
     {"shard", KEY_SHARD, "K/N", 0, "Render only every N-th frame of the range, beginning with the K-th", 0},
+    {"chunk", KEY_CHUNK, "K/N", 0, "Render only the K-th of N runs of neighbouring frames", 0},
     {"resume", KEY_RESUME, NULL, 0, "Skip frames whose files exist, are complete and have the requested size", 0},
     {"digests", KEY_DIGESTS, NULL, 0,
      "Write FILE.sha256 beside each picture, for 'farlight verify'; --resume then renders again what differs from "
@@ -33,11 +43,15 @@ static const struct argp_option options[] = {
      0},
     {0}};
 
-static error_t set_shard(struct cli_job *job, const char *value)
+static error_t set_part(struct cli_job *job, const char *value, bool is_chunk)
 {
+    const char *option = is_chunk ? "--chunk" : "--shard";
+    if (job->series.shard_parts > 0 && job->series.is_chunk != is_chunk)
+        return cli_usage(job, option, "cannot go with %s", is_chunk ? "--shard" : "--chunk");
+    job->series.is_chunk = is_chunk;
     if (fl_text_shard(value, &job->series.shard_part, &job->series.shard_parts, &job->error))
         return 0;
-    snprintf(job->error.field, sizeof(job->error.field), "--shard");
+    snprintf(job->error.field, sizeof(job->error.field), "%s", option);
     return EINVAL;
 }
 
@@ -50,7 +64,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
         state->child_inputs[0] = state->child_inputs[1] = job;
         return 0;
     case KEY_SHARD:
-        return set_shard(job, value);
+    case KEY_CHUNK:
+        return set_part(job, value, key == KEY_CHUNK);
     case KEY_RESUME:
         job->series.resume = true;
         return 0;
@@ -82,7 +97,7 @@ static error_t set_series(void *user, const char *name, const char *value)
     struct animation *animation = user;
     struct cli_job *job = &animation->job;
     if (strcmp(name, "shard") == 0)
-        return set_shard(job, value);
+        return set_part(job, value, false);
     if (strcmp(name, "lossless") != 0)
         return cli_series_set(job, name, value);
     job->lossless = true;

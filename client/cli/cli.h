@@ -101,6 +101,8 @@ const char *cli_base_name(const char *path);
 /* Whether a file can be created at `path`, without creating it. `folder` gets its folder, which may be missing:
  * then it is one that can be made. */
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
+/* Refuses a folder that is missing, which may be misspelt or not mounted, unless `parents` says to make it. */
+bool cli_check_folder(const char *path, const char *folder, bool parents, struct fl_error *error);
 /* Makes the folder, and those around it, where they are missing. */
 bool cli_make_folder(const char *folder, struct fl_error *error);
 /* Replaces a file as a whole. */
@@ -200,6 +202,7 @@ struct cli_series {
     bool has_range;
     struct fl_frame_run range;
     uint32_t shard_part, shard_parts; /* 0 parts: all frames */
+    bool is_chunk;                    /* the part is of neighbouring frames */
     bool resume;                      /* frames whose files exist are not rendered again */
     bool digests;                     /* a file with its digest beside each picture */
     struct record_camera_key *keys;   /* of the job's keys_file, once all options are read */
@@ -255,6 +258,7 @@ struct cli_job {
         outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */
     size_t output_count;
     struct cli_series series;
+    bool parents;      /* a missing folder of an output is made */
     bool has_progress; /* else by whether there is a terminal */
     enum cli_progress_form progress;
     struct cli_retries retries;

@@ -124,6 +124,15 @@ bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struc
     return try_folder(path, present, error);
 }
 
+bool cli_check_folder(const char *path, const char *folder, bool parents, struct fl_error *error)
+{
+    struct stat status;
+    if (parents || stat(folder, &status) == 0)
+        return true;
+    fl_error_set(error, FL_ERROR_FILE, path, "there is no folder '%.200s'", folder);
+    return fl_error_remedy(error, "make it first; --parents of render, animate, turntable and thumbnail does");
+}
+
 bool cli_make_folder(const char *folder, struct fl_error *error)
 {
     char path[4097];
@@ -189,7 +198,8 @@ bool cli_check_error_picture(const char *picture, const char *const *inputs, siz
         return fl_error_remedy(error, "known endings: .png .jpg .jpeg");
     }
     return cli_check_not_input(picture, "--output", inputs, count, error) &&
-           cli_check_output(picture, folder, sizeof(folder), error) && cli_make_folder(folder, error);
+           cli_check_output(picture, folder, sizeof(folder), error) &&
+           cli_check_folder(picture, folder, false, error);
 }
 
 bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error)

@@ -55,9 +55,10 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
         return true;
     if (job->series.resume || job->series.shard_parts > 1 || job->series.digests) {
         cli_usage(job,
-                  job->series.resume    ? "--resume"
-                  : job->series.digests ? "--digests"
-                                        : "--shard",
+                  job->series.resume     ? "--resume"
+                  : job->series.digests  ? "--digests"
+                  : job->series.is_chunk ? "--chunk"
+                                         : "--shard",
                   "a video is made of all frames at once");
         return fl_error_remedy(&job->error,
                                "write images, such as 'frames/%%04d.png', and a video of all of them");

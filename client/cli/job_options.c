@@ -54,6 +54,7 @@ enum key {
     KEY_RETRY_FOR,
     KEY_RETRIES,
     KEY_METADATA,
+    KEY_PARENTS,
     KEY_AT,
     KEY_VIEWS, /* cli_views_set() has those that follow */
     KEY_VIEWS_END = KEY_VIEWS + 6,
@@ -63,6 +64,8 @@ enum key {
 /* What is more than a field of `render`. */
 static const struct argp_option special[] = {
     {"output", KEY_OUTPUT, "IMAGE", 0, "Image file; its ending is its format. '-' is standard output",
+     CLI_GROUP_OUTPUT},
+    {"parents", KEY_PARENTS, NULL, 0, "Make the folder of --output, and those around it, where it is missing",
      CLI_GROUP_OUTPUT},
     {"at", KEY_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
      "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; again: one more of it",
@@ -338,6 +341,9 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return fl_link_parse(value, &(struct fl_link){0}, &job->error) ? 0 : name_field(job, field);
     case KEY_AT:
         return cli_set_place(job, field, value);
+    case KEY_PARENTS:
+        job->parents = true;
+        return 0;
     case KEY_OUTPUT:
         job->output = value;
         return 0;
@@ -537,9 +543,9 @@ const struct argp *cli_job_argp(void)
 const struct argp *cli_picture_argp(void)
 {
     static const char *const left_out[] = {
-        "output",        "format",      "half",     "float",     "tone-map", "tracer",   "primary",
-        "timings",       "trace-file",  "layers",   "retry-for", "retries",  "metadata", "stereo",
-        "stereo-layout", "light-field", "baseline", "views",     "lens",     "noise",    NULL};
+        "parents",     "output",     "format", "half",      "float",   "tone-map", "tracer", "primary",
+        "timings",     "trace-file", "layers", "retry-for", "retries", "metadata", "stereo", "stereo-layout",
+        "light-field", "baseline",   "views",  "lens",      "noise",   NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -548,9 +554,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_views_argp(void)
 {
-    static const char *const left_out[] = {"output",        "format", "half",      "float",   "timings",
-                                           "trace-file",    "layers", "retry-for", "retries", "metadata",
-                                           "stereo-layout", "noise",  "crop",      NULL};
+    static const char *const left_out[] = {"parents",  "output",        "format", "half",      "float",
+                                           "timings",  "trace-file",    "layers", "retry-for", "retries",
+                                           "metadata", "stereo-layout", "noise",  "crop",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -571,10 +577,10 @@ const struct argp *cli_thumbnail_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {"output",     "format",   "half",       "float",    "samples",
-                                           "integrator", "timings",  "trace-file", "layers",   "clip-once",
-                                           "clip-start", "encoding", "retries",    "metadata", "light-field",
-                                           "baseline",   "views",    "crop",       NULL};
+    static const char *const left_out[] = {"parents",     "output",     "format",   "half",       "float",
+                                           "samples",     "integrator", "timings",  "trace-file", "layers",
+                                           "clip-once",   "clip-start", "encoding", "retries",    "metadata",
+                                           "light-field", "baseline",   "views",    "crop",       NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -583,12 +589,12 @@ const struct argp *cli_view_argp(void)
 
 const struct argp *cli_web_argp(void)
 {
-    static const char *const left_out[] = {"output",     "format",      "half",       "float",         "samples",
-                                           "integrator", "timings",     "trace-file", "layers",        "clip-once",
-                                           "retry-for",  "clip-start",  "clip-speed", "clip",          "encoding",
-                                           "retries",    "light-field", "metadata",   "stereo-layout", "baseline",
-                                           "views",      "crop",        "stereo",     "lens",          "size",
-                                           NULL};
+    static const char *const left_out[] = {"parents",   "output",     "format",      "half",       "float",
+                                           "samples",   "integrator", "timings",     "trace-file", "layers",
+                                           "clip-once", "retry-for",  "clip-start",  "clip-speed", "clip",
+                                           "encoding",  "retries",    "light-field", "metadata",   "stereo-layout",
+                                           "baseline",  "views",      "crop",        "stereo",     "lens",
+                                           "size",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

@@ -140,7 +140,8 @@ static bool choose_frames(struct session *session, struct fl_error *error)
         return true;
     session->has_set = true;
     if (session->is_series && series->shard_parts > 0 &&
-        !fl_frame_run_shard(&series->range, series->shard_part, series->shard_parts, &wanted)) {
+        !(series->is_chunk ? fl_frame_run_chunk : fl_frame_run_shard)(&series->range, series->shard_part,
+                                                                      series->shard_parts, &wanted)) {
         if (!job->quiet)
             fprintf(stderr, "farlight: there are fewer frames than parts: part %u has none\n", series->shard_part);
         return true;

@@ -43,6 +43,7 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
         return prepare_stdout(sink, error);
     if (!sink->is_series || cli_image_is_video(sink->output.image))
         return cli_check_output(path, sink->folder, sizeof(sink->folder), error) &&
+               cli_check_folder(path, sink->folder, sink->job->parents, error) &&
                snprintf(sink->path, sizeof(sink->path), "%s", path) > 0;
     if (!fl_pattern_parse(path, &sink->pattern, error)) {
         snprintf(error->field, sizeof(error->field), "--output");
@@ -51,7 +52,8 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     /* The highest possible frame number: it gives the longest path. */
     if (!fl_pattern_path(&sink->pattern, 10000000, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "the path of a frame is too long");
-    if (cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error))
+    if (cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error) &&
+        cli_check_folder(path, sink->folder, sink->job->parents, error))
         return true;
     /* No frame of that number may be wanted. */
     fl_text_utf8(path, error->field, sizeof(error->field));

@@ -220,6 +220,15 @@ static bool report(struct thumbnails *wanted, size_t index, const struct fl_erro
     return connect_to(wanted, error);
 }
 
+/* A picture beside the others has the model's name. */
+static bool check_name(const char *name, struct fl_error *error)
+{
+    char plain[4097];
+    fl_text_utf8(name, plain, sizeof(plain));
+    return strcmp(name, plain) == 0 ||
+           fl_error_set(error, FL_ERROR_FILE, plain, "its name is not UTF-8, and so no name of a picture");
+}
+
 static bool take(struct thumbnails *wanted, size_t index, struct fl_error *error)
 {
     const struct model_list_entry *entry = &wanted->models.entries[index];
@@ -230,8 +239,10 @@ static bool take(struct thumbnails *wanted, size_t index, struct fl_error *error
         *error = why;
         return false;
     }
-    if (!frame)
+    if (!frame || (wanted->to_folder && !check_name(name, &why))) {
+        fl_frame_destroy(frame);
         return report(wanted, index, &why, error);
+    }
     const bool taken = wanted->to_folder
                            ? write_file(wanted, name, frame, error)
                            : sheet_put(&wanted->sheet, (uint32_t)index, cli_base_name(name), frame, error);
@@ -280,7 +291,8 @@ static bool run(struct thumbnails *wanted, struct fl_error *error)
     if (to_stdout && !cli_check_stdout("a sheet", error))
         return false;
     return (wanted->to_folder || to_stdout ||
-            cli_check_output(wanted->job.outputs[0].path, folder, sizeof(folder), error)) &&
+            (cli_check_output(wanted->job.outputs[0].path, folder, sizeof(folder), error) &&
+             cli_check_folder(wanted->job.outputs[0].path, folder, wanted->job.parents, error))) &&
            (wanted->to_folder ? prepare_folder(wanted, error) : prepare_sheet(wanted, error)) &&
            connect_to(wanted, error) && make_all(wanted, error) && finish(wanted, &wanted->job, error);
 }

@@ -225,8 +225,8 @@ static int is_at_end_of_hdr(void *context)
 }
 
 /* A row has four bytes a texel or, if it has eight texels or more, a head of four bytes and then, for each of four
- * channels, two bytes a run of at most 127. A header that claims more than the file can hold is refused before memory
- * is taken for it. */
+ * channels, two bytes a run of at most 127. A header that claims more than the file can hold is refused before
+ * memory is taken for it. */
 static bool holds_rows_of_hdr(const struct texture_job *job, int width, int height)
 {
     const uint64_t texels = (uint64_t)width, rows = (uint64_t)height;

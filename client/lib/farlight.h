@@ -623,7 +623,8 @@ struct fl_exporter_options {
     bool draws_text;    /* pictures come with text */
     struct {
         uint32_t x, y, width, height;
-    } window; /* frames are the part from (x, y) on of pictures of width x height, as EXR files say; all 0: all of it */
+    } window; /* frames are the part from (x, y) on of pictures of width x height, as EXR files say; all 0: all of
+                 it */
 };
 /* A line of text in the middle of a box, of about 14 pixels' height; the beginning of one that is too long for the
  * box is left out. Without an installed font none is drawn. */

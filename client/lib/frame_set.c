@@ -52,6 +52,18 @@ bool fl_frame_run_shard(const struct fl_frame_run *range, uint32_t part, uint32_
     return true;
 }
 
+bool fl_frame_run_chunk(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run)
+{
+    const uint64_t count = fl_frame_run_count(range);
+    const uint64_t begin = count * (part - 1) / parts, end = count * part / parts;
+    if (begin == end)
+        return false;
+    run->first = range->first + (uint32_t)(begin * range->step);
+    run->last = range->first + (uint32_t)((end - 1) * range->step);
+    run->step = run->first == run->last ? 1 : range->step; /* as of a shard */
+    return true;
+}
+
 static bool add_run(struct fl_frame_set *set, size_t *capacity, const struct fl_frame_run *run,
                     struct fl_error *error)
 {

@@ -26,6 +26,10 @@ uint32_t fl_frame_run_count(const struct fl_frame_run *run);
  * and together they are the range. False: this part is empty. */
 bool fl_frame_run_shard(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run);
 
+/* The `part`-th of `parts` runs of neighbouring frames, which differ by a frame at most: what caches of neighbours
+ * gain by is kept. */
+bool fl_frame_run_chunk(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run);
+
 /* The frames of `range` for which `is_there` is false (NULL: all), in as few runs as possible. False: no
  * memory. */
 bool fl_frame_set_missing(const struct fl_frame_run *range, bool (*is_there)(void *user, uint32_t frame),

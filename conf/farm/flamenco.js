@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT
 // An animation as a job type of Flamenco 3; it belongs into the folder `scripts` beside flamenco-manager.
-// Each task renders one part of the frames with the daemon of its worker's GPU; the last one checks all of them.
+// Each task renders neighbouring frames with the daemon of its worker's GPU; the last one checks all of them.
+// flamenco-manager.yaml says where the programs are on each platform, as for {blender}:
+//   variables:
+//     farlight: {values: [{platform: linux, value: /usr/bin/farlight}]}
+//     farlightNode: {values: [{platform: linux, value: /usr/bin/farlight-node}]}
+// and, as variables with is_twoway: true, where shared folders are: the manager puts them into the settings of a job.
 const JOB_TYPE = {
     label: "farlight animation",
     description: "Render a model's animation with farlight",
@@ -17,9 +22,9 @@ const JOB_TYPE = {
 // Of all frames: an orbit or a dolly lasts as long as the range that is given, so that a range of its own would be another path.
 function animate(settings, part) {
     return author.Command("exec", {
-        exe: "farlight-node",
-        args: ["farlight", "animate", "--frames", settings.frames, "--shard", part, "-o", settings.output, "--resume", "--digests",
-               "--progress", "lines", "--retry-for", "5", ...settings.options.split(" ").filter((word) => word !== ""), "--", settings.model],
+        exe: "{farlightNode}",
+        args: ["{farlight}", "animate", "--frames", settings.frames, "--chunk", part, "-o", settings.output, "--parents", "--resume",
+               "--digests", "--progress", "lines", "--retry-for", "5", ...settings.options.split(" ").filter((word) => word !== ""), "--", settings.model],
     });
 }
 
@@ -27,7 +32,7 @@ function compileJob(job) {
     const settings = job.settings;
     const verify = author.Task("verify", "misc");
     verify.addCommand(author.Command("exec", {
-        exe: "farlight", args: ["verify", "--frames", settings.frames, "--", settings.output],
+        exe: "{farlight}", args: ["verify", "--frames", settings.frames, "--", settings.output],
     }));
     const parts = frameChunker(settings.frames, settings.chunk_size).length;
     for (let part = 1; part <= parts; part++) {

@@ -48,6 +48,8 @@ class Farm:
         self.model = folder / "teapot.glb"
         runtime = folder / "run"
         runtime.mkdir(mode=0o700)
+        for name in ("reference", "slurm", "openjd", "flamenco", "xargs", "node"):
+            (self.folder / name).mkdir()
         os.environ.update(PATH=f"{programs}:{FARM}:{os.environ['PATH']}", XDG_RUNTIME_DIR=str(runtime), FARLIGHT_GPU="software",
                           FARLIGHT_UNUSED="20", FARLIGHT_LIBEXEC=str(programs))
         reference = folder / "reference"
@@ -136,10 +138,10 @@ class Farm:
 
     def hostile(self, folder):
         """A model with such a name in a folder, whose pictures shall be in a folder with that name. What is to be called then."""
-        folder.mkdir(exist_ok=True)
+        (folder / HOSTILE).mkdir(parents=True)
         shutil.copy(self.model, folder / f"{HOSTILE}.glb")
         reference = self.folder / "of 2"
-        self.run("farlight", "animate", folder / f"{HOSTILE}.glb", *self.range(2), "-o", reference / "%04d.png", *PICTURE, "-q")
+        self.run("farlight", "animate", folder / f"{HOSTILE}.glb", *self.range(2), "-o", reference / "%04d.png", "--parents", *PICTURE, "-q")
 
         def check():
             self.is_as_one_run(folder / HOSTILE, digests(reference))

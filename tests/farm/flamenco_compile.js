@@ -26,4 +26,13 @@ for (const setting of context.type.settings)
     if (setting.required && !(setting.key in settings))
         throw new Error(`setting ${setting.key} is missing`);
 context.compile({ settings, addTask: (task) => tasks.push(task) });
+// The manager's variables.
+const programs = { "{farlight}": "farlight", "{farlightNode}": "farlight-node" };
+for (const { commands } of tasks)
+    for (const { parameters } of commands) {
+        if (!(parameters.exe in programs))
+            throw new Error(`${parameters.exe} is no variable`);
+        parameters.exe = programs[parameters.exe];
+        parameters.args = parameters.args.map((word) => programs[word] || word);
+    }
 console.log(JSON.stringify(tasks));

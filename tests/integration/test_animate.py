@@ -164,6 +164,8 @@ class Parts(OneDaemon, Animations):
         for part, frames in ((1, [10, 19, 28]), (2, [13, 22, 31]), (3, [16, 25])):
             got, _ = self.animate(f"part{part}", self.model, *self.RANGE, "--shard", f"{part}/3")
             self.assertEqual(got, {frame: whole[frame] for frame in frames})
+        got, _ = self.animate("chunk", self.model, *self.RANGE, "--chunk", "2/3")
+        self.assertEqual(got, {frame: whole[frame] for frame in (16, 19, 22)})
         got, result = self.animate("part9", self.model, *self.RANGE, "--shard", "9/9")
         self.assertEqual(got, {})
         self.assertIn("part 9 has none", result.stderr)
@@ -407,6 +409,7 @@ class Videos(OneDaemon, Animations):
 
     def test_what_makes_no_video_is_refused_before_anything_is_rendered(self):
         for arguments, said in ((["-o", "m.mp4", "--resume"], "--resume"), (["-o", "m.mp4", "--shard", "1/2"], "--shard"),
+                                (["-o", "m.mp4", "--chunk", "1/2"], "--chunk"), (["-o", "%d.png", "--chunk", "1/2", "--shard", "1/2"], "--shard"),
                                 (["-o", "-", "--format", "png"], "standard output"), (["-o", "m.webm"], "m.webm"),
                                 (["-o", "m.mp4", "--lossless"], ".mkv"), (["-o", "m.mp4", "--quality", "60"], "51"),
                                 (["-o", "m.gif", "--resume"], "--resume"), (["-o", "m.webp", "--shard", "1/2"], "--shard"),

@@ -150,6 +150,14 @@ class Inputs(OneDaemon):
         self.assertEqual(sorted(path.name for path in out.iterdir()), ["square.obj.png", "teapot.glb.png"])
         self.assertEqual(read_png(out / "teapot.glb.png")[:2], (32, 32))
 
+    def test_a_model_whose_name_is_not_utf_8_is_passed_over(self):
+        (self.folder / "all").mkdir()
+        for name in ("a.obj", "b\udce4.obj", "c.obj"):  # a byte of Latin-1
+            (self.folder / "all" / name).write_bytes(self.square.read_bytes())
+        result = self.expect(farlight("thumbnail", self.folder / "all", "-o", f"{self.folder}/out/", "--size", "16x16"), 1)
+        self.assertIn("b?.obj: its name is not UTF-8", result.stderr)
+        self.assertEqual(sorted(path.name for path in (self.folder / "out").iterdir()), ["a.obj.png", "c.obj.png"])
+
     def test_endings_of_models_are_those_that_the_importer_knows(self):
         unknown = self.folder / "model.xyz"
         unknown.write_text("?")

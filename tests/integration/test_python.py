@@ -431,6 +431,29 @@ esac
         (self.folder / "cell.png").write_bytes(picture._repr_png_())  # pylint: disable=protected-access
         self.assertEqual(read_png(self.folder / "cell.png")[:2], (8, 8))
 
+    def test_a_forked_process_connects_anew_and_leaves_its_parents_connection(self):
+        scene, _ = triangle()
+        with farlight.connect() as own:  # with a daemon that must not end with the child's client
+            for client in (self.connect(), own):
+                wanted = client.render(scene, STRAIGHT, width=8, height=8).data
+                pipes = [os.pipe() for _ in range(2)]
+                for _, write in pipes:
+                    child = os.fork()
+                    if child == 0:
+                        try:
+                            picture = client.render(scene, STRAIGHT, width=8, height=8).data
+                            client.close()
+                            os.write(write, b"same" if picture == wanted else b"other")
+                        finally:
+                            os._exit(0)
+                    self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data, wanted)
+                    os.waitpid(child, 0)
+                    self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data, wanted)
+                for read, write in pipes:
+                    os.close(write)
+                    self.assertEqual(os.read(read, 9), b"same")
+                    os.close(read)
+
     def test_only_what_has_changed_is_sent(self):
         client, (scene, material) = self.connect(), triangle()
         first = client.render(scene, STRAIGHT, width=16, height=16)

@@ -201,12 +201,15 @@ class BadInput(Case):
                 with self.subTest(text=text, command=command):
                     self.assertIn("script.json", self.expect(farlight(*command), 2).stderr)
 
-    def test_a_missing_folder_is_made_when_there_is_something_to_write(self):
+    def test_a_missing_folder_is_made_if_that_is_wanted_when_there_is_something_to_write(self):
         cornell, folder = bundled_scenes() / "cornell.glb", self.folder / "made" / "for" / "it"
-        self.expect(farlight("animate", cornell, "--frames", "1-2", "-o", folder / "%d.png", "--dry-run"), 0)
-        self.refused(1, "render", self.folder / "missing.glb", "-o", folder / "x.png", says=["missing.glb"])
+        for command, name in ((["render"], "x.png"), (["animate", "--frames", "1-2"], "%d.png"), (["animate", "--frames", "1-2"], "x.mp4"),
+                              (["thumbnail"], "x.png")):
+            self.refused(1, *command, cornell, "-o", folder / name, says=[f"{folder / name}: there is no folder '{folder}'", "--parents"])
+        self.expect(farlight("animate", cornell, "--frames", "1-2", "-o", folder / "%d.png", "--dry-run", "--parents"), 0)
+        self.refused(1, "render", self.folder / "missing.glb", "-o", folder / "x.png", "--parents", says=["missing.glb"])
         self.assertEqual(list(self.folder.iterdir()), [])
-        self.expect(farlight("render", cornell, "--size", "8x8", "-o", folder / "x.png"), 0)
+        self.expect(farlight("render", cornell, "--size", "8x8", "-o", folder / "x.png", "--parents"), 0)
         self.assertEqual(self.leftovers(), ["made/for/it/x.png"])
 
     def test_messages_name_the_pattern_of_the_files_not_a_file_that_nobody_wants(self):

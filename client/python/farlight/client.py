@@ -101,13 +101,15 @@ class View:
 
 
 class Client:
-    """A connection to a daemon; a context manager. Made by connect(). Not for several threads at once."""
+    """A connection to a daemon; a context manager. Made by connect(). Not for several threads at once. A forked process, such
+    as that of a data loader, connects anew at its first call."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
         self._link: address.Link | None = None
         self._core: Core = options.core(None)
         self._selector = selectors.DefaultSelector()
+        self._process = os.getpid()
         self._closed = False
         try:
             self._again(self._ensure)
@@ -139,10 +141,24 @@ class Client:
             self._link.close()
             self._link = None
 
+    def _leave_parent(self) -> None:
+        """In a forked process: what it has of the connection is its parent's, which goes on with it."""
+        if self._process == os.getpid():
+            return
+        self._process = os.getpid()
+        self._core.fail(ConnectionLost("the connection is that of the process which forked this one", retryable=False))
+        self._core = self._options.core(None)
+        self._selector.close()
+        self._selector = selectors.DefaultSelector()
+        if self._link is not None:
+            self._link.socket.close()  # without a word to the daemon; its program is not ours to end
+            self._link = None
+
     def _ensure(self) -> None:
         """Connects, and again if the connection was lost, or is found to be."""
         if self._closed:
             raise ConnectionLost("the client is closed", retryable=False)
+        self._leave_parent()
         if self._link is not None and self._core.failure is None:
             while self._receive() and self._core.failure is None:
                 pass
@@ -332,6 +348,7 @@ class Client:
 
     def close(self) -> None:
         """Says goodbye; a daemon of one's own ends."""
+        self._leave_parent()
         if not self._closed and self._link is not None:
             self._core.leave()
             self._flush()

@@ -28,29 +28,53 @@ TEST(a_part_is_written_as_k_of_n)
     }
 }
 
+typedef bool divide(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run);
+
 /* All parts of all kinds of ranges: each frame falls to exactly one. */
-TEST(the_parts_of_a_range_are_the_range)
+static void check_parts(divide *part_of, bool is_chunk)
 {
     static uint8_t seen[400];
     for (uint32_t step = 1; step <= 5; step++)
         for (uint32_t last = 7; last < 60; last++)
             for (uint32_t parts = 1; parts <= 9; parts++) {
                 const struct fl_frame_run range = {.first = 7, .last = last, .step = step};
+                uint32_t empty = 0;
                 memset(seen, 0, sizeof(seen));
                 for (uint32_t part = 1; part <= parts; part++) {
                     struct fl_frame_run run;
-                    if (!fl_frame_run_shard(&range, part, parts, &run)) {
-                        assert_true(part > fl_frame_run_count(&range));
+                    if (!part_of(&range, part, parts, &run)) {
+                        assert_true(is_chunk || part > fl_frame_run_count(&range));
+                        empty++;
                         continue;
                     }
+                    if (is_chunk && run.first != run.last)
+                        assert_int_equal(run.step, step);
                     assert_true(run.step >= 1 && run.first <= run.last);
                     assert_int_equal((run.last - run.first) % run.step, 0);
                     for (uint32_t frame = run.first; frame <= run.last; frame += run.step)
                         seen[frame]++;
                 }
+                const uint32_t count = fl_frame_run_count(&range);
+                assert_int_equal(empty, count < parts ? parts - count : 0);
                 for (uint32_t frame = 0; frame < 100; frame++)
                     assert_int_equal(seen[frame], frame >= 7 && frame <= last && (frame - 7) % step == 0);
             }
+}
+
+TEST(the_parts_of_a_range_are_the_range)
+{
+    check_parts(fl_frame_run_shard, false);
+    check_parts(fl_frame_run_chunk, true);
+}
+
+TEST(a_chunk_has_neighbouring_frames)
+{
+    const struct fl_frame_run range = {.first = 1, .last = 10, .step = 1};
+    struct fl_frame_run run;
+    assert_true(fl_frame_run_chunk(&range, 2, 3, &run));
+    assert_int_equal(run.first, 4);
+    assert_int_equal(run.last, 6);
+    assert_int_equal(run.step, 1);
 }
 
 TEST(the_maximum_range_does_not_wrap)
@@ -62,6 +86,8 @@ TEST(the_maximum_range_does_not_wrap)
     assert_int_equal(run.first, 10000000);
     assert_int_equal(run.last, 10000000);
     assert_false(fl_frame_run_shard(&range, 3, 1000000, &run));
+    assert_true(fl_frame_run_chunk(&range, 1000000, 1000000, &run));
+    assert_int_equal(run.first, 10000000);
 }
 
 static bool is_there(void *user, uint32_t frame)

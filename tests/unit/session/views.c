@@ -726,7 +726,8 @@ SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
     assert_true(effort.bytes == 0);
 }
 
-/* 300 KB in 0.1 s: neither a picture of 300 KB with what it hides fits twenty a second, nor one with its margin. */
+/* 300 KB in 0.1 s: neither a picture of 300 KB with what it hides fits twenty a second, nor one with its margin.
+ */
 SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
 {
     struct engine_command *start = start_view_on_a_slow_link(0.1f, 150 * MS);
