@@ -150,6 +150,19 @@ matrix matrix_of(const std::vector<double> &t, const std::vector<double> &q, con
     return m;
 }
 
+matrix product(const matrix &a, const matrix &b)
+{
+    matrix out;
+
+    for (size_t column = 0; column < 4; column++)
+        for (size_t row = 0; row < 4; row++) {
+            out[column * 4 + row] = 0;
+            for (size_t k = 0; k < 4; k++)
+                out[column * 4 + row] += a[k * 4 + row] * b[column * 4 + k];
+        }
+    return out;
+}
+
 void check_matrix(reader &r, const matrix &m, const std::string &where)
 {
     for (double value : m)

@@ -49,6 +49,26 @@ const signature signatures[] = {
     {"pnm", 0, 2, "P6"},
 };
 
+// Formats that are known and not read.
+struct unread_format {
+    size_t offset, length;
+    const char *bytes, *reason;
+};
+const unread_format unread_formats[] = {
+    {0, 7, "\xabKTX 20", "is a KTX2 image, which is not read; " TEXTURE_KTX2_REMEDY},
+    {0, 4, "DDS ", "is a DDS image, which is not read; convert it to PNG, WebP or JPEG"},
+    {4, 8, "ftypavif", "is an AVIF image, which is not read; convert it to PNG, WebP or JPEG"},
+};
+
+std::string reason_of_unread(const unsigned char *bytes, size_t size_bytes)
+{
+    for (const unread_format &format : unread_formats)
+        if (size_bytes >= format.offset + format.length &&
+            memcmp(bytes + format.offset, format.bytes, format.length) == 0)
+            return format.reason;
+    return "is not an image of a known format";
+}
+
 bool looks_like_targa(const unsigned char *bytes, size_t size_bytes)
 {
     if (size_bytes < 18 || bytes[1] > 1)
@@ -187,7 +207,7 @@ bool decode(texture_job &job, std::string &reason)
 {
     const char *reader = reader_of(job.bytes, job.size_bytes);
     if (!reader) {
-        reason = "is not an image of a known format";
+        reason = reason_of_unread(job.bytes, job.size_bytes);
         return false;
     }
     opened_image image(job.bytes, job.size_bytes);

@@ -24,6 +24,9 @@ struct texture_job {
     char reason[200];
 };
 
+#define TEXTURE_KTX2_REMEDY                                                                                       \
+    "convert its textures to PNG, as 'gltf-transform ktxdecompress IN OUT' does, or to WebP or JPEG"
+
 /* What the module exports, under the name `texture_reader`. */
 struct texture_reader {
     /* Decodes all that have neither texels nor a reason, with two threads if there are several. Never fails as a

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: MIT
 """Models as exporters write them that stray from their format, or use corners of it that few readers know: each is shown as its
 author meant it, or a note names what is left out and why."""
+import base64
+import json
+import struct
 import unittest
 
 import importer
-from importer import SET_MATERIAL, SET_MESH, SET_SPHERES, SET_TEXTURE
+from importer import SET_CAMERA, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_SPHERES, SET_TEXTURE
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 PPM = b"P6\n1 1\n255\n\x80\x80\x80"
@@ -67,6 +70,82 @@ class Obj(importer.Written):
         self.assertEqual(spheres["count"], 3)
         self.assertEqual({material["base"][:3] for material in result.of(SET_MATERIAL)}, {(1, 0, 0), (0, 1, 0), (0, 0, 1)})
         self.assertIn("lines cannot be shown", self.import_text("model.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", 1).text())
+
+
+class Gltf(importer.Written):
+    """A triangle of floats and, behind it, an index and one unnormalised colour for each corner."""
+
+    DATA = struct.pack("<9f3H2x", 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 2) + bytes((255, 51, 0, 0)) * 3
+
+    def run_gltf(self, extra=None, primitives=None, status=0, folder_buffer=None):
+        uri = folder_buffer or "data:application/octet-stream;base64," + base64.b64encode(self.DATA).decode("ascii")
+        model = {"asset": {"version": "2.0"}, "buffers": [{"uri": uri, "byteLength": len(self.DATA)}],
+                 "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in ((0, 36), (36, 6), (44, 12))],
+                 "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+                               {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+                               {"bufferView": 2, "componentType": 5121, "count": 3, "type": "VEC4"},
+                               {"componentType": 5126, "count": 0, "type": "VEC3"}, {"componentType": 5123, "count": 0, "type": "SCALAR"}],
+                 "meshes": [{"primitives": primitives or [{"attributes": {"POSITION": 0}, "indices": 1}]}], "nodes": [{"mesh": 0}],
+                 **(extra or {})}
+        return self.import_text("model.gltf", json.dumps(model), status)
+
+    def test_an_empty_primitive_is_left_out(self):
+        good = {"attributes": {"POSITION": 0}, "indices": 1}
+        for empty in ({"attributes": {"POSITION": 3}}, {"attributes": {"POSITION": 3}, "indices": 4}, {"attributes": {"POSITION": 0}, "indices": 4}):
+            result = self.run_gltf(primitives=[empty, good])
+            self.assert_has(result.of(SET_MESH), [{"triangles": 1}])
+            self.assertIn("meshes[0].primitives[0]: a primitive without vertices is left out", result.text())
+
+    def test_a_bad_camera_or_light_leaves_itself_out(self):
+        cameras = [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}},
+                   {"type": "perspective", "perspective": {"yfov": 0, "znear": 0.1}},
+                   {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 0, "znear": 0, "zfar": 1}}]
+        result = self.run_gltf({"cameras": cameras, "nodes": [{"mesh": 0}, *({"camera": i} for i in range(4)),
+                                                              {"extensions": {"KHR_lights_punctual": {"light": 7}}}]})
+        self.assert_has(result.of(SET_CAMERA), [{"fov_y": 0.7}])
+        for wanted in ("cameras[1]: the camera is left out: yfov", "cameras[2]: the camera is left out: ymag",
+                       "nodes[4]: the camera is left out: there is no", "nodes[5]: the light is left out: there is no"):
+            self.assertIn(wanted, result.text())
+
+    def test_percent_signs_in_names_stand_for_themselves_or_for_characters(self):
+        """And an image is found by its name alone, as those of other formats."""
+        for name in ("10%.bin", "a b.bin", "a%20b.bin"):
+            self.write(name, self.DATA)
+        names = ("50%.ppm", "a%20b.ppm", "c%20d.ppm", "C:\\tex\\50%.ppm", "none%.ppm")
+        for name in ("50%.ppm", "a b.ppm", "c%20d.ppm"):
+            self.write(name, PPM)
+        textured = {"images": [{"uri": name} for name in names], "textures": [{"source": i} for i in range(len(names))],
+                    "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}} for i in range(len(names))]}
+        primitives = [{"attributes": {"POSITION": 0}, "material": i} for i in range(len(names))]
+        for name in ("10%.bin", "a%20b.bin"):
+            result = self.run_gltf(textured, primitives, folder_buffer=name)
+            self.assertEqual([texture["nearest"] for texture in result.of(SET_TEXTURE)], [0, 0, 0, 0, 1], result.text())
+            self.assertIn("'none%25.ppm' could not be read: No such file", result.text())
+
+    def test_lights_in_candela_become_watts_where_all_would_be_white(self):
+        for kind, intensity, wanted in (("point", 54351.4, 79.577), ("point", 79.577, 79.577), ("directional", 3.0, 3.0),
+                                        ("directional", 68300.0, 100.0)):
+            result = self.run_gltf({"nodes": [{"mesh": 0}, {"translation": [0, 5, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+                                    "extensions": {"KHR_lights_punctual": {"lights": [{"type": kind, "intensity": intensity}]}}})
+            self.assertAlmostEqual(result.of(SET_LIGHT)[0]["colour"][0], wanted, 2)
+            self.assertEqual("divided by 683" in result.text(), intensity != wanted)
+
+    def test_whole_numbers_of_colours_are_parts_of_255(self):
+        result = self.run_gltf(primitives=[{"attributes": {"POSITION": 0, "COLOR_0": 2}}])
+        self.assertEqual(result.data(result.of(SET_MESH)[0]["arrays"][6]), bytes((255, 51, 0, 0)) * 3)
+
+    def test_images_of_formats_that_are_not_read_are_named(self):
+        basisu = {"KHR_texture_basisu": {"source": 1}}
+        for texture, wanted in (({"source": 1}, "a KTX2 image, which is not read; convert"), ({"extensions": basisu}, "left out; convert"),
+                                ({"source": 0, "extensions": basisu}, "the images that stand in for them are shown")):
+            self.write("a.ppm", PPM)
+            self.write("b.ktx2", b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(64))
+            result = self.run_gltf({"images": [{"uri": "a.ppm"}, {"uri": "b.ktx2"}], "textures": [texture],
+                                    "extensionsUsed": ["KHR_texture_basisu"],
+                                    "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]},
+                                   [{"attributes": {"POSITION": 0}, "material": 0}])
+            self.assertIn(wanted, result.text())
+            self.assertEqual(len(result.notes), 2, "and that there is no scene")
 
 
 def result_corners(mesh, result):
