@@ -13,6 +13,7 @@
 #include <tiny_gltf.h>
 
 #include <array>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
@@ -73,8 +74,6 @@ void load(reader &r, const unsigned char *bytes, size_t size_bytes);
 // Primitives without vertices or indices are left out, with a note, and percent signs that stand for themselves
 // are written as URIs have them.
 std::string complete_json(reader &r, const unsigned char *json, size_t size_bytes, bool binary);
-// With the percent signs resolved.
-std::string decoded_uri(const std::string &uri);
 
 // ---- gltf_meshopt.cpp
 // The bytes of a view that is compressed with meshoptimizer (EXT_meshopt_compression, KHR_meshopt_compression),
@@ -190,8 +189,19 @@ parts node_parts(reader &r, size_t node);
 
 matrix matrix_of(const std::vector<double> &translation, const std::vector<double> &rotation,
                  const std::vector<double> &scale); // of other lengths than 3, 4, 3: none
+std::array<double, 3> point_of(const matrix &m, const std::array<double, 3> &p);
+struct world_box {
+    std::array<double, 3> lower, upper;
+};
+using node_visitor = std::function<void(const tinygltf::Node &node, const matrix &world_from_node)>;
+// Around all meshes at rest, as their accessors state it; inside out where there is none. Visits each node.
+world_box box_of(reader &r, const std::vector<int> &roots, const node_visitor &visit = {});
 // Fails where a number is not finite or beyond 1e12.
 void check_matrix(reader &r, const matrix &m, const std::string &where);
+
+// ---- gltf_origin.cpp
+// Subtracts an origin from the nodes of a model that is far away; the identifier of the node that has it, 0: none.
+uint32_t settle_origin(reader &r, const std::vector<int> &roots);
 
 // ---- gltf_instance.cpp
 // Where the node's mesh is shown, in the node's space; none: it is not instanced.

@@ -119,19 +119,6 @@ void leave_out_empty_primitives(reader &r, json_t *root)
     }
 }
 
-int hex_value(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-}
-
-bool is_escape(const std::string &uri, size_t at)
-{
-    return at + 2 < uri.size() && uri[at] == '%' && hex_value(uri[at + 1]) >= 0 && hex_value(uri[at + 2]) >= 0;
-}
-
 // Names that are no URIs: a percent sign without two digits stands for itself, and one with them may.
 void complete_uris(reader &r, json_t *root)
 {
@@ -147,10 +134,10 @@ void complete_uris(reader &r, json_t *root)
             if (uri.find('%') == std::string::npos || uri.compare(0, 5, "data:") == 0)
                 continue;
             for (size_t at = 0; at < uri.size(); at++)
-                completed += uri[at] == '%' && !is_escape(uri, at) ? "%25" : std::string(1, uri[at]);
+                completed += uri[at] == '%' && !reading::is_escape(uri, at) ? "%25" : std::string(1, uri[at]);
             if (completed != uri)
                 json_object_set_new(holder, "uri", json_string(completed.c_str()));
-            r.raw_names[decoded_uri(completed)] = uri;
+            r.raw_names[reading::decoded_uri(completed)] = uri;
         }
 }
 
@@ -171,18 +158,6 @@ bool counts_nothing(const char *json, size_t size_bytes)
     return false;
 }
 } // namespace
-
-std::string decoded_uri(const std::string &uri)
-{
-    std::string name;
-
-    for (size_t at = 0; at < uri.size(); at++) {
-        const bool escape = is_escape(uri, at);
-        name += escape ? char(hex_value(uri[at + 1]) << 4 | hex_value(uri[at + 2])) : uri[at];
-        at += escape ? 2 : 0;
-    }
-    return name;
-}
 
 std::string complete_json(reader &r, const unsigned char *json, size_t size_bytes, bool binary)
 {

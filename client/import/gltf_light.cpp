@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace gltf
 {
@@ -29,48 +28,13 @@ void give_size(reader &r, const tinygltf::Light &light, const std::string &where
 
 // ---- photometric files
 
-struct box {
-    std::array<double, 3> lower, upper;
-};
-
 struct light_place {
     int light;
     std::array<double, 3> at;
 };
 
-std::array<double, 3> point_of(const matrix &m, const std::array<double, 3> &p)
-{
-    std::array<double, 3> out;
-    for (size_t row = 0; row < 3; row++)
-        out[row] = m[row] * p[0] + m[4 + row] * p[1] + m[8 + row] * p[2] + m[12 + row];
-    return out;
-}
-
-// Around the positions of a mesh as their accessors state them, where `m` places it.
-void grow(const reader &r, int mesh, const matrix &m, box &around)
-{
-    if (mesh < 0 || size_t(mesh) >= r.model.meshes.size())
-        return;
-    for (const tinygltf::Primitive &primitive : r.model.meshes[size_t(mesh)].primitives) {
-        const int position = attribute(primitive.attributes, "POSITION");
-        if (position < 0 || size_t(position) >= r.model.accessors.size())
-            continue;
-        const tinygltf::Accessor &of = r.model.accessors[size_t(position)];
-        for (size_t corner = 0; corner < 8 && of.minValues.size() == 3 && of.maxValues.size() == 3; corner++) {
-            std::array<double, 3> place;
-            for (size_t c = 0; c < 3; c++)
-                place[c] = corner >> c & 1 ? of.maxValues[c] : of.minValues[c];
-            place = point_of(m, place);
-            for (size_t c = 0; c < 3; c++) {
-                around.lower[c] = std::min(around.lower[c], place[c]);
-                around.upper[c] = std::max(around.upper[c], place[c]);
-            }
-        }
-    }
-}
-
 // How many times white a white surface in the middle of the scene would be.
-double whiteness(const reader &r, const std::vector<light_place> &lights, const box &around)
+double whiteness(const reader &r, const std::vector<light_place> &lights, const world_box &around)
 {
     double extent2 = 0, sum = 0;
 
@@ -138,26 +102,16 @@ void convert_photometric_lights(reader &r, const std::vector<int> &roots)
     constexpr double lumens_per_watt = 683; // of Blender's exporter
     // Between a scene that is lit well and the same in candela, on the bright side.
     constexpr double photometric_white = 50;
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    box around = {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
-    std::vector<std::pair<int, matrix>> open;
     std::vector<light_place> lights;
 
-    for (int root : roots)
-        open.push_back({root, identity()});
-    while (!open.empty() && !r.model.lights.empty()) {
-        const auto [index, parent] = open.back();
-        const tinygltf::Node &node = r.model.nodes[size_t(index)];
-        const matrix placed = product(parent, node_matrix(r, size_t(index)));
-        open.pop_back();
-        grow(r, node.mesh, placed, around);
+    if (r.model.lights.empty())
+        return;
+    const world_box around = box_of(r, roots, [&](const tinygltf::Node &node, const matrix &placed) {
         const tinygltf::Value *own = extension(node.extensions, "KHR_lights_punctual");
         const int light = own ? index_of(*own, "light") : -1;
         if (light >= 0 && size_t(light) < r.model.lights.size())
             lights.push_back({light, point_of(placed, {0, 0, 0})});
-        for (int child : node.children)
-            open.push_back({child, placed});
-    }
+    });
     const double white = whiteness(r, lights, around); // of a scene without meshes it is 0 or NaN
     if (!(white > photometric_white && white < 1e30))
         return;

@@ -206,12 +206,12 @@ void note_uses(reader &r, const tinygltf::Node &node, std::set<int> &used)
 }
 
 // Calls `visit(node, parent's result)` for all nodes below the roots, parents first.
-template <typename visitor> void traverse(reader &r, const std::vector<int> &roots, visitor visit)
+template <typename visitor> void traverse(reader &r, const std::vector<int> &roots, uint32_t top, visitor visit)
 {
     std::vector<pending> open;
 
     for (size_t i = roots.size(); i-- > 0;)
-        open.push_back({roots[i], 0, 1});
+        open.push_back({roots[i], top, 1});
     while (!open.empty()) {
         const pending at = open.back();
         open.pop_back();
@@ -258,14 +258,15 @@ void add_scene(reader &r)
     const std::vector<int> roots = roots_of(r);
     std::set<int> used;
 
-    traverse(r, roots, [&](size_t node, uint32_t) {
+    traverse(r, roots, 0, [&](size_t node, uint32_t) {
         note_uses(r, r.model.nodes[node], used);
         return 0u;
     });
     convert_photometric_lights(r, roots);
     add_materials(r, used);
     r.node_ids.assign(r.model.nodes.size(), 0);
-    traverse(r, roots, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
+    const uint32_t top = settle_origin(r, roots);
+    traverse(r, roots, top, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
     add_skins(r);
 }
 

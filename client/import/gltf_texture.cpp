@@ -87,7 +87,7 @@ void read_moved(reader &r, tinygltf::Image &source, texture_job &job)
     char reason[FILES_REASON_BYTES] = "";
     size_t size_bytes = 0;
     const std::unique_ptr<unsigned char, void (*)(void *)> bytes(
-        obj::read_moved_image(r.scene, r.files, decoded_uri(source.uri), &size_bytes, reason), free);
+        obj::read_moved_image(r.scene, r.files, reading::decoded_uri(source.uri), &size_bytes, reason), free);
 
     if (bytes)
         source.image.assign(bytes.get(), bytes.get() + size_bytes);

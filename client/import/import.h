@@ -94,6 +94,7 @@ struct import_scene {
     double point_size;   /* diameter of points and lines without faces, metres; 0: chosen by their distances */
     const char *variant; /* of the materials, that the user wants; NULL: the file's choice. Readers of formats
                             without variants need not look */
+    float origin[3];     /* what was subtracted from all places (origin.h); 0: nothing */
     bool failed;
     struct import_notice failure;
 };

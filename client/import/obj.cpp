@@ -3,10 +3,12 @@
 // is done here. One mesh for the whole file; triangles sorted by material.
 #include "obj.hpp"
 
+#include "origin.h"
 #include "points.hpp"
 #include "protocol/common/srgb.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -69,6 +71,7 @@ class vertex_table
 
 struct state {
     reader &r;
+    const prepared &text;
     memory_stream &stream;
     std::vector<float> positions, texcoords, normals;
     vertex_table vertices;
@@ -170,11 +173,20 @@ uint32_t name_number(state &s, const char *text)
     return s.name_numbers[name] = uint32_t(s.material_names.size() - 1);
 }
 
+void add_position(state &s, std::array<float, 3> place)
+{
+    const size_t at = s.positions.size();
+
+    for (size_t c = 0; at + c < s.text.places.size() && c < 3; c++)
+        place[c] = float(s.text.places[at + c] - s.text.origin[c]);
+    s.positions.insert(s.positions.end(), place.begin(), place.end());
+}
+
 tinyobj::callback_t callbacks()
 {
     tinyobj::callback_t all;
     all.vertex_cb = [](void *user, float x, float y, float z, float) {
-        guarded(user, [&](state &s) { s.positions.insert(s.positions.end(), {x, y, z}); });
+        guarded(user, [&](state &s) { add_position(s, {x, y, z}); });
     };
     all.normal_cb = [](void *user, float x, float y, float z) {
         guarded(user, [&](state &s) { s.normals.insert(s.normals.end(), {x, y, z}); });
@@ -257,6 +269,12 @@ std::vector<uint32_t> material_ids(state &s, const std::vector<std::string> &lib
     return add_materials(s.r.scene, read_image, wanted);
 }
 
+// The node from which the positions are.
+uint32_t parent_of(const state &s)
+{
+    return s.text.places.empty() ? 0 : import_add_origin_node(s.r.scene, s.text.origin, 0);
+}
+
 void add_mesh(state &s, const prepared &text)
 {
     const std::vector<uint32_t> ids = material_ids(s, text.libraries);
@@ -274,7 +292,7 @@ void add_mesh(state &s, const prepared &text)
         throw;
     }
     mesh.name = s.r.scene->file;
-    import_add_grouped_mesh(s.r.scene, 0, &mesh, materials.data());
+    import_add_grouped_mesh(s.r.scene, parent_of(s), &mesh, materials.data());
 }
 
 void add_points(state &s, prepared &text)
@@ -288,6 +306,7 @@ void add_points(state &s, prepared &text)
     set.object = points::add(r, cloud, s.r.scene->file, "");
     set.kind = PROTOCOL_NODE_SPHERES;
     set.name = s.r.scene->file;
+    set.parent = parent_of(s);
     import_identity(set.parent_from_node);
     if (set.object != 0)
         import_add_node(s.r.scene, &set);
@@ -299,7 +318,7 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
     if (r.scene->failed)
         return;
     memory_stream stream(text.begin(), text.size_bytes());
-    state s = {r, stream, {}, {}, {}, {}, {}, {}, {}, {}, none, POLYGON_BUDGET, false, {}, {}, {}};
+    state s = {r, text, stream, {}, {}, {}, {}, {}, {}, {}, {}, none, POLYGON_BUDGET, false, {}, {}, {}};
     std::istream input(&stream);
     std::string warning, error;
 

@@ -49,6 +49,8 @@ struct prepared {
     {
         return mended.empty() ? original_bytes : mended.size();
     }
+    std::vector<double> places;         // 3 a vertex, where floats would lose something of them; else empty
+    double origin[3];                   // to be subtracted from these
     std::vector<float> colours;         // 3 a vertex, sRGB, as the file has them; empty: it has none
     std::vector<std::string> libraries; // whole arguments of mtllib: several names, or one with spaces
     bool has_points, has_lines;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "obj.hpp"
+#include "origin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -109,6 +110,35 @@ struct scan {
     size_t vertices = 0;
 };
 
+// Floats are a millimetre apart from here on.
+constexpr double exact_max = 8192;
+
+// The first vertex says whether places are kept as doubles.
+void keep_place(scan &s, const char *const *starts, size_t count)
+{
+    double place[3] = {0, 0, 0};
+
+    if (s.vertices > 1 && s.out.places.empty())
+        return;
+    for (size_t c = 0; c < 3 && c < count; c++)
+        place[c] = strtod(starts[c], nullptr);
+    if (s.vertices > 1 || std::any_of(place, place + 3, [](double value) { return std::fabs(value) > exact_max; }))
+        s.out.places.insert(s.out.places.end(), place, place + 3);
+}
+
+// Places that floats hold well enough, or around the origin, are left to the library.
+void settle_places(prepared &out)
+{
+    double lower[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+
+    for (size_t i = 0; i < out.places.size(); i++) {
+        lower[i % 3] = std::min(lower[i % 3], out.places[i]);
+        upper[i % 3] = std::max(upper[i % 3], out.places[i]);
+    }
+    if (!import_find_origin(lower, upper, out.origin))
+        out.places.clear();
+}
+
 // Up to six numbers of a `v` line. tinyobjloader takes what is no number for 0, which is not for us to show.
 bool scan_vertex(scan &s, const char *at, const char *end)
 {
@@ -141,6 +171,7 @@ bool scan_vertex(scan &s, const char *at, const char *end)
         count++;
     }
     s.vertices++;
+    keep_place(s, starts, count);
     if (count < 6 && s.out.colours.empty())
         return true;
     for (size_t i = 3; i < count && count == 6; i++)
@@ -222,7 +253,7 @@ std::string memory_stream::place() const
 
 prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
-    prepared out = {reinterpret_cast<const char *>(bytes), size_bytes, {}, {}, {}, false, false};
+    prepared out = {reinterpret_cast<const char *>(bytes), size_bytes, {}, {}, {}, {}, {}, false, false};
 
     if (size_bytes >= 2 && ((bytes[0] == 0xfe && bytes[1] == 0xff) || (bytes[0] == 0xff && bytes[1] == 0xfe)))
         out.mended = from_utf16(bytes, size_bytes, bytes[0] == 0xfe);
@@ -240,6 +271,7 @@ prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes)
     }
     scan s = {r, out};
     scan_lines(s, out.begin(), out.begin() + out.size_bytes());
+    settle_places(out);
     return out;
 }
 } // namespace obj

@@ -153,6 +153,9 @@ struct fl_import_stats {
     uint64_t upload_ns; /* from sending the first to the acknowledgement of the last */
     uint64_t commit_ns; /* from commit to the answer: the daemon's work */
     uint64_t revision;
+    /* Subtracted from all places of models that are far from the origin; 0: nothing was. A place of the model is
+     * one of the scene and this. */
+    double origin[3];
 };
 
 struct fl_note {

@@ -3,12 +3,14 @@
 """Models as exporters write them that stray from their format, or use corners of it that few readers know: each is shown as its
 author meant it, or a note names what is left out and why."""
 import base64
+import io
 import json
 import struct
 import unittest
+import zipfile
 
 import importer
-from importer import SET_CAMERA, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_SPHERES, SET_TEXTURE
+from importer import SET_CAMERA, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_SPHERES, SET_TEXTURE
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 PPM = b"P6\n1 1\n255\n\x80\x80\x80"
@@ -146,6 +148,160 @@ class Gltf(importer.Written):
                                    [{"attributes": {"POSITION": 0}, "material": 0}])
             self.assertIn(wanted, result.text())
             self.assertEqual(len(result.notes), 2, "and that there is no scene")
+
+
+class Scanned(importer.Written):
+    """STL and PLY."""
+
+    FACET = struct.pack("<12f2x", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0)
+
+    def test_stl_files_that_stray_are_shown_or_say_why_not(self):
+        """Bytes behind the facets, counts that are wrong, files that are cut, and words in other letters or none."""
+        def binary(count, facets, tail=b"", head=b"solid of a program"):
+            return head.ljust(80) + struct.pack("<I", count) + self.FACET * facets + tail
+        corners = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+        usual = f"solid a\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid a\n"
+        for data, triangles, said in ((binary(2, 2), 2, "^$"), (binary(2, 2, b"tail"), 2, "^$"), (binary(1, 2), 1, "^$"),
+                                      (binary(2, 1, self.FACET[:30]), 1, "cut off: it states 2 facets and has 1 whole"),
+                                      (binary(0, 2), 2, "states 0 facets; the 2"), (usual.encode(), 1, "^$"), (usual.upper().encode(), 1, "^$"),
+                                      (f"solid a\n{corners * 2}endsolid".encode(), 2, "^$"), (binary(0, 0), 0, "without facets"),
+                                      (binary(3, 0, self.FACET[:30]), 0, "states 3 facets, but is cut off"), (binary(1, 0)[:60] + b"\0", 0, "cut off within its head"),
+                                      (b"solid a\nendsolid a\n", 0, "nothing that can be shown")):
+            with self.subTest(data[:100]):
+                result = self.import_text("model.stl", data, status=0 if triangles else 1)
+                self.assertEqual(sum(mesh["triangles"] for mesh in result.of(SET_MESH)), triangles)
+                self.assertRegex(result.text(), said)
+
+    def ply(self, vertex, rows, faces="", form="ascii"):
+        return (f"ply\nformat {form} 1.0\nelement vertex {len(rows)}\n" + "".join(f"property {one}\n" for one in vertex) + faces +
+                "end_header\n")
+
+    XYZ, QUAD = ["float x", "float y", "float z"], ["0 0 0", "1 0 0", "0 1 0", "1 1 0"]
+
+    def import_ply(self, vertex, rows, faces="", face_rows=()):
+        return self.import_text("model.ply", self.ply(vertex, rows, faces) + "\n".join([*rows, *face_rows]) + "\n")
+
+    def test_ply_strips_are_triangles(self):
+        strip = "element tristrips 1\nproperty list int int vertex_indices\n"
+        for rows, wanted in ((["4 0 1 2 3"], 2), (["8 0 1 2 -1 0 1 2 3"], 3)):
+            result = self.import_ply(self.XYZ, self.QUAD, strip, rows)
+            mesh, = result.of(SET_MESH)
+            self.assertEqual(mesh["triangles"], wanted)
+            places = result_corners(mesh, result)
+            for at in range(0, len(places), 9):
+                a, b, c = (places[at + 3 * i:at + 3 * i + 2] for i in range(3))
+                self.assertGreater((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]), 0, "the side that it faces")
+
+    def test_ply_colours_are_those_of_faces_and_of_floats_up_to_255(self):
+        face = "element face 2\nproperty list uchar int vertex_indices\n"
+        colours = [f"property uchar {name}\n" for name in ("red", "green", "blue")]
+        result = self.import_ply(self.XYZ, self.QUAD, face + "".join(colours), ["3 0 1 2 255 0 0", "3 1 3 2 0 0 255"])
+        mesh, = result.of(SET_MESH)
+        values = result.data(mesh["arrays"][6])
+        self.assertEqual([tuple(values[4 * i:4 * i + 3]) for i in result.integers(mesh["arrays"][1])], [(255, 0, 0)] * 3 + [(0, 0, 255)] * 3)
+        for full in (1, 255):
+            rows = [f"{place} {full} {full / 2} 0" for place in self.QUAD]
+            result = self.import_ply(self.XYZ + [f"float {name}" for name in ("red", "green", "blue")], rows, face, ["3 0 1 2", "3 1 3 2"])
+            self.assertEqual(tuple(result.data(result.of(SET_MESH)[0]["arrays"][6])[:4]), (255, 55, 0, 255))
+
+    def test_gaussians_are_points_in_their_colours_with_a_note(self):
+        red, green = (0.5 / 0.28209479177387814, -2, -2), (-2, 0.5 / 0.28209479177387814, -2)
+        rows = [f"0 0 0 {' '.join(map(str, red))}", f"1 0 0 {' '.join(map(str, green))}"]
+        result = self.import_ply(self.XYZ + [f"float f_dc_{i}" for i in range(3)], rows)
+        self.assertEqual({material["base"][:3] for material in result.of(SET_MATERIAL)}, {(1, 0, 0), (0, 1, 0)})
+        self.assertIn("3D Gaussians (3DGS), which are not rendered as such", result.text())
+
+    def test_a_cut_ply_file_says_so(self):
+        head = self.ply(self.XYZ, self.QUAD, "element face 2\nproperty list uchar int vertex_indices\n", "binary_little_endian").encode()
+        data = head + struct.pack("<12f", *(float(one) for row in self.QUAD for one in row.split())) + struct.pack("<B3i", 3, 0, 1, 2) + b"\3\0"
+        self.assertIn("ends within its elements 'face'", self.import_text("model.ply", data, 1).text())
+
+
+class Far(importer.Written):
+    """Models in the coordinates of a survey, whose details floats would lose."""
+
+    BASE = (452340.0, 312.0, 5411190.0)
+
+    def places(self, result):
+        """Of all corners, in the scene's space, of nodes that only move."""
+        nodes = {node["id"]: node for node in result.of(SET_NODE)}
+        found = set()
+        for node in nodes.values():
+            shown = {mesh["id"]: mesh for mesh in result.of(SET_MESH if node["kind"] == 1 else SET_SPHERES)}.get(node["object"])
+            if node["kind"] not in (1, 2) or not shown:
+                continue
+            values, width = result.floats(shown["arrays"][0]), 3 if node["kind"] == 1 else 4
+            move, above = [0, 0, 0], node
+            while above:
+                move = [one + above["matrix"][4 * c + 3] for c, one in enumerate(move)]
+                above = nodes.get(above["parent"])
+            found |= {tuple(round(values[at + c] + move[c] + result.origin[c] - self.BASE[c], 4) for c in range(3))
+                      for at in range(0, len(values), width)}
+        return found
+
+    DETAIL = {(0.12, 0.25, 0.38), (1.12, 0.25, 0.38), (1.12, 1.25, 0.51)}
+
+    def rows(self):
+        return [" ".join(f"{base + one:.3f}" for base, one in zip(self.BASE, place)) for place in sorted(self.DETAIL)]
+
+    def check(self, result, wanted=None):
+        self.assertEqual(self.places(result), wanted or self.DETAIL)
+        self.assertLess(max(abs(node["matrix"][4 * c + 3]) for node in result.of(SET_NODE) for c in range(3)), 1000)
+        self.assertRegex(result.text(), "lies 543[0-9]* m from the origin.*45234[0-2],31[23],54111[0-9]* is subtracted")
+
+    def test_obj_and_ply_keep_what_doubles_say(self):
+        self.check(self.import_text("model.obj", "".join(f"v {row}\n" for row in self.rows()) + "f 1 2 3\n"))
+        self.check(self.import_text("model.obj", "".join(f"v {row}\n" for row in self.rows()) + "p 1 2 3\n"))
+        head = "ply\nformat %s 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nend_header\n"
+        self.check(self.import_text("model.ply", head % "ascii" + "\n".join(self.rows()) + "\n"))
+        values = [float(one) for row in self.rows() for one in row.split()]
+        for form, order in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
+            self.check(self.import_text("model.ply", (head % form).encode() + struct.pack(order + "9d", *values)))
+
+    def test_gltf_keeps_what_nodes_say(self):
+        """Also below a root that has no place of its own, and where the positions themselves are far."""
+        data = struct.pack("<9f", *(one for place in ((0, 0, 0), (1, 0, 0), (0, 1, 0)) for one in place))
+        moved = {(place[0] + x, place[1] + y, place[2]) for place in ((0.12, 0.25, 0.38), (3.12, 0.25, 0.38)) for x, y in ((0, 0), (1, 0), (0, 1))}
+        nodes = [{"mesh": 0, "translation": [base + one for base, one in zip(self.BASE, place)]}
+                 for place in ((0.12, 0.25, 0.38), (3.12, 0.25, 0.38))]
+        for more, roots in (([], [0, 1]), ([{"children": [0, 1]}], [2])):
+            model = {"asset": {"version": "2.0"}, "scenes": [{"nodes": roots}], "nodes": nodes + more,
+                     "buffers": [{"uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode(), "byteLength": 36}],
+                     "bufferViews": [{"buffer": 0, "byteLength": 36}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                     "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}]}
+            self.check(self.import_text("model.gltf", json.dumps(model)), {tuple(round(one, 4) for one in place) for place in moved})
+            # A clip that moves the root: all is moved by a node above.
+            model["animations"] = [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+                                    "samplers": [{"input": 1, "output": 0}]}]
+            model["accessors"].append({"bufferView": 0, "componentType": 5126, "count": 3, "type": "SCALAR"})
+            result = self.import_text("model.gltf", json.dumps(model))
+            self.assertGreater(result.origin[2], 5411000)
+
+    def test_a_model_around_the_origin_stays_where_it_is(self):
+        result = self.import_text("model.obj", "v -9000 0 0\nv 9000 0 0\nv 0 9000 0\nf 1 2 3\n")
+        self.assertEqual((result.origin, len(result.of(SET_NODE))), ((0, 0, 0), 1))
+
+
+class Packages(importer.Written):
+    """3MF."""
+
+    def test_parts_are_found_by_the_rules_of_packages(self):
+        """Relations in any quotes or none at all, names with backslashes, other letters and percent signs."""
+        mesh = ('<model unit="meter"><resources>%s</resources><build><item objectid="1"%s/></build></model>')
+        triangle = ('<object id="1"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="1" z="0"/></vertices>'
+                    '<triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh></object>')
+        whole, other = mesh % (triangle, ""), mesh % ("", ' p:path="/3D/a%20b.model"')
+        kind = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+        for names in ({"3D/x.model": whole, "_rels/.rels": f"<R><Relationship Target='/3D/x.model' Type='{kind}'/></R>"},
+                      {"3D\\3dmodel.model": whole, "_rels/.rels": f'<R><Relationship Target="/3D/3dmodel.model" Type="{kind}"/></R>'},
+                      {"3D/3DModel.model": whole, "_rels/.rels": f'<R><Relationship Type = "{kind}" Target = "/3D/3dmodel.model"/></R>'},
+                      {"other/only.model": whole}, {"3D/3dmodel.model": other, "3D/a b.model": whole}):
+            archive = io.BytesIO()
+            with zipfile.ZipFile(archive, "w") as packed:
+                for name, text in names.items():
+                    packed.writestr(name, text)
+            result = self.import_text("model.3mf", archive.getvalue())
+            self.assertEqual([one["triangles"] for one in result.of(SET_MESH)], [1], result.text())
 
 
 def result_corners(mesh, result):

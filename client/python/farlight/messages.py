@@ -2729,6 +2729,7 @@ class ImportDone(Message):
     parse_ns: parsing and decoding
     hash_ns: hashing blobs
     total_ns: from the start of main to here
+    origin: subtracted from all places of models that are far from the origin; 0: nothing was
     """
     TYPE: ClassVar[int] = 0x8304
     SENDER: ClassVar[str] = "local"
@@ -2739,12 +2740,14 @@ class ImportDone(Message):
         _f.whole("parse_ns", "Q", 0, 18446744073709551615),
         _f.whole("hash_ns", "Q", 0, 18446744073709551615),
         _f.whole("total_ns", "Q", 0, 18446744073709551615),
+        _f.real("origin", -1e12, 1e12, 3),
     )
     read_bytes: int = 0
     read_ns: int = 0
     parse_ns: int = 0
     hash_ns: int = 0
     total_ns: int = 0
+    origin: Sequence[float] = (0.0, 0.0, 0.0)
 
 
 @dataclass
