@@ -123,6 +123,12 @@ void decode_images(reader &r, images &all)
     all.blobs.assign(all.jobs.size(), 0);
     for (const auto &entry : all.numbers) {
         texture_job &job = all.jobs[entry.second];
+        if (job.texels && job.reduced > 1) {
+            char text[200];
+            texture_explain_reduction(&job, text);
+            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, image_name(r, entry.first.first).c_str(),
+                        "the image %s", text);
+        }
         if (!job.texels) {
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, image_name(r, entry.first.first).c_str(),
                         "the image '%.100s' %.150s; it is shown in magenta and black",

@@ -280,6 +280,12 @@ static bool import_environment(struct import_scene *scene, struct files *files, 
     free(bytes);
     if (!job.texels)
         return import_fail(scene, file, "the environment cannot be read: %s", job.reason);
+    if (job.reduced > 1) {
+        char text[200];
+
+        texture_explain_reduction(&job, text);
+        import_note(scene, PROTOCOL_SEVERITY_WARNING, file, "%s", text);
+    }
     if (job.width != 2 * job.height)
         import_note(scene, PROTOCOL_SEVERITY_INFO, file,
                     "is %u x %u; an equirectangular image is twice as wide as high", job.width, job.height);

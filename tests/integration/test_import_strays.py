@@ -8,9 +8,10 @@ import json
 import struct
 import unittest
 import zipfile
+import zlib
 
 import importer
-from importer import SET_CAMERA, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_SPHERES, SET_TEXTURE
+from importer import SET_CAMERA, SET_ENVIRONMENT, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_SPHERES, SET_TEXTURE
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 PPM = b"P6\n1 1\n255\n\x80\x80\x80"
@@ -280,6 +281,62 @@ class Far(importer.Written):
     def test_a_model_around_the_origin_stays_where_it_is(self):
         result = self.import_text("model.obj", "v -9000 0 0\nv 9000 0 0\nv 0 9000 0\nf 1 2 3\n")
         self.assertEqual((result.origin, len(result.of(SET_NODE))), ((0, 0, 0), 1))
+
+
+class Large(importer.Written):
+    """Images beyond what textures may have are reduced, with a note."""
+
+    WIDTH = 20480
+
+    def test_textures_and_environments_are_reduced_to_what_can_be_shown(self):
+        def chunk(kind, data):
+            return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        row = b"\x00\xfe" * (self.WIDTH // 2)
+        images = {"png": b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", self.WIDTH, 3, 8, 0, 0, 0, 0)) +
+                         chunk(b"IDAT", zlib.compress((b"\0" + row) * 3)) + chunk(b"IEND", b""),
+                  "ppm": b"P6\n%d 3\n255\n" % self.WIDTH + bytes(one for value in row for one in (value,) * 3) * 3}
+        for kind, data in images.items():
+            self.write(f"w.{kind}", data)
+            self.write("m.mtl", f"newmtl a\nmap_Kd w.{kind}\n")
+            result = self.import_text("model.obj", "mtllib m.mtl\n" + QUAD + "usemtl a\nf 1/1 2/2 3/3\n")
+            texture, = result.of(SET_TEXTURE)
+            self.assertEqual((texture["width"], texture["height"]), (self.WIDTH // 2, 2))
+            self.assertEqual(set(result.data(texture["arrays"][0])), {127, 255})
+            self.assertIn("reduced to a half, 10240 x 2 texels", result.text())
+        self.write("x.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X %d\n" % self.WIDTH + b"\x40\x40\x40\x80\xc0\xc0\xc0\x80" * self.WIDTH)
+        result = importer.import_file(str(self.write("t.obj", QUAD + "f 1 2 3\n")), "--environment", str(self.folder / "x.hdr"))
+        environment, = result.of(SET_ENVIRONMENT)
+        self.assertEqual(environment["size"], (self.WIDTH // 2, 1))
+        self.assertEqual(set(struct.unpack("<40960e", result.data(environment["arrays"][0]))[0::4]), {0.5})
+        self.assertIn("x.hdr: is larger than can be shown: it is reduced to a half", result.text())
+
+    def test_what_could_not_be_read_in_time_is_refused_with_the_limit(self):
+        self.write("w.png", b"\x89PNG\r\n\x1a\n" + struct.pack(">I4s2I5B", 13, b"IHDR", 65537, 1, 8, 0, 0, 0, 0) +
+                   struct.pack(">I", zlib.crc32(struct.pack(">4s2I5B", b"IHDR", 65537, 1, 8, 0, 0, 0, 0))) + struct.pack(">I4s", 0, b"IDAT") +
+                   struct.pack(">I", zlib.crc32(b"IDAT")))
+        self.write("m.mtl", "newmtl a\nmap_Kd w.png\n")
+        self.assertIn("is 65537 x 1 texels; up to 65536 in one direction",
+                      self.import_text("model.obj", "mtllib m.mtl\n" + QUAD + "usemtl a\nf 1/1 2/2 3/3\n").text())
+
+
+class Bodies(importer.Written):
+    def test_a_closed_body_that_absorbs_light_has_its_own_thickness(self):
+        """Four volumes over the area of a box of 1 x 2 x 3; an open one keeps what the file says."""
+        places = [(x, y, z) for z in (0, 3) for y in (0, 2) for x in (0, 1)]
+        sides = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+        corners = [corner for a, b, c, d in sides for corner in (a, b, c, a, c, d)]
+        for count, wanted in ((36, 4 * 6 / 22), (33, 7.0)):
+            data = b"".join(struct.pack("<3f", *place) for place in places) + struct.pack("<36H", *corners)
+            model = {"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                     "buffers": [{"uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode(), "byteLength": len(data)}],
+                     "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": 72}],
+                     "accessors": [{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"},
+                                   {"bufferView": 1, "componentType": 5123, "count": count, "type": "SCALAR"}],
+                     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+                     "materials": [{"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1},
+                                                   "KHR_materials_volume": {"thicknessFactor": 7, "attenuationDistance": 1}}}]}
+            material, = self.import_text("model.gltf", json.dumps(model)).of(SET_MATERIAL)
+            self.assertAlmostEqual(material["body"][4], wanted, 5)
 
 
 class Packages(importer.Written):
