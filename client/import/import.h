@@ -169,6 +169,8 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh);
 /* Once all is added: says in the edit of each mesh whether it is closed (closed.h). Blobs may be hashed and sent
  * meanwhile. */
 void import_mark_closed(struct import_scene *scene);
+/* After that: sets the thickness of materials that absorb light to that of the closed meshes that have them. */
+void import_measure_bodies(struct import_scene *scene);
 void import_mesh_finish(struct import_mesh *mesh); /* for one that was not added */
 
 /* `spheres` (4 floats each) and `ranges` are taken. */

@@ -377,6 +377,7 @@ static bool send_names(struct sender *sender, const struct options *options)
 static void *mark_closed(void *scene)
 {
     import_mark_closed(scene);
+    import_measure_bodies(scene);
     return NULL;
 }
 
