@@ -49,6 +49,19 @@ class Obj(importer.Written):
         self.last = super().import_text(*arguments, **options)
         return self.last
 
+    def test_a_spike_without_width_is_no_part_of_a_polygon(self):
+        """A square with one from a corner, and with one from its side."""
+        for spike in ("1 1 0\nv 3 2 0\nv 1 1 0", "1 0 0\nv 1 0.5 0\nv 4 0.5 0\nv 1 0.5 0\nv 1 1 0"):
+            text = f"v 0 0 0\nv 1 0 0\nv {spike}\nv 0 1 0\n"
+            result = self.import_text("model.obj", text + "f " + " ".join(str(i + 1) for i in range(text.count("v"))) + "\n")
+            places, total = result_corners(result.of(SET_MESH)[0], result), 0
+            for at in range(0, len(places), 9):
+                (ax, ay), (bx, by), (cx, cy) = (places[at + 3 * i:at + 3 * i + 2] for i in range(3))
+                area = ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2
+                self.assertTrue(area == 0 or max(ax, bx, cx) <= 1, (ax, bx, cx))
+                total += area
+            self.assertAlmostEqual(total, 1, 6)
+
     def test_colours_of_vertices_are_srgb(self):
         result = self.import_text("model.obj", "v 0 0 0 0.5 0.5 0.5\nv 1 0 0 1 1 1\nv 1 1 0 0 0 0\nf 1 2 3\n")
         colours = result.data(result.of(SET_MESH)[0]["arrays"][6])
