@@ -119,6 +119,32 @@ void leave_out_empty_primitives(reader &r, json_t *root)
     }
 }
 
+void leave_out_empty_channels(reader &r, json_t *root)
+{
+    const json_t *accessors = json_object_get(root, "accessors");
+    size_t i;
+    json_t *animation;
+
+    json_array_foreach(json_object_get(root, "animations"), i, animation)
+    {
+        json_t *channels = json_object_get(animation, "channels");
+        for (size_t k = json_array_size(channels); k-- > 0;) {
+            const json_t *number = json_object_get(json_array_get(channels, k), "sampler");
+            const json_t *sampler =
+                json_is_integer(number) && json_integer_value(number) >= 0
+                    ? json_array_get(json_object_get(animation, "samplers"), size_t(json_integer_value(number)))
+                    : nullptr;
+            if (!is_empty(accessors, json_object_get(sampler, "input")) &&
+                !is_empty(accessors, json_object_get(sampler, "output")))
+                continue;
+            import_note(r.scene, PROTOCOL_SEVERITY_INFO,
+                        (place("animations", i) + "." + place("channels", k)).c_str(),
+                        "a channel without keys is left out");
+            json_array_remove(channels, k);
+        }
+    }
+}
+
 // Names that are no URIs: a percent sign without two digits stands for itself, and one with them may.
 void complete_uris(reader &r, json_t *root)
 {
@@ -173,8 +199,10 @@ std::string complete_json(reader &r, const unsigned char *json, size_t size_byte
     if (!json_is_object(root.get()))
         return text; // the parser says what is wrong
     complete_meshes(root.get());
-    if (counts_none)
+    if (counts_none) {
         leave_out_empty_primitives(r, root.get());
+        leave_out_empty_channels(r, root.get());
+    }
     complete_uris(r, root.get());
     if (compressed)
         complete_buffers(root.get(), binary);

@@ -112,6 +112,12 @@ class Gltf(importer.Written):
             self.assert_has(result.of(SET_MESH), [{"triangles": 1}])
             self.assertIn("meshes[0].primitives[0]: a primitive without vertices is left out", result.text())
 
+    def test_a_channel_without_keys_is_left_out(self):
+        result = self.run_gltf({"animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+                                                "samplers": [{"input": 4, "output": 3}]}]})
+        self.assertEqual(len(result.of(SET_MESH)), 1)
+        self.assertIn("animations[0].channels[0]: a channel without keys is left out", result.text())
+
     def test_a_bad_camera_or_light_leaves_itself_out(self):
         cameras = [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}},
                    {"type": "perspective", "perspective": {"yfov": 0, "znear": 0.1}},
