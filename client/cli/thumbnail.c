@@ -225,6 +225,14 @@ static bool take(struct thumbnails *wanted, size_t index, struct fl_error *error
     const struct model_list_entry *entry = &wanted->models.entries[index];
     const char *name = entry->path + entry->name_at;
     struct fl_error why = {0};
+    char plain[4097];
+    fl_text_utf8(name, plain, sizeof(plain));
+    if (wanted->to_folder && strcmp(name, plain) != 0) {
+        fl_error_set(&why, FL_ERROR_FILE, plain, "its name, and so that of its picture, is not UTF-8; rename it");
+        fl_import_destroy(wanted->ahead); /* was its own */
+        wanted->ahead = NULL;
+        return report(wanted, index, &why, error);
+    }
     struct fl_frame *frame = make(wanted, index, &why);
     if (why.code == FL_ERROR_INTERRUPTED) {
         *error = why;

@@ -148,9 +148,9 @@ static bool has_moving_root(const struct import_scene *scene, const struct tree 
     for (size_t i = 0; i < scene->edit_count; i++) {
         const struct message_set_channel *channel = &scene->edits[i].message.set_channel;
 
-        if (scene->edits[i].message.type == MESSAGE_SET_CHANNEL && channel->path == PROTOCOL_CHANNEL_NODE_TRANSLATION &&
-            channel->object < tree->node_count && tree->nodes[channel->object] &&
-            tree->nodes[channel->object]->parent == 0)
+        if (scene->edits[i].message.type == MESSAGE_SET_CHANNEL &&
+            channel->path == PROTOCOL_CHANNEL_NODE_TRANSLATION && channel->object < tree->node_count &&
+            tree->nodes[channel->object] && tree->nodes[channel->object]->parent == 0)
             return true;
     }
     return false;

@@ -3,6 +3,7 @@
 #include "web/callers.h"
 #include "web/page.h"
 #include "protocol/common/clock.h"
+#include "protocol/plain_text.h"
 
 #include <libwebsockets.h>
 #include <stdio.h>
@@ -32,6 +33,7 @@ struct gateway {
     struct web_links links;
     unsigned viewers;
     lws_sorted_usec_list_t check;
+    bool told_origin;
 };
 
 /* What belongs to one HTTP request or WebSocket; cleared by libwebsockets. */
@@ -72,6 +74,22 @@ static bool is_own_origin(struct lws *wsi)
            (strncmp(origin, "http://", 7) == 0 || strncmp(origin, "https://", 8) == 0);
 }
 
+/* A proxy that gives requests its own name for the host serves the page, which then finds no view: once, as pages
+ * of others ask, too. */
+static void tell_origin(struct gateway *gateway, struct lws *wsi)
+{
+    char origin[NAME_BYTES], host[NAME_BYTES];
+    if (gateway->told_origin || lws_hdr_copy(wsi, origin, sizeof(origin), WSI_TOKEN_ORIGIN) <= 0 ||
+        lws_hdr_copy(wsi, host, sizeof(host), WSI_TOKEN_HOST) <= 0)
+        return;
+    gateway->told_origin = true;
+    fputs("farlight-web: refused a view of a page at ", stderr);
+    plain_text_print(stderr, origin);
+    fputs(", which asked for the host ", stderr);
+    plain_text_print(stderr, host);
+    fputs("; a proxy must keep the host's name, as nginx does with 'proxy_set_header Host $http_host'\n", stderr);
+}
+
 /* The HTTP status with which a WebSocket is turned away; 0: it may come in. */
 static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web_right *right)
 {
@@ -82,8 +100,10 @@ static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web
     const char *name = length > 0 ? web_links_find(&gateway->links, path, right) : NULL;
     if (!name || strcmp(name, "view") != 0)
         return HTTP_STATUS_UNAUTHORIZED;
-    if (!is_own_origin(wsi))
+    if (!is_own_origin(wsi)) {
+        tell_origin(gateway, wsi);
         return HTTP_STATUS_FORBIDDEN;
+    }
     return gateway->viewers < gateway->options->viewers ? 0 : HTTP_STATUS_SERVICE_UNAVAILABLE;
 }
 
@@ -119,12 +139,29 @@ static int begin_page(struct lws *wsi, struct visitor *visitor, const struct pag
     return 0;
 }
 
+/* Of a link without its last slash to the link, relative, as a proxy may have put it below a path. */
+static int add_slash(struct lws *wsi, const char *path)
+{
+    unsigned char buffer[LWS_PRE + HEADERS_BYTES], *at = buffer + LWS_PRE;
+    char link[WEB_TOKEN_LENGTH + 2];
+    const int length = snprintf(link, sizeof(link), "%.*s/", WEB_TOKEN_LENGTH, path + 1);
+    if (lws_http_redirect(wsi, HTTP_STATUS_FOUND, (const unsigned char *)link, length, &at,
+                          buffer + sizeof(buffer)) < 0)
+        return -1;
+    return lws_http_transaction_completed(wsi) ? -1 : 0;
+}
+
 static int on_page(struct gateway *gateway, struct lws *wsi, struct visitor *visitor, const char *path)
 {
     if (!is_own_host(gateway, wsi))
         return begin_page(wsi, visitor, &page_misdirected, MISDIRECTED);
     const bool is_get = lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0;
     enum web_right right;
+    char slashed[WEB_TOKEN_LENGTH + 3];
+    if (is_get && strlen(path) == WEB_TOKEN_LENGTH + 1 &&
+        snprintf(slashed, sizeof(slashed), "%s/", path) == WEB_TOKEN_LENGTH + 2 &&
+        web_links_find(&gateway->links, slashed, &right))
+        return add_slash(wsi, path);
     const char *name = web_links_find(&gateway->links, path, &right);
     if (!name)
         return begin_page(wsi, visitor, &page_denied, HTTP_STATUS_UNAUTHORIZED);

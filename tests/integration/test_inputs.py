@@ -2,6 +2,7 @@
 """What a picture is made of: several models in a scene, a model from standard input, files that change; and contact
 sheets of whole folders."""
 import json
+import os
 import signal
 import subprocess
 import unittest
@@ -149,6 +150,16 @@ class Inputs(OneDaemon):
         self.expect(farlight("thumbnail", self.square, teapot, "-o", f"{out}/", "--size", "32x32"), 0)
         self.assertEqual(sorted(path.name for path in out.iterdir()), ["square.obj.png", "teapot.glb.png"])
         self.assertEqual(read_png(out / "teapot.glb.png")[:2], (32, 32))
+
+    def test_a_model_whose_name_is_not_utf_8_does_not_stop_the_others(self):
+        folder = self.folder / "names"
+        folder.mkdir()
+        for name in (b"a\xff.obj", b"b.obj"):
+            with open(os.path.join(os.fsencode(folder), name), "wb") as file:
+                file.write(self.square.read_bytes())
+        result = self.expect(farlight("thumbnail", folder, "-o", f"{self.folder}/out/", "--size", "16x16"), 1)
+        self.assertIn("is not UTF-8; rename it", result.stderr)
+        self.assertEqual([path.name for path in (self.folder / "out").iterdir()], ["b.obj.png"])
 
     def test_endings_of_models_are_those_that_the_importer_knows(self):
         unknown = self.folder / "model.xyz"

@@ -57,7 +57,7 @@ class Web(Case):
     def test_nothing_comes_without_the_token(self):
         path = self.gateway.path
         other = path[:5] + ("A" if path[5] != "A" else "B") + path[6:]
-        for wrong in ("/", "/page.js", other, path[:-2] + "/", path[:-1], "/../etc/passwd", "/" + "A" * 3000):
+        for wrong in ("/", "/page.js", other, path[:-2] + "/", path[:-2], "/../etc/passwd", "/" + "A" * 3000):
             status, headers, body = self.gateway.get(wrong)
             self.assertIn(status, (401, 403, 404, 413, 431), wrong)
             self.assertNotIn(path[1:-1].encode(), body)
@@ -65,6 +65,19 @@ class Web(Case):
         self.assertEqual(self.gateway.get(path + "../main.c")[0], 401)
         self.assertEqual(self.gateway.get(path + "main.c")[0], 404)
         self.assertEqual(self.gateway.get(path, "POST")[0], 405)
+
+    def test_a_link_without_its_last_slash_leads_to_the_page(self):
+        status, headers, _ = self.gateway.get(self.gateway.path[:-1])
+        self.assertEqual((status, headers["location"]), (302, self.gateway.path[1:]))
+
+    def test_a_proxy_that_changes_the_name_of_the_host_is_told(self):
+        with Gateway("--server", self.address, "--scene", NAME) as gateway:
+            for _ in range(2):
+                with Socket(gateway, origin="https://proxy.example") as view:
+                    self.assertEqual(view.status, 403)
+            said = gateway.stop()[1]
+        self.assertEqual(said.count("page at https://proxy.example"), 1, said)
+        self.assertIn(f"host {gateway.host}; a proxy must keep the host's name", said)
 
     def test_sockets_need_token_and_origin(self):
         path = self.gateway.path
