@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace gltf
 {
@@ -49,6 +50,16 @@ double whiteness(const reader &r, const std::vector<light_place> &lights, const 
         sum += light.type == "directional" ? light.intensity : light.intensity / std::max(distance2, extent2 / 16);
     }
     return sum / pi;
+}
+// From here on intensities are lumens: above models that are lit brightly on purpose (Khronos' LightsPunctualLamp
+// is 61 times white), or, by exporters that write lumens unless they are told otherwise, not far above white.
+double photometric_white(const reader &r)
+{
+    int major = 0, minor = 0;
+    const bool is_blender =
+        sscanf(r.model.asset.generator.c_str(), "Khronos glTF Blender I/O v%d.%d", &major, &minor) == 2;
+
+    return is_blender && major * 100 + minor >= 306 ? 20 : 200;
 }
 } // namespace
 
@@ -100,8 +111,6 @@ uint32_t light_id(reader &r, int index, const std::string &where)
 void convert_photometric_lights(reader &r, const std::vector<int> &roots)
 {
     constexpr double lumens_per_watt = 683; // of Blender's exporter
-    // Between a scene that is lit well and the same in candela, on the bright side.
-    constexpr double photometric_white = 50;
     std::vector<light_place> lights;
 
     if (r.model.lights.empty())
@@ -113,7 +122,7 @@ void convert_photometric_lights(reader &r, const std::vector<int> &roots)
             lights.push_back({light, point_of(placed, {0, 0, 0})});
     });
     const double white = whiteness(r, lights, around); // of a scene without meshes it is 0 or NaN
-    if (!(white > photometric_white && white < 1e30))
+    if (!(white > photometric_white(r) && white < 1e30))
         return;
     for (tinygltf::Light &light : r.model.lights)
         light.intensity /= lumens_per_watt;

@@ -145,9 +145,13 @@ class Gltf(importer.Written):
             self.assertIn("'none%25.ppm' could not be read: No such file", result.text())
 
     def test_lights_in_candela_become_watts_where_all_would_be_white(self):
-        for kind, intensity, wanted in (("point", 54351.4, 79.577), ("point", 79.577, 79.577), ("directional", 3.0, 3.0),
-                                        ("directional", 68300.0, 100.0)):
-            result = self.run_gltf({"nodes": [{"mesh": 0}, {"translation": [0, 5, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+        blender = "Khronos glTF Blender I/O v3.6.28"
+        for kind, intensity, wanted, generator in (
+                ("point", 54351.4, 79.577, ""), ("point", 79.577, 79.577, blender), ("directional", 3.0, 3.0, blender),
+                ("directional", 68300.0, 100.0, ""), ("directional", 68.3, 0.1, blender), ("directional", 68.3, 68.3, ""),
+                ("directional", 68.3, 68.3, "Khronos glTF Blender I/O v3.3.0")):
+            result = self.run_gltf({"asset": {"version": "2.0", "generator": generator},
+                                    "nodes": [{"mesh": 0}, {"translation": [0, 5, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
                                     "extensions": {"KHR_lights_punctual": {"lights": [{"type": kind, "intensity": intensity}]}}})
             self.assertAlmostEqual(result.of(SET_LIGHT)[0]["colour"][0], wanted, 2)
             self.assertEqual("divided by 683" in result.text(), intensity != wanted)
