@@ -309,6 +309,29 @@ class WithDaemon(OneDaemon):
         self.addCleanup(client.close)
         return client
 
+    def test_a_forked_process_connects_anew(self):
+        """As the workers of a loader of training data do, beside the process that they were forked from."""
+        client = self.connect()
+        scene = farlight.load(bundled_scenes() / "teapot.glb")
+
+        def rendered(i):
+            return client.render(scene, farlight.Camera((1 + i, 2, 6)), width=32, height=24, samples=1).data
+        wanted = [bytes(rendered(i)) for i in range(3)]
+        children = []
+        for i in range(3):
+            child = os.fork()
+            if child == 0:
+                status = 1
+                try:
+                    status = int(any(bytes(rendered(i)) != wanted[i] for _ in range(3)))
+                    client.close()
+                finally:
+                    os._exit(status)
+            children.append(child)
+        for i in range(3):
+            self.assertEqual(bytes(rendered(i)), wanted[i])
+        self.assertEqual([os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children], [0, 0, 0])
+
     def test_pictures_are_the_command_lines_to_the_byte(self):
         self.default_samples()
         client = self.connect()

@@ -108,6 +108,7 @@ class Client:
         self._link: address.Link | None = None
         self._core: Core = options.core(None)
         self._selector = selectors.DefaultSelector()
+        self._pid = os.getpid()
         self._closed = False
         try:
             self._again(self._ensure)
@@ -139,10 +140,20 @@ class Client:
             self._link.close()
             self._link = None
 
+    def _leave_to_parent(self) -> None:
+        """After a fork: the connection, its daemon and the selector, whose kernel side is shared, stay the other process's."""
+        self._pid = os.getpid()
+        self._selector = selectors.DefaultSelector()
+        if self._link is not None:
+            self._link.socket.close()
+            self._link = None
+
     def _ensure(self) -> None:
-        """Connects, and again if the connection was lost, or is found to be."""
+        """Connects, and again if the connection was lost, or is found to be; anew in a forked process."""
         if self._closed:
             raise ConnectionLost("the client is closed", retryable=False)
+        if self._pid != os.getpid():
+            self._leave_to_parent()
         if self._link is not None and self._core.failure is None:
             while self._receive() and self._core.failure is None:
                 pass
@@ -332,6 +343,8 @@ class Client:
 
     def close(self) -> None:
         """Says goodbye; a daemon of one's own ends."""
+        if self._pid != os.getpid():
+            self._leave_to_parent()
         if not self._closed and self._link is not None:
             self._core.leave()
             self._flush()
