@@ -640,6 +640,7 @@ struct fl_export_options {
     unsigned quality;   /* JPEG and WebP; 0: 95 */
     const struct fl_export_text *texts; /* to be drawn into it, if it has the format rgba8 */
     size_t text_count;
+    double origin[3]; /* for the metadata: that of the scene's import statistics */
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);

@@ -33,6 +33,7 @@ struct image {
     float frames_per_second;                 /* 0: unknown */
     bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */
     const char *model;                       /* for the metadata; may be empty */
+    const float *origin;                     /* for the metadata: subtracted from all places; NULL or 0: nothing */
     const struct message_frame_begin *begin; /* encoding raw */
     const struct message_frame_end *end;
     const uint8_t *pixels;

@@ -3,7 +3,7 @@
 import json
 import math
 
-from farlight_test import OneDaemon, bundled_scenes, farlight, read_png
+from farlight_test import OneDaemon, bundled_scenes, exr_attributes, farlight, read_png
 
 COLOURS = {"front": (1, 0, 0), "back": (0, 1, 0), "left": (0, 0, 1), "right": (1, 1, 0), "top": (0, 1, 1), "bottom": (1, 0, 1)}
 # x -2 .. 2, y 0 .. 1, z -0.5 .. 0.5: each side has its colour.
@@ -57,6 +57,8 @@ class Sides(OneDaemon):
                 pictures += [read_png(self.folder / f"f-{i}.png") for i in (1, 2)]
             made.append(pictures)
         self.assertEqual(made[0][0], made[1][0])
+        self.expect(farlight("render", far, "-o", self.folder / "x.exr", "--size", "8x8", "--samples", "1"), 0)
+        self.assertIn(b"452340,313,5411190", exr_attributes(self.folder / "x.exr")["farlight/origin"])
         # Places of keys and shots are floats, which are half a metre apart there.
         for near, away in zip(made[0][1:], made[1][1:]):
             self.assertLess(sum(a != b for a, b in zip(b"".join(near[2]), b"".join(away[2]))), len(near[2]) * len(near[2][0]) // 2)
