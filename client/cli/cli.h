@@ -295,6 +295,8 @@ struct cli_job {
     unsigned file_quality;          /* of JPEG, WebP and video files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
+    double eye_rest[3], look_at_rest[3]; /* what the key's floats lose of --eye and --look-at */
+    double origin[3];                    /* subtracted from all places of the camera so far */
     struct message_render options;
     struct fl_error error; /* of what was typed */
 };
@@ -381,11 +383,13 @@ bool cli_loading_again(struct cli_loading *loading, struct fl_error *error);
 /* That `what` is new, and how much of it was sent; on standard error, unless the job is quiet. */
 void cli_loading_print_sent(const struct cli_loading *loading, const char *what);
 void cli_loading_close(struct cli_loading *loading);
-/* Sets the job's camera if the command line leaves it to the model. */
 /* A camera by name or number; without one the model's first, unless keys or something else place it. `framed`: the
  * node that is to be in view, name or number; NULL: all. */
 bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,
                      const struct fl_scene *scene, struct fl_error *error);
+/* Places of the camera are the model's: moves them to the scene, whose origin may be another. */
+void cli_move_camera(struct cli_job *job, const double origin[3]);
+/* Sets the job's camera if the command line leaves it to the model. */
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error);
 
 /* ---- retry.c: lost daemons that may come back ---- */

@@ -193,11 +193,13 @@ static bool is_zero(const float vector[3])
 }
 
 /* Whether `up` and the view direction leave the picture's upright undefined. */
-static bool is_degenerate(const struct record_camera_key *key)
+static bool is_degenerate(const struct cli_job *job)
 {
+    const struct record_camera_key *key = &job->key;
     double view[3], cross = 0, lengths = 0, view2 = 0, up2 = 0;
     for (unsigned i = 0; i < 3; i++) {
-        view[i] = (double)key->look_at_world[i] - (double)key->eye_world[i];
+        view[i] =
+            (double)key->look_at_world[i] - (double)key->eye_world[i] + job->look_at_rest[i] - job->eye_rest[i];
         view2 += view[i] * view[i];
         up2 += (double)key->up_world[i] * (double)key->up_world[i];
     }
@@ -233,9 +235,10 @@ static bool complete_camera(struct cli_job *job)
         job->has_framing |= job->has_fov;
         return true;
     }
-    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof(job->key.eye_world)) == 0)
+    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof(job->key.eye_world)) == 0 &&
+        memcmp(job->eye_rest, job->look_at_rest, sizeof(job->eye_rest)) == 0)
         return cli_usage(job, "--look-at", "is where --eye is") == 0;
-    if (is_zero(job->key.up_world) || is_degenerate(&job->key))
+    if (is_zero(job->key.up_world) || is_degenerate(job))
         return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
     job->options.ground_up_x = job->key.up_world[0];
     job->options.ground_up_y = job->key.up_world[1];
@@ -244,6 +247,50 @@ static bool complete_camera(struct cli_job *job)
     job->options.keys = &job->key;
     job->options.keys_count = 1;
     return true;
+}
+
+static void move_place(float place[3], const double rest[3], const double by[3])
+{
+    for (unsigned i = 0; i < 3; i++)
+        place[i] = (float)((double)place[i] + rest[i] - by[i]);
+}
+
+/* The script's camera; tangents of splines are no places. */
+static void move_channel(const struct fl_channel *channel, const double by[3])
+{
+    static const double nothing[3];
+    const bool has_tangents = channel->interpolation == PROTOCOL_INTERPOLATION_CUBIC_SPLINE;
+    const uint32_t parts = has_tangents || channel->interpolation == PROTOCOL_INTERPOLATION_BEZIER ? 3 : 1;
+    float *values = (float *)(uintptr_t)channel->values; /* the script's own */
+    for (uint32_t i = 0; i < channel->key_count * parts; i++)
+        if (!has_tangents || i % 3 == 1)
+            move_place(values + (size_t)i * 3, nothing, by);
+}
+
+void cli_move_camera(struct cli_job *job, const double origin[3])
+{
+    double by[3];
+    bool moves = false;
+    for (unsigned i = 0; i < 3; i++) {
+        by[i] = origin[i] - job->origin[i];
+        moves = moves || by[i] < 0 || by[i] > 0;
+        job->origin[i] = origin[i];
+    }
+    if (!moves)
+        return;
+    move_place(job->key.eye_world, job->eye_rest, by);
+    move_place(job->key.look_at_world, job->look_at_rest, by);
+    memset(job->eye_rest, 0, sizeof(job->eye_rest));
+    memset(job->look_at_rest, 0, sizeof(job->look_at_rest));
+    for (uint32_t i = 0; job->series.keys && i < job->options.keys_count; i++) {
+        static const double nothing[3];
+        move_place(job->series.keys[i].eye_world, nothing, by);
+        move_place(job->series.keys[i].look_at_world, nothing, by);
+    }
+    for (size_t i = 0; i < job->channel_count; i++)
+        if (job->channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_EYE ||
+            job->channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_LOOK_AT)
+            move_channel(&job->channels[i].channel, by);
 }
 
 bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,

@@ -204,6 +204,21 @@ static error_t set_vector(struct cli_job *job, const char *field, const char *va
     return fl_text_vector(value, vector, &job->error) ? 0 : name_field(job, field);
 }
 
+/* With what a float loses of it: models may be far from the origin. */
+static error_t set_place(struct cli_job *job, const char *field, const char *value, float place[3], double rest[3],
+                         bool *is_set)
+{
+    double read[3] = {0, 0, 0};
+    *is_set = true;
+    if (!fl_text_place(value, read, &job->error))
+        return name_field(job, field);
+    for (unsigned i = 0; i < 3; i++) {
+        place[i] = (float)read[i];
+        rest[i] = read[i] - (double)place[i];
+    }
+    return 0;
+}
+
 /* Formats of pictures and of models have no name in common. */
 static error_t set_format(struct cli_job *job, const char *value)
 {
@@ -372,9 +387,9 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         job->camera = value;
         return 0;
     case KEY_EYE:
-        return set_vector(job, field, value, job->key.eye_world, &job->has_eye);
+        return set_place(job, field, value, job->key.eye_world, job->eye_rest, &job->has_eye);
     case KEY_LOOK_AT:
-        return set_vector(job, field, value, job->key.look_at_world, &job->has_look_at);
+        return set_place(job, field, value, job->key.look_at_world, job->look_at_rest, &job->has_look_at);
     case KEY_UP:
         return set_vector(job, field, value, job->key.up_world, &job->has_up);
     case KEY_HALF:

@@ -150,6 +150,8 @@ void cli_loading_close(struct cli_loading *loading)
 
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error)
 {
+    if (!job->scene)
+        cli_move_camera(job, fl_scene_import_stats(scene)->origin);
     return cli_find_camera(&job->options, job->camera, job->framed, job->has_framing || job->is_orbit, scene,
                            error);
 }

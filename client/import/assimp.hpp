@@ -28,7 +28,8 @@ struct reader : reading::base {
     struct files *files;
     const assimp_format *format;
     const aiScene *source = nullptr;
-    double metres = 1; // of a unit, when the scene is there
+    double metres = 1;            // of a unit, when the scene is there
+    double origin[3] = {0, 0, 0}; // to be added to the positions that the library has
     std::vector<uint32_t> material_ids = {};
     bool uses_second_texcoords = false;                                    // some material does
     std::map<std::vector<unsigned>, shown_mesh> meshes = {};               // by places in the scene's list
@@ -45,9 +46,13 @@ float linear(float value);
 // ---- assimp_check.cpp: what the library would not survive, before it sees the file
 void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes);
 
-// ---- assimp_collada.cpp
-// The text that the library is to read instead.
+// ---- assimp_collada.cpp, assimp_ply.cpp, assimp_stl.cpp
+// What the library is to read instead; of PLY and STL empty: the file itself.
 std::string mend_collada(reader &r, const unsigned char *bytes, size_t size_bytes);
+std::string mend_ply(reader &r, const unsigned char *bytes, size_t size_bytes);
+// Fails where the file ends too early.
+void check_ply_rows(reader &r, const unsigned char *bytes, size_t size_bytes);
+std::string mend_stl(reader &r, const unsigned char *bytes, size_t size_bytes);
 
 // ---- assimp_scene.cpp
 void add_scene(reader &r);

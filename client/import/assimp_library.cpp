@@ -132,6 +132,12 @@ bool has_all_corners(const aiScene &scene, char reason[ASSIMP_REASON_BYTES])
     return true;
 }
 
+bool has_colours(const aiScene &scene)
+{
+    return std::any_of(scene.mMeshes, scene.mMeshes + scene.mNumMeshes,
+                       [](const aiMesh *mesh) { return mesh->mColors[0] != nullptr; });
+}
+
 const aiScene *read(const char *name, const assimp_format *format, const unsigned char *bytes, size_t size_bytes,
                     void **keep, char reason[ASSIMP_REASON_BYTES])
 {
@@ -149,7 +155,10 @@ const aiScene *read(const char *name, const assimp_format *format, const unsigne
     const aiScene *scene = importer->ReadFile(plain.c_str(), 0);
     if (scene && !has_all_corners(*scene, reason))
         return nullptr;
-    if (scene)
+    // Joining takes no notice of colours: faces would lose theirs to their neighbours.
+    if (scene && has_colours(*scene))
+        steps &= ~unsigned(aiProcess_JoinIdenticalVertices);
+    if (scene && steps != 0)
         scene = importer->ApplyPostProcessing(steps);
     snprintf(reason, ASSIMP_REASON_BYTES, "%s", scene ? "" : importer->GetErrorString());
     if (scene)

@@ -211,18 +211,12 @@ const aiTexture *embedded(const reader &r, const std::string &name)
     return nullptr;
 }
 
-// Names are often those of the machine where the model was made: then the last part counts.
 unsigned char *read_image(const reader &r, const std::string &name, size_t *size_bytes, char *reason)
 {
     if (const aiTexture *image = embedded(r, name))
         return image->mHeight == 0 ? copy_bytes(image->pcData, image->mWidth, size_bytes)
                                    : as_tga(*image, size_bytes, reason);
-    unsigned char *bytes = files_read(r.files, name.c_str(), size_bytes, reason);
-    const std::string last = base_name(name);
-    char reason_last[FILES_REASON_BYTES];
-    if (!bytes && last != name)
-        bytes = files_read(r.files, last.c_str(), size_bytes, reason_last);
-    return bytes;
+    return obj::read_moved_image(r.scene, r.files, name, size_bytes, reason);
 }
 
 // Made up by the library for a file without materials: nameless or of the library's own name, and plainly white

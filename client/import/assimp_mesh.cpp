@@ -93,11 +93,26 @@ void read_vectors(const aiVector3D *from, unsigned count, float *to)
     }
 }
 
-void read_colours(const aiColor4D *from, unsigned count, uint8_t *to)
+// What a value is divided by: PLY files with floats have them from 0 to 1, or to 255.
+float full_colour(const reader &r, const aiMesh &from)
+{
+    const aiColor4D *colours = from.mColors[0];
+    const bool is_ply = strcmp(r.format->ending, ".ply") == 0;
+
+    return is_ply && colours &&
+                   std::any_of(colours, colours + from.mNumVertices,
+                               [](const aiColor4D &one) { return one.r > 1 || one.g > 1 || one.b > 1; })
+               ? 255
+               : 1;
+}
+
+void read_colours(const aiColor4D *from, unsigned count, float full, uint8_t *to)
 {
     for (unsigned i = 0; i < count; i++)
         for (unsigned c = 0; c < 4; c++) {
-            const float value = !from ? 1 : c < 3 ? linear(from[i][c]) : std::min(std::max(from[i].a, 0.0f), 1.0f);
+            const float value = !from   ? 1
+                                : c < 3 ? linear(from[i][c] / full)
+                                        : std::min(std::max(from[i].a, 0.0f), 1.0f);
             to[size_t(i) * 4 + c] = uint8_t(std::lround(value * 255));
         }
 }
@@ -134,7 +149,7 @@ void read_vertices(builder &b, uint64_t count)
             if (mesh.texcoords[set])
                 read_texcoords(from->mTextureCoords[set], from->mNumVertices, mesh.texcoords[set] + first * 2);
         if (mesh.colours)
-            read_colours(from->mColors[0], from->mNumVertices, mesh.colours + first * 4);
+            read_colours(from->mColors[0], from->mNumVertices, full_colour(b.r, *from), mesh.colours + first * 4);
         first += from->mNumVertices;
     }
 }
@@ -223,12 +238,13 @@ shown_mesh add_points(reader &r, const aiMesh &from, const std::string &where)
     if (from.mNumVertices > points::points_max)
         fail(r, where, "%u points; up to %u are allowed", from.mNumVertices, points::points_max);
     check_room(r, where, from.mNumVertices, 10 * sizeof(float)); // with its sphere
+    const float full = full_colour(r, from);
     for (unsigned i = 0; i < from.mNumVertices; i++) {
         const aiVector3D &place = from.mVertices[i];
         cloud.places.insert(cloud.places.end(), {place.x, place.y, place.z});
         if (from.mColors[0]) {
             const aiColor4D &colour = from.mColors[0][i];
-            cloud.colours.insert(cloud.colours.end(), {colour.r, colour.g, colour.b});
+            cloud.colours.insert(cloud.colours.end(), {colour.r / full, colour.g / full, colour.b / full});
         }
     }
     cloud.material = from.mMaterialIndex < r.material_ids.size() ? r.material_ids[from.mMaterialIndex] : 0;

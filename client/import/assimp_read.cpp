@@ -81,12 +81,19 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
         fail(r, "", "%s", reason);
     check_bytes(r, bytes, size_bytes);
     std::string mended;
-    if (strcmp(r.format->ending, ".dae") == 0) {
+    if (strcmp(r.format->ending, ".dae") == 0)
         mended = mend_collada(r, bytes, size_bytes);
+    else if (strcmp(r.format->ending, ".ply") == 0)
+        mended = mend_ply(r, bytes, size_bytes);
+    else if (strcmp(r.format->ending, ".stl") == 0)
+        mended = mend_stl(r, bytes, size_bytes);
+    if (!mended.empty()) {
         bytes = reinterpret_cast<const unsigned char *>(mended.data());
         size_bytes = mended.size();
     }
     r.source = owner.library->read(r.format->ending, r.format, bytes, size_bytes, &owner.keep, reason);
+    if ((!r.source || !r.source->mRootNode) && strcmp(r.format->ending, ".ply") == 0)
+        check_ply_rows(r, bytes, size_bytes);
     if (!r.source || !r.source->mRootNode)
         explain(r, reason, bytes, size_bytes);
     add_materials(r);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The hierarchy, with cameras and lights, which the library ties to nodes by name. Nothing here is recursive.
 #include "assimp.hpp"
+#include "origin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -298,6 +299,8 @@ void add_scene(reader &r)
             w.lights.emplace(text(r.source->mLights[i]->mName), i);
     if (!is_identity(axes))
         open[0].parent = add_node(r, 0, axes, nullptr, "y up, in metres");
+    if (std::any_of(r.origin, r.origin + 3, [](double one) { return one < 0 || one > 0; }))
+        open[0].parent = import_add_origin_node(r.scene, r.origin, open[0].parent);
     while (!open.empty()) {
         const pending at = open.back();
         open.pop_back();

@@ -5,6 +5,7 @@
 #include "protocol/common/clock.h"
 #include "protocol/plain_text.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -12,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -335,6 +337,67 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
                           char reason[FILES_REASON_BYTES])
 {
     return read_beneath(files, files->folder, name, size_bytes, reason);
+}
+
+/* The last part of a path of any system, without blanks and quotes around it. False: it has none, or is too long.
+ */
+static bool last_part(const char *path, char name[FILES_NAME_BYTES])
+{
+    static const char around[] = " \t\"'";
+    size_t length = strlen(path);
+
+    while (length > 0 && strchr(around, path[length - 1]))
+        length--;
+    size_t begin = length;
+    while (begin > 0 && path[begin - 1] != '/' && path[begin - 1] != '\\')
+        begin--;
+    while (begin < length && strchr(around, path[begin]))
+        begin++;
+    if (begin == length || length - begin >= FILES_NAME_BYTES)
+        return false;
+    memcpy(name, path + begin, length - begin);
+    name[length - begin] = '\0';
+    return true;
+}
+
+/* Replaces the name by that of a file beside the model that differs in case alone; the first one in the order of
+ * bytes, so that the same folder gives the same picture. */
+static bool find_in_any_case(const struct files *files, char name[FILES_NAME_BYTES])
+{
+    const int descriptor = openat(files->folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *folder = descriptor >= 0 ? fdopendir(descriptor) : NULL;
+    char found[FILES_NAME_BYTES] = "";
+
+    if (!folder) {
+        if (descriptor >= 0)
+            close(descriptor);
+        return false;
+    }
+    for (const struct dirent *entry; (entry = readdir(folder));)
+        if (strcasecmp(entry->d_name, name) == 0 && (found[0] == '\0' || strcmp(entry->d_name, found) < 0))
+            snprintf(found, sizeof(found), "%s", entry->d_name);
+    closedir(folder);
+    if (found[0] != '\0')
+        memcpy(name, found, sizeof(found));
+    return found[0] != '\0';
+}
+
+unsigned char *files_read_moved(struct files *files, const char *name, size_t *size_bytes,
+                                char found[FILES_NAME_BYTES], char reason[FILES_REASON_BYTES])
+{
+    char reason_last[FILES_REASON_BYTES];
+    unsigned char *bytes = files_read(files, name, size_bytes, reason);
+
+    if (!bytes && files->folder >= 0 && last_part(name, found)) {
+        if (strcmp(found, name) != 0)
+            bytes = files_read(files, found, size_bytes, reason_last);
+        if (!bytes && find_in_any_case(files, found))
+            bytes = files_read(files, found, size_bytes, reason_last);
+        if (bytes)
+            return bytes;
+    }
+    found[0] = '\0';
+    return bytes;
 }
 
 unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,

@@ -20,6 +20,7 @@ extern "C" {
 #define FILES_BYTES_MAX (2ULL << 30) /* of one file */
 #define FILES_TOTAL_MAX (4ULL << 30) /* of all files of a model */
 #define FILES_REASON_BYTES 256
+#define FILES_NAME_BYTES 256 /* of a name within a folder, with its NUL */
 #define FILES_NAMED_MAX 4096
 
 struct files {
@@ -52,6 +53,12 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 /* `name` is relative to the model's folder; '\' also separates folders if there is no file of that very name. */
 unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
                           char reason[FILES_REASON_BYTES]);
+
+/* As files_read(). Names are often those of the machine where the model was made: where there is no such file, one
+ * beside the model with the name's last part, in any case and without quotes, is read and `found` has its name,
+ * which is empty otherwise. The reason is that of the whole name. */
+unsigned char *files_read_moved(struct files *files, const char *name, size_t *size_bytes,
+                                char found[FILES_NAME_BYTES], char reason[FILES_REASON_BYTES]);
 
 /* As files_read(); what is not in the model's folder may be in that of further images. */
 unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,

@@ -13,6 +13,7 @@
 #include <tiny_gltf.h>
 
 #include <array>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
@@ -53,8 +54,9 @@ struct reader : reading::base {
     int variant = -1; // of the materials; -1: as the primitives have them
     // By texture and whether it holds colour: what has been decoded.
     std::map<std::pair<int, bool>, uint32_t> texture_ids;
-    std::map<std::string, size_t> buffer_sizes; // by file: how much of it the model asks for, where that is less
-    std::vector<int> parents;                   // by node; -1: a root
+    std::map<std::string, std::string> raw_names; // by name as a URI: as it stands in the file, with percent signs
+    std::map<std::string, size_t> buffer_sizes;   // by file: how much of it the model asks for, where that is less
+    std::vector<int> parents;                     // by node; -1: a root
     // By view that is compressed: what it holds.
     std::map<int, std::vector<unsigned char>> decoded_views;
     size_t draco_buffers = 0; // where buffers begin that Draco has filled for the mesh at hand
@@ -69,7 +71,9 @@ void load(reader &r, const unsigned char *bytes, size_t size_bytes);
 // ---- gltf_complete.cpp
 // Some extensions let a file leave out what tinygltf insists on: the JSON with that filled in; empty where nothing
 // has to be, or the JSON is none. The indices of a mesh that Draco holds alone are named by the extension then.
-std::string complete_json(const unsigned char *json, size_t size_bytes, bool binary);
+// Primitives without vertices or indices are left out, with a note, and percent signs that stand for themselves
+// are written as URIs have them.
+std::string complete_json(reader &r, const unsigned char *json, size_t size_bytes, bool binary);
 
 // ---- gltf_meshopt.cpp
 // The bytes of a view that is compressed with meshoptimizer (EXT_meshopt_compression, KHR_meshopt_compression),
@@ -174,6 +178,7 @@ void add_clips(reader &r);
 using matrix = std::array<double, 16>; // column-major as in glTF
 matrix identity();
 matrix node_matrix(reader &r, size_t node);
+matrix product(const matrix &a, const matrix &b);
 void to_rows(const matrix &m, float out[12]);
 // A node's translation, rotation (a unit quaternion x y z w) and scale; of a matrix the nearest, with a note where
 // it has shear.
@@ -184,8 +189,19 @@ parts node_parts(reader &r, size_t node);
 
 matrix matrix_of(const std::vector<double> &translation, const std::vector<double> &rotation,
                  const std::vector<double> &scale); // of other lengths than 3, 4, 3: none
+std::array<double, 3> point_of(const matrix &m, const std::array<double, 3> &p);
+struct world_box {
+    std::array<double, 3> lower, upper;
+};
+using node_visitor = std::function<void(const tinygltf::Node &node, const matrix &world_from_node)>;
+// Around all meshes at rest, as their accessors state it; inside out where there is none. Visits each node.
+world_box box_of(reader &r, const std::vector<int> &roots, const node_visitor &visit = {});
 // Fails where a number is not finite or beyond 1e12.
 void check_matrix(reader &r, const matrix &m, const std::string &where);
+
+// ---- gltf_origin.cpp
+// Subtracts an origin from the nodes of a model that is far away; the identifier of the node that has it, 0: none.
+uint32_t settle_origin(reader &r, const std::vector<int> &roots);
 
 // ---- gltf_instance.cpp
 // Where the node's mesh is shown, in the node's space; none: it is not instanced.
@@ -201,11 +217,17 @@ int material_of(const reader &r, const tinygltf::Primitive &primitive);
 // Checks that the nodes are a forest and fills r.parents.
 void check_hierarchy(reader &r);
 void add_scene(reader &r);
-// What a light's colour is divided by: the disc that a sphere shows, 1 for a light without size.
-double light_disc(const tinygltf::Light &light);
 // Adds a node that is not part of what is shown, and those above it, without what hangs there; returns its
 // identifier.
 uint32_t add_hidden_node(reader &r, size_t node);
+
+// ---- gltf_light.cpp
+// The light's identifier; 0, with a note: it cannot be had.
+uint32_t light_id(reader &r, int index, const std::string &where);
+// What a light's colour is divided by: the disc that a sphere shows, 1 for a light without size.
+double light_disc(const tinygltf::Light &light);
+// Intensities that would make the scene white throughout are lumens, as Blender writes them: they become watts.
+void convert_photometric_lights(reader &r, const std::vector<int> &roots);
 
 // ---- gltf_extension.cpp
 // Fails with the name of an extension that the file requires and that is not understood, and what to do.

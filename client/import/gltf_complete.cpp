@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// tinygltf refuses a file in which the indices of a primitive have no buffer view (KHR_draco_mesh_compression lets
-// them), a buffer has no bytes (EXT_meshopt_compression) or a channel no node (KHR_animation_pointer).
+// What is changed in the JSON before tinygltf sees it. It refuses a file in which the indices of a primitive have
+// no buffer view (KHR_draco_mesh_compression lets them), a buffer has no bytes (EXT_meshopt_compression) or a
+// channel no node (KHR_animation_pointer), and one with an accessor of no elements.
 #include "gltf.hpp"
 
 #include <jansson.h>
 
+#include <cctype>
 #include <cstring>
 #include <memory>
 
@@ -84,21 +86,124 @@ void complete_channels(json_t *root)
             json_object_set_new(target, "node", json_integer(-1));
     }
 }
+bool is_empty(const json_t *accessors, const json_t *index)
+{
+    const json_t *accessor = json_is_integer(index) && json_integer_value(index) >= 0
+                                 ? json_array_get(accessors, size_t(json_integer_value(index)))
+                                 : nullptr;
+    const json_t *count = json_object_get(accessor, "count");
+
+    return json_is_integer(count) && json_integer_value(count) == 0;
+}
+
+// Exporters write them for objects without faces.
+void leave_out_empty_primitives(reader &r, json_t *root)
+{
+    const json_t *accessors = json_object_get(root, "accessors");
+    size_t i;
+    json_t *mesh;
+
+    json_array_foreach(json_object_get(root, "meshes"), i, mesh)
+    {
+        json_t *primitives = json_object_get(mesh, "primitives");
+        for (size_t k = json_array_size(primitives); k-- > 0;) {
+            const json_t *primitive = json_array_get(primitives, k);
+            const json_t *position = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
+            if (!is_empty(accessors, position) && !is_empty(accessors, json_object_get(primitive, "indices")))
+                continue;
+            import_note(r.scene, PROTOCOL_SEVERITY_INFO,
+                        (place("meshes", i) + "." + place("primitives", k)).c_str(),
+                        "a primitive without vertices is left out");
+            json_array_remove(primitives, k);
+        }
+    }
+}
+
+void leave_out_empty_channels(reader &r, json_t *root)
+{
+    const json_t *accessors = json_object_get(root, "accessors");
+    size_t i;
+    json_t *animation;
+
+    json_array_foreach(json_object_get(root, "animations"), i, animation)
+    {
+        json_t *channels = json_object_get(animation, "channels");
+        for (size_t k = json_array_size(channels); k-- > 0;) {
+            const json_t *number = json_object_get(json_array_get(channels, k), "sampler");
+            const json_t *sampler =
+                json_is_integer(number) && json_integer_value(number) >= 0
+                    ? json_array_get(json_object_get(animation, "samplers"), size_t(json_integer_value(number)))
+                    : nullptr;
+            if (!is_empty(accessors, json_object_get(sampler, "input")) &&
+                !is_empty(accessors, json_object_get(sampler, "output")))
+                continue;
+            import_note(r.scene, PROTOCOL_SEVERITY_INFO,
+                        (place("animations", i) + "." + place("channels", k)).c_str(),
+                        "a channel without keys is left out");
+            json_array_remove(channels, k);
+        }
+    }
+}
+
+// Names that are no URIs: a percent sign without two digits stands for itself, and one with them may.
+void complete_uris(reader &r, json_t *root)
+{
+    size_t i;
+    json_t *holder;
+
+    for (const char *array : {"buffers", "images"})
+        json_array_foreach(json_object_get(root, array), i, holder)
+        {
+            const char *text = json_string_value(json_object_get(holder, "uri"));
+            const std::string uri = text ? text : "";
+            std::string completed;
+            if (uri.find('%') == std::string::npos || uri.compare(0, 5, "data:") == 0)
+                continue;
+            for (size_t at = 0; at < uri.size(); at++)
+                completed += uri[at] == '%' && !reading::is_escape(uri, at) ? "%25" : std::string(1, uri[at]);
+            if (completed != uri)
+                json_object_set_new(holder, "uri", json_string(completed.c_str()));
+            r.raw_names[reading::decoded_uri(completed)] = uri;
+        }
+}
+
+// "count": 0
+bool counts_nothing(const char *json, size_t size_bytes)
+{
+    const char *const end = json + size_bytes, key[] = "\"count\"";
+
+    for (const char *at = json;
+         (at = static_cast<const char *>(memmem(at, size_t(end - at), key, sizeof(key) - 1)));) {
+        at += sizeof(key) - 1;
+        const char *value = at;
+        while (value < end && (isspace(static_cast<unsigned char>(*value)) || *value == ':'))
+            value++;
+        if (value < end && *value == '0')
+            return true;
+    }
+    return false;
+}
 } // namespace
 
-std::string complete_json(const unsigned char *json, size_t size_bytes, bool binary)
+std::string complete_json(reader &r, const unsigned char *json, size_t size_bytes, bool binary)
 {
     const auto names = [&](const char *text) { return memmem(json, size_bytes, text, strlen(text)) != nullptr; };
-    const bool compressed = names("meshopt_compression");
+    const bool compressed = names("meshopt_compression"),
+               counts_none = counts_nothing(reinterpret_cast<const char *>(json), size_bytes);
     std::string text;
 
-    if (!names(draco) && !compressed && !names("KHR_animation_pointer"))
+    if (!names(draco) && !compressed && !names("KHR_animation_pointer") && !counts_none && !names("%"))
         return text;
     const std::unique_ptr<json_t, release_json> root(
         json_loadb(reinterpret_cast<const char *>(json), size_bytes, JSON_ALLOW_NUL, nullptr));
     if (!json_is_object(root.get()))
         return text; // the parser says what is wrong
     complete_meshes(root.get());
+    if (counts_none) {
+        leave_out_empty_primitives(r, root.get());
+        leave_out_empty_channels(r, root.get());
+    }
+    complete_uris(r, root.get());
     if (compressed)
         complete_buffers(root.get(), binary);
     complete_channels(root.get());

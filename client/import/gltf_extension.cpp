@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which extensions are understood; what becomes of files with others.
 #include "gltf.hpp"
+#include "texture.h"
 
 #include <algorithm>
 #include <cstring>
@@ -31,8 +32,7 @@ struct remedy {
     const char *extension, *text;
 };
 const remedy remedies[] = {
-    {"KHR_texture_basisu",
-     "convert its textures to PNG, as 'gltf-transform ktxdecompress IN OUT' does, or to WebP or JPEG"},
+    {"KHR_texture_basisu", TEXTURE_KTX2_REMEDY},
 };
 
 template <size_t count> bool is_one_of(const std::string &name, const char *const (&names)[count])
@@ -67,7 +67,7 @@ void note_unknown_extensions(reader &r)
     std::string list;
 
     for (const std::string &name : r.model.extensionsUsed)
-        if (!is_known(name))
+        if (!is_known(name) && name != "KHR_texture_basisu") // the textures that have it say what becomes of them
             names.insert(name.substr(0, 80));
     for (const std::string &name : names)
         list += (list.empty() ? "" : ", ") + name;

@@ -167,7 +167,10 @@ bool read_file(std::vector<unsigned char> *out, std::string *error, const std::s
     char reason[FILES_REASON_BYTES] = "";
     size_t size_bytes = 0;
     unsigned char *bytes = files_read(r.files, path.c_str(), &size_bytes, reason);
+    const auto raw = r.raw_names.find(path);
 
+    if (!bytes && raw != r.raw_names.end())
+        bytes = files_read(r.files, raw->second.c_str(), &size_bytes, reason);
     if (!bytes) {
         if (error)
             *error += "'" + path + "' " + reason + "\n";
@@ -279,7 +282,7 @@ void load(reader &r, const unsigned char *bytes, size_t size_bytes)
     if (binary) {
         chunks parts = cut_binary(r, bytes, size_bytes);
         check_json_depth(r, parts.json, parts.json_bytes);
-        completed = complete_json(parts.json, parts.json_bytes, binary);
+        completed = complete_json(r, parts.json, parts.json_bytes, binary);
         if (!completed.empty()) {
             parts.json = reinterpret_cast<const unsigned char *>(completed.data());
             parts.json_bytes = completed.size();
@@ -292,7 +295,7 @@ void load(reader &r, const unsigned char *bytes, size_t size_bytes)
         }
     } else {
         check_json_depth(r, bytes, size_bytes);
-        completed = complete_json(bytes, size_bytes, binary);
+        completed = complete_json(r, bytes, size_bytes, binary);
         if (!completed.empty()) {
             bytes = reinterpret_cast<const unsigned char *>(completed.data());
             size_bytes = completed.size();

@@ -320,6 +320,10 @@ uint32_t material_id(reader &r, const tinygltf::Primitive &primitive, const std:
 void read_colours(reader &r, int accessor, size_t count, uint8_t *out, const std::string &where)
 {
     const bool has_alpha = accessor_components(r, accessor, where) == 4;
+    tinygltf::Accessor &from = r.model.accessors[size_t(accessor)];
+
+    // Exporters forget to say so of integers, which mean nothing else (glTF 2.0, section 3.7.2.1).
+    from.normalized = from.normalized || from.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT;
     std::vector<float> colours(count * 4);
 
     read_floats(r, accessor, 4, 1, colours.data(), where);

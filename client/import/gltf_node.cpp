@@ -23,58 +23,16 @@ std::string name_of(const reader &r, const tinygltf::Node &node)
     return "";
 }
 
-// The extension knows only points. A point light whose "extras" have a "radius" (metres) is a sphere that sends as
-// much, intensity being its radiance times the disc that it shows.
-void give_size(reader &r, const tinygltf::Light &light, const std::string &where, message_set_light &set)
-{
-    const double radius = number(light.extras, "radius", 0);
-
-    if (!(radius > 0))
-        return;
-    set.kind = PROTOCOL_LIGHT_SPHERE;
-    set.size[0] = limited(r, where, "the light's radius", radius, 1e-6, 1e12);
-    for (float &one : set.colour)
-        one = limited(r, where, "the light's radiance", double(one) / light_disc(light), 0, 1e12);
-}
-
-// Candela become watts per steradian and lux watts per square metre number by number: the renderer works in one
-// unit throughout, and files are made to look right at exposure 0, not to be photometric.
-uint32_t light_id(reader &r, int index, const std::string &where)
-{
-    if (index < 0 || size_t(index) >= r.model.lights.size())
-        fail(r, where, "light %d does not exist", index);
-    const tinygltf::Light &light = r.model.lights[size_t(index)];
-    const std::string here = place("KHR_lights_punctual.lights", size_t(index));
-    message_set_light set = {};
-
-    for (size_t c = 0; c < 3; c++)
-        set.colour[c] = limited(r, here, "the light's colour",
-                                (light.color.size() == 3 ? light.color[c] : 1.0) * light.intensity, 0, 1e12);
-    set.range = limited(r, here, "the light's range", light.range, 0, 1e12);
-    set.name = light.name.c_str();
-    if (light.type == "directional") {
-        set.kind = PROTOCOL_LIGHT_DIRECTIONAL;
-    } else if (light.type == "point") {
-        set.kind = PROTOCOL_LIGHT_POINT;
-        give_size(r, light, here, set);
-    } else if (light.type == "spot") {
-        set.kind = PROTOCOL_LIGHT_SPOT;
-        set.outer_cone = limited(r, here, "the outer cone", light.spot.outerConeAngle, 0, 1.5707);
-        set.inner_cone = limited(r, here, "the inner cone", light.spot.innerConeAngle, 0, double(set.outer_cone));
-    } else {
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, here.c_str(),
-                    "a light of unknown type '%.32s' is left out", light.type.c_str());
-        return 0;
-    }
-    const uint32_t id = import_add_light(r.scene, &set);
-    r.light_ids[index].push_back(id);
-    return id;
-}
-
+// 0, with a note: it cannot be had.
 uint32_t camera_id(reader &r, int index, const std::string &where)
 {
+    const auto leave_out = [&](const std::string &what, const char *why) {
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, what.c_str(), "the camera is left out: %s", why);
+        return 0u;
+    };
+
     if (size_t(index) >= r.model.cameras.size())
-        fail(r, where, "camera %d does not exist", index);
+        return leave_out(where, "there is no camera of its number");
     const tinygltf::Camera &camera = r.model.cameras[size_t(index)];
     const std::string here = place("cameras", size_t(index));
     message_set_camera set = {};
@@ -82,14 +40,16 @@ uint32_t camera_id(reader &r, int index, const std::string &where)
     set.name = camera.name.c_str();
     if (camera.type == "perspective") {
         if (!(camera.perspective.yfov > 0))
-            fail(r, here, "a field of view of %g", camera.perspective.yfov);
+            return leave_out(here, "yfov, its field of view, is not above 0");
         set.fov_y = limited(r, here, "the field of view", camera.perspective.yfov, 0.001, 3.1);
         set.near = limited(r, here, "the near distance", camera.perspective.znear, 0, 1e12);
     } else if (camera.type == "orthographic") {
+        if (!(std::fabs(camera.orthographic.ymag) > 0))
+            return leave_out(here, "ymag, half the height that it sees, is 0");
         set.height = limited(r, here, "the orthographic height", 2 * std::fabs(camera.orthographic.ymag), 0, 1e12);
         set.near = limited(r, here, "the near distance", std::max(0.0, camera.orthographic.znear), 0, 1e12);
     } else {
-        fail(r, here, "a camera of unknown type '%.32s'", camera.type.c_str());
+        return leave_out(here, "its type is neither 'perspective' nor 'orthographic'");
     }
     return import_add_camera(r.scene, &set);
 }
@@ -127,8 +87,9 @@ std::vector<attachment> attachments_of(reader &r, size_t index)
 
     if (node.mesh >= 0)
         attach_mesh(r, node, where, found);
-    if (node.camera >= 0)
-        found.push_back({PROTOCOL_NODE_CAMERA, camera_id(r, node.camera, where), " camera", false, 0, {}});
+    const uint32_t camera = node.camera >= 0 ? camera_id(r, node.camera, where) : 0;
+    if (camera != 0)
+        found.push_back({PROTOCOL_NODE_CAMERA, camera, " camera", false, 0, {}});
     if (const tinygltf::Value *lights = extension(node.extensions, "KHR_lights_punctual")) {
         const uint32_t light = light_id(r, index_of(*lights, "light"), where);
         if (light != 0)
@@ -245,12 +206,12 @@ void note_uses(reader &r, const tinygltf::Node &node, std::set<int> &used)
 }
 
 // Calls `visit(node, parent's result)` for all nodes below the roots, parents first.
-template <typename visitor> void traverse(reader &r, const std::vector<int> &roots, visitor visit)
+template <typename visitor> void traverse(reader &r, const std::vector<int> &roots, uint32_t top, visitor visit)
 {
     std::vector<pending> open;
 
     for (size_t i = roots.size(); i-- > 0;)
-        open.push_back({roots[i], 0, 1});
+        open.push_back({roots[i], top, 1});
     while (!open.empty()) {
         const pending at = open.back();
         open.pop_back();
@@ -263,16 +224,6 @@ template <typename visitor> void traverse(reader &r, const std::vector<int> &roo
     }
 }
 } // namespace
-
-double light_disc(const tinygltf::Light &light)
-{
-    const double radius = light.type == "point" ? number(light.extras, "radius", 0) : 0;
-
-    if (!(radius > 0))
-        return 1;
-    const double allowed = std::min(std::max(radius, 1e-6), 1e12);
-    return 3.14159265358979 * allowed * allowed;
-}
 
 void check_hierarchy(reader &r)
 {
@@ -307,13 +258,15 @@ void add_scene(reader &r)
     const std::vector<int> roots = roots_of(r);
     std::set<int> used;
 
-    traverse(r, roots, [&](size_t node, uint32_t) {
+    traverse(r, roots, 0, [&](size_t node, uint32_t) {
         note_uses(r, r.model.nodes[node], used);
         return 0u;
     });
+    convert_photometric_lights(r, roots);
     add_materials(r, used);
     r.node_ids.assign(r.model.nodes.size(), 0);
-    traverse(r, roots, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
+    const uint32_t top = settle_origin(r, roots);
+    traverse(r, roots, top, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
     add_skins(r);
 }
 

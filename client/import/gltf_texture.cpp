@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "gltf_texture.hpp"
 
+#include "obj.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 
 namespace gltf
 {
@@ -65,20 +68,45 @@ int image_of(reader &r, int texture, const std::string &where)
         source = webp->Has("source") ? index_of(*webp, "source") : source;
     if (source >= 0 && size_t(source) >= r.model.images.size())
         fail(r, place("textures", size_t(texture)), "image %d does not exist", source);
+    const bool has_ktx2 = extension(t.extensions, "KHR_texture_basisu") != nullptr;
     if (source < 0)
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, place("textures", size_t(texture)).c_str(),
-                    "a texture without an image in a known format is left out");
+                    "a texture without an image in a known format is left out%s%s", has_ktx2 ? "; " : "",
+                    has_ktx2 ? TEXTURE_KTX2_REMEDY : "");
+    else if (has_ktx2)
+        import_note(r.scene, PROTOCOL_SEVERITY_INFO, place("textures", size_t(texture)).c_str(),
+                    "KTX2 images (KHR_texture_basisu) are not read; the images that stand in for them are shown");
     return source;
 }
+
+namespace
+{
+// One that is not where its name says.
+void read_moved(reader &r, tinygltf::Image &source, texture_job &job)
+{
+    char reason[FILES_REASON_BYTES] = "";
+    size_t size_bytes = 0;
+    const std::unique_ptr<unsigned char, void (*)(void *)> bytes(
+        obj::read_moved_image(r.scene, r.files, reading::decoded_uri(source.uri), &size_bytes, reason), free);
+
+    if (bytes)
+        source.image.assign(bytes.get(), bytes.get() + size_bytes);
+    else
+        snprintf(job.reason, sizeof(job.reason), "could not be read: %.150s", reason);
+}
+} // namespace
 
 void want_image(reader &r, images &all, int image, bool colour)
 {
     const image_key key = {image, colour};
     if (all.numbers.count(key))
         return;
-    const tinygltf::Image &source = r.model.images[size_t(image)];
+    tinygltf::Image &source = r.model.images[size_t(image)];
     texture_job job = {};
     job.srgb = colour;
+    if (source.bufferView < 0 && source.image.empty() && !source.uri.empty() &&
+        source.uri.compare(0, 5, "data:") != 0)
+        read_moved(r, source, job);
     if (source.bufferView >= 0) {
         job.bytes = view_bytes(r, source.bufferView, job.size_bytes, place("images", size_t(image)));
     } else {
@@ -95,11 +123,17 @@ void decode_images(reader &r, images &all)
     all.blobs.assign(all.jobs.size(), 0);
     for (const auto &entry : all.numbers) {
         texture_job &job = all.jobs[entry.second];
+        if (job.texels && job.reduced > 1) {
+            char text[200];
+            texture_explain_reduction(&job, text);
+            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, image_name(r, entry.first.first).c_str(),
+                        "the image %s", text);
+        }
         if (!job.texels) {
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, image_name(r, entry.first.first).c_str(),
                         "the image '%.100s' %.150s; it is shown in magenta and black",
                         image_name(r, entry.first.first).c_str(),
-                        job.size_bytes == 0 ? "could not be read" : job.reason);
+                        job.size_bytes == 0 && job.reason[0] == '\0' ? "could not be read" : job.reason);
             job.texels = texture_marker();
             job.width = job.height = 2;
         }

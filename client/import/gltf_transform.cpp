@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace gltf
 {
@@ -150,6 +151,19 @@ matrix matrix_of(const std::vector<double> &t, const std::vector<double> &q, con
     return m;
 }
 
+matrix product(const matrix &a, const matrix &b)
+{
+    matrix out;
+
+    for (size_t column = 0; column < 4; column++)
+        for (size_t row = 0; row < 4; row++) {
+            out[column * 4 + row] = 0;
+            for (size_t k = 0; k < 4; k++)
+                out[column * 4 + row] += a[k * 4 + row] * b[column * 4 + k];
+        }
+    return out;
+}
+
 void check_matrix(reader &r, const matrix &m, const std::string &where)
 {
     for (double value : m)
@@ -196,4 +210,62 @@ parts node_parts(reader &r, size_t index)
         result.rotation[i] = float(q[i] / std::sqrt(squared));
     return result;
 }
+
+std::array<double, 3> point_of(const matrix &m, const std::array<double, 3> &p)
+{
+    std::array<double, 3> out;
+    for (size_t row = 0; row < 3; row++)
+        out[row] = m[row] * p[0] + m[4 + row] * p[1] + m[8 + row] * p[2] + m[12 + row];
+    return out;
+}
+
+namespace
+{
+// Around the positions of a mesh as their accessors state them, where `m` places it.
+void grow(const reader &r, int mesh, const matrix &m, world_box &around)
+{
+    if (mesh < 0 || size_t(mesh) >= r.model.meshes.size())
+        return;
+    for (const tinygltf::Primitive &primitive : r.model.meshes[size_t(mesh)].primitives) {
+        const int position = attribute(primitive.attributes, "POSITION");
+        if (position < 0 || size_t(position) >= r.model.accessors.size())
+            continue;
+        const tinygltf::Accessor &of = r.model.accessors[size_t(position)];
+        for (size_t corner = 0; corner < 8 && of.minValues.size() == 3 && of.maxValues.size() == 3; corner++) {
+            std::array<double, 3> place;
+            for (size_t c = 0; c < 3; c++)
+                place[c] = corner >> c & 1 ? of.maxValues[c] : of.minValues[c];
+            place = point_of(m, place);
+            for (size_t c = 0; c < 3; c++) {
+                around.lower[c] = std::min(around.lower[c], place[c]);
+                around.upper[c] = std::max(around.upper[c], place[c]);
+            }
+        }
+    }
+}
+
+} // namespace
+
+world_box box_of(reader &r, const std::vector<int> &roots, const node_visitor &visit)
+{
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    world_box around = {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+    std::vector<std::pair<int, matrix>> open;
+
+    for (int root : roots)
+        open.push_back({root, identity()});
+    while (!open.empty()) {
+        const auto [index, parent] = open.back();
+        const tinygltf::Node &node = r.model.nodes[size_t(index)];
+        const matrix placed = product(parent, node_matrix(r, size_t(index)));
+        open.pop_back();
+        grow(r, node.mesh, placed, around);
+        if (visit)
+            visit(node, placed);
+        for (int child : node.children)
+            open.push_back({child, placed});
+    }
+    return around;
+}
+
 } // namespace gltf

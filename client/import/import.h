@@ -94,6 +94,7 @@ struct import_scene {
     double point_size;   /* diameter of points and lines without faces, metres; 0: chosen by their distances */
     const char *variant; /* of the materials, that the user wants; NULL: the file's choice. Readers of formats
                             without variants need not look */
+    float origin[3];     /* what was subtracted from all places (origin.h); 0: nothing */
     bool failed;
     struct import_notice failure;
 };
@@ -168,6 +169,8 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh);
 /* Once all is added: says in the edit of each mesh whether it is closed (closed.h). Blobs may be hashed and sent
  * meanwhile. */
 void import_mark_closed(struct import_scene *scene);
+/* After that: sets the thickness of materials that absorb light to that of the closed meshes that have them. */
+void import_measure_bodies(struct import_scene *scene);
 void import_mesh_finish(struct import_mesh *mesh); /* for one that was not added */
 
 /* `spheres` (4 floats each) and `ranges` are taken. */

@@ -7,6 +7,7 @@
 #include "helper/module.h"
 #include "helper/sandbox.h"
 #include "model.h"
+#include "origin.h"
 #include "send.h"
 #include "source.h"
 #include "texture.h"
@@ -279,6 +280,12 @@ static bool import_environment(struct import_scene *scene, struct files *files, 
     free(bytes);
     if (!job.texels)
         return import_fail(scene, file, "the environment cannot be read: %s", job.reason);
+    if (job.reduced > 1) {
+        char text[200];
+
+        texture_explain_reduction(&job, text);
+        import_note(scene, PROTOCOL_SEVERITY_WARNING, file, "%s", text);
+    }
     if (job.width != 2 * job.height)
         import_note(scene, PROTOCOL_SEVERITY_INFO, file,
                     "is %u x %u; an equirectangular image is twice as wide as high", job.width, job.height);
@@ -296,6 +303,14 @@ static uint32_t count_shown(const struct import_scene *scene)
            scene->last_id[PROTOCOL_OBJECT_LIGHT];
 }
 
+static const char *first_warning(const struct import_scene *scene)
+{
+    for (size_t i = 0; i < scene->note_count; i++)
+        if (scene->notes[i].severity == PROTOCOL_SEVERITY_WARNING)
+            return scene->notes[i].text;
+    return "";
+}
+
 static bool import_model(struct import_scene *scene, struct sender *sender, const struct options *options,
                          size_t index)
 {
@@ -310,8 +325,15 @@ static bool import_model(struct import_scene *scene, struct sender *sender, cons
     if (source_repeat(scene, options->sources, index, options->source_count))
         return !scene->failed;
     imported = source_begin(scene, options->sources, index, options->source_count) && parse_model(scene, source);
-    if (imported && count_shown(scene) == shown)
-        import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
+    if (imported && count_shown(scene) == shown) {
+        static const char nothing[] = "it contains nothing that can be shown";
+        const char *why = first_warning(scene);
+
+        if (options->source_count == 1)
+            imported = import_fail(scene, NULL, "%s%s%s", nothing, why[0] != '\0' ? ": " : "", why);
+        else
+            import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "%s", nothing);
+    }
     source_end(scene, source);
     return imported;
 }
@@ -325,7 +347,7 @@ static bool import_all(struct import_scene *scene, struct files *surroundings, s
     if (options->environment &&
         !import_environment(scene, surroundings, file_part(options->environment), options->environment_degrees))
         return false;
-    return !scene->failed;
+    return import_settle_origin(scene);
 }
 
 static bool read_files(struct import_scene *scene, struct files *surroundings, const struct options *options)
@@ -355,6 +377,7 @@ static bool send_names(struct sender *sender, const struct options *options)
 static void *mark_closed(void *scene)
 {
     import_mark_closed(scene);
+    import_measure_bodies(scene);
     return NULL;
 }
 
@@ -396,6 +419,7 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
     if (!sent || !sender_edits(sender, options->scene))
         return false;
     done.total_ns = monotonic_now_ns() - start_ns;
+    memcpy(done.origin, scene->origin, sizeof(done.origin));
     return sender_done(sender, &done);
 }
 

@@ -3,7 +3,12 @@
 // is done here. One mesh for the whole file; triangles sorted by material.
 #include "obj.hpp"
 
+#include "origin.h"
+#include "points.hpp"
+#include "protocol/common/srgb.h"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -66,13 +71,13 @@ class vertex_table
 
 struct state {
     reader &r;
+    const prepared &text;
     memory_stream &stream;
     std::vector<float> positions, texcoords, normals;
     vertex_table vertices;
     std::vector<uint32_t> indices, names; // of a triangle: position in material_names
     std::vector<std::string> material_names;
     std::map<std::string, uint32_t> name_numbers;
-    std::vector<tinyobj::material_t> materials;
     uint32_t name = none;
     uint64_t budget = POLYGON_BUDGET;
     bool failed = false; // exceptions would pass through the library's frames
@@ -168,11 +173,20 @@ uint32_t name_number(state &s, const char *text)
     return s.name_numbers[name] = uint32_t(s.material_names.size() - 1);
 }
 
+void add_position(state &s, std::array<float, 3> place)
+{
+    const size_t at = s.positions.size();
+
+    for (size_t c = 0; at + c < s.text.places.size() && c < 3; c++)
+        place[c] = float(s.text.places[at + c] - s.text.origin[c]);
+    s.positions.insert(s.positions.end(), place.begin(), place.end());
+}
+
 tinyobj::callback_t callbacks()
 {
     tinyobj::callback_t all;
     all.vertex_cb = [](void *user, float x, float y, float z, float) {
-        guarded(user, [&](state &s) { s.positions.insert(s.positions.end(), {x, y, z}); });
+        guarded(user, [&](state &s) { add_position(s, {x, y, z}); });
     };
     all.normal_cb = [](void *user, float x, float y, float z) {
         guarded(user, [&](state &s) { s.normals.insert(s.normals.end(), {x, y, z}); });
@@ -186,9 +200,6 @@ tinyobj::callback_t callbacks()
     all.usemtl_cb = [](void *user, const char *name, int) {
         guarded(user, [&](state &s) { s.name = name_number(s, name); });
     };
-    all.mtllib_cb = [](void *user, const tinyobj::material_t *materials, int count) {
-        guarded(user, [&](state &s) { s.materials.assign(materials, materials + count); });
-    };
     return all;
 }
 
@@ -200,8 +211,13 @@ template <typename type> type *allocate(size_t count)
     return static_cast<type *>(memory);
 }
 
+uint8_t linear_byte(float srgb)
+{
+    return uint8_t(std::lround(linear_from_srgb_f(std::min(std::max(srgb, 0.0f), 1.0f)) * 255)); // NaN becomes 0
+}
+
 // Arrays of the mesh, a vertex for each triple. OBJ's v runs upwards, ours downwards.
-void fill_mesh(const state &s, const std::vector<uint8_t> &colours, import_mesh &mesh)
+void fill_mesh(const state &s, const std::vector<float> &colours, import_mesh &mesh)
 {
     const std::vector<triple> &triples = s.vertices.triples;
     const size_t count = triples.size();
@@ -226,18 +242,19 @@ void fill_mesh(const state &s, const std::vector<uint8_t> &colours, import_mesh 
             mesh.texcoords[0][i * 2] = s.texcoords[size_t(t.vt) * 2];
             mesh.texcoords[0][i * 2 + 1] = 1 - s.texcoords[size_t(t.vt) * 2 + 1];
         }
-        if (mesh.colours)
-            memcpy(mesh.colours + i * 4, &colours[size_t(t.v) * 4], 4);
+        for (size_t c = 0; mesh.colours && c < 4; c++)
+            mesh.colours[i * 4 + c] = c < 3 ? linear_byte(colours[size_t(t.v) * 3 + c]) : 255;
     }
 }
 
 // Of the materials that faces name; 0 for those that no file defines.
-std::vector<uint32_t> material_ids(state &s)
+std::vector<uint32_t> material_ids(state &s, const std::vector<std::string> &libraries)
 {
+    const std::vector<tinyobj::material_t> materials = read_libraries(s.r, libraries);
     std::map<std::string, const tinyobj::material_t *> defined;
     std::vector<const tinyobj::material_t *> wanted;
 
-    for (const tinyobj::material_t &material : s.materials)
+    for (const tinyobj::material_t &material : materials)
         defined.emplace(material.name, &material);
     for (const std::string &name : s.material_names) {
         const auto found = defined.find(name);
@@ -247,14 +264,20 @@ std::vector<uint32_t> material_ids(state &s)
         wanted.push_back(found == defined.end() ? nullptr : found->second);
     }
     const auto read_image = [&](const std::string &name, size_t *size_bytes, char *reason) {
-        return files_read(s.r.files, name.c_str(), size_bytes, reason);
+        return read_moved_image(s.r.scene, s.r.files, name, size_bytes, reason);
     };
     return add_materials(s.r.scene, read_image, wanted);
 }
 
-void add_mesh(state &s, const std::vector<uint8_t> &colours)
+// The node from which the positions are.
+uint32_t parent_of(const state &s)
 {
-    const std::vector<uint32_t> ids = material_ids(s);
+    return s.text.places.empty() ? 0 : import_add_origin_node(s.r.scene, s.text.origin, 0);
+}
+
+void add_mesh(state &s, const prepared &text)
+{
+    const std::vector<uint32_t> ids = material_ids(s, text.libraries);
     std::vector<uint32_t> materials(s.names.size());
     import_mesh mesh = {};
 
@@ -263,39 +286,57 @@ void add_mesh(state &s, const std::vector<uint8_t> &colours)
     for (size_t i = 0; i < materials.size(); i++)
         materials[i] = s.names[i] == none ? 0 : ids[s.names[i]];
     try {
-        fill_mesh(s, colours, mesh);
+        fill_mesh(s, text.colours, mesh);
     } catch (...) {
         import_mesh_finish(&mesh);
         throw;
     }
     mesh.name = s.r.scene->file;
-    import_add_grouped_mesh(s.r.scene, 0, &mesh, materials.data());
+    import_add_grouped_mesh(s.r.scene, parent_of(s), &mesh, materials.data());
+}
+
+void add_points(state &s, prepared &text)
+{
+    reading::base r = {s.r.scene};
+    points::cloud cloud;
+    message_set_node set = {};
+
+    cloud.places = std::move(s.positions);
+    cloud.colours = std::move(text.colours);
+    set.object = points::add(r, cloud, s.r.scene->file, "");
+    set.kind = PROTOCOL_NODE_SPHERES;
+    set.name = s.r.scene->file;
+    set.parent = parent_of(s);
+    import_identity(set.parent_from_node);
+    if (set.object != 0)
+        import_add_node(s.r.scene, &set);
 }
 
 void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
-    const prepared text = prepare(r, bytes, size_bytes);
+    prepared text = prepare(r, bytes, size_bytes);
     if (r.scene->failed)
         return;
     memory_stream stream(text.begin(), text.size_bytes());
-    state s = {r, stream, {}, {}, {}, {}, {}, {}, {}, {}, {}, none, POLYGON_BUDGET, false, {}, {}, {}};
+    state s = {r, text, stream, {}, {}, {}, {}, {}, {}, {}, {}, none, POLYGON_BUDGET, false, {}, {}, {}};
     std::istream input(&stream);
-    material_reader material_files(r, text.libraries);
     std::string warning, error;
 
-    tinyobj::LoadObjWithCallback(input, callbacks(), &s, &material_files, &warning, &error);
+    tinyobj::LoadObjWithCallback(input, callbacks(), &s, nullptr, &warning, &error);
     if (r.scene->failed)
         return;
-    if (s.indices.empty()) {
-        import_fail(r.scene, nullptr, "it contains no faces%s",
-                    text.has_points_or_lines ? "; points and lines cannot be shown" : "");
+    text.colours.resize(text.colours.empty() ? 0 : s.positions.size(), 1);
+    if (s.indices.empty() && !s.positions.empty() && !text.has_lines) {
+        add_points(s, text);
         return;
     }
-    if (text.has_points_or_lines)
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "points and lines cannot be shown");
-    std::vector<uint8_t> colours = text.colours;
-    colours.resize(colours.empty() ? 0 : s.positions.size() / 3 * 4, 255);
-    add_mesh(s, colours);
+    if (s.indices.empty()) {
+        import_fail(r.scene, nullptr, "it contains no faces%s", text.has_lines ? "; lines cannot be shown" : "");
+        return;
+    }
+    if (text.has_points || text.has_lines)
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "points and lines beside faces cannot be shown");
+    add_mesh(s, text);
 }
 } // namespace
 } // namespace obj
@@ -306,6 +347,8 @@ extern "C" bool obj_import(struct import_scene *scene, struct files *files, cons
     try {
         obj::reader r = {scene, files};
         obj::import(r, bytes, size_bytes);
+    } catch (const reading::failed &) {
+        // said already
     } catch (const std::bad_alloc &) {
         import_fail(scene, nullptr, "out of memory");
     } catch (const std::exception &exception) {

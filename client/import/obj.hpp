@@ -49,29 +49,24 @@ struct prepared {
     {
         return mended.empty() ? original_bytes : mended.size();
     }
-    std::vector<uint8_t> colours;       // 4 a vertex, linear; empty: the file has none
-    std::vector<std::string> libraries; // whole arguments of mtllib: names with spaces
-    bool has_points_or_lines;
+    std::vector<double> places;         // 3 a vertex, where floats would lose something of them; else empty
+    double origin[3];                   // to be subtracted from these
+    std::vector<float> colours;         // 3 a vertex, sRGB, as the file has them; empty: it has none
+    std::vector<std::string> libraries; // whole arguments of mtllib: several names, or one with spaces
+    bool has_points, has_lines;
 };
-// UTF-16 becomes UTF-8, continued lines become one; numbers that are none are reported with their line.
+// UTF-16 becomes UTF-8, continued lines become one, decimal commas become points, and corners lose the slashes at
+// their end; numbers that are none are reported with their line.
 prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes);
 
 // ---- obj_material.cpp
-class material_reader : public tinyobj::MaterialReader
-{
-  public:
-    material_reader(reader &from, const std::vector<std::string> &whole_names) : r(from), libraries(whole_names)
-    {
-    }
-    bool operator()(const std::string &name, std::vector<tinyobj::material_t> *materials,
-                    std::map<std::string, int> *numbers, std::string *warning, std::string *error) override;
-
-  private:
-    reader &r;
-    const std::vector<std::string> &libraries;
-};
+// What the libraries define, in their order; a note says which cannot be used.
+std::vector<tinyobj::material_t> read_libraries(reader &r, const std::vector<std::string> &libraries);
 // Reads an image by the name that a material has for it, as files_read() does.
 using image_source = std::function<unsigned char *(const std::string &name, size_t *size_bytes, char *reason)>;
+// Reads it as files_read_moved() does, with a note of what was found instead.
+unsigned char *read_moved_image(import_scene *scene, struct files *files, const std::string &name,
+                                size_t *size_bytes, char *reason);
 // Which texture coordinates each map of a material uses.
 using texcoord_sets = std::array<uint32_t, PROTOCOL_MATERIAL_COUNT>;
 // Also for readers that fill such materials from other formats. `sets`, by position, may be empty: MTL has one

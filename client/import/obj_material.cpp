@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <set>
+#include <sstream>
+#include <strings.h>
 
 namespace obj
 {
@@ -31,8 +34,11 @@ void reflection(const tinyobj::material_t &m, message_set_material &set)
     const bool mirrors = m.illum >= 3 && m.illum <= 7;
     const float diffuse = max_component(m.diffuse), specular = max_component(m.specular);
 
+    // Exporters leave Kd black where a texture takes its place.
+    const bool is_textured = diffuse <= 0 && !m.diffuse_texname.empty();
+
     for (size_t c = 0; c < 3; c++)
-        set.base_colour[c] = unit(m.diffuse[c]);
+        set.base_colour[c] = is_textured ? 1 : unit(m.diffuse[c]);
     // Equal width of Blinn's and GGX's highlights (Walter et al. 2007), perceptual roughness being the root.
     set.roughness = unit(std::sqrt(2 / (std::max(m.shininess, 0.0f) + 2)));
     set.metallic = unit(m.metallic);
@@ -167,6 +173,9 @@ uint32_t add_material(building &b, const tinyobj::material_t &m, const texcoord_
     transparency(m, set);
     for (size_t c = 0; c < 3; c++)
         set.emission[c] = m.emission[c] > 0 ? std::min(m.emission[c], 1e6f) : 0;
+    if (set.alpha_mode == PROTOCOL_ALPHA_BLEND && set.base_colour[3] <= 0 && m.alpha_texname.empty())
+        import_note(b.scene, PROTOCOL_SEVERITY_WARNING, m.name.c_str(),
+                    "a material is wholly transparent (d 0 or Tr 1): nothing is seen of what has it");
     surface_maps(b, m, sets, set, uses);
     relief_maps(b, m, sets, uses);
     note_unused(b, m);
@@ -176,37 +185,117 @@ uint32_t add_material(building &b, const tinyobj::material_t &m, const texcoord_
 }
 } // namespace
 
-bool material_reader::operator()(const std::string &name, std::vector<tinyobj::material_t> *materials,
-                                 std::map<std::string, int> *numbers, std::string *, std::string *)
+namespace
 {
-    char reason[FILES_REASON_BYTES] = "";
-    std::string tried = name;
-    size_t size_bytes = 0;
-    unsigned char *bytes = files_read(r.files, name.c_str(), &size_bytes, reason);
+const char *const statements[] = {
+    "newmtl",   "Ka",       "Kd",     "Ks",     "Kt",     "Tf",       "Ni",       "Ke",     "Ns",
+    "illum",    "d",        "Tr",     "Pr",     "Pm",     "Ps",       "Pc",       "Pcr",    "aniso",
+    "anisor",   "map_Ka",   "map_Kd", "map_Ks", "map_Ns", "map_Bump", "map_bump", "bump",   "map_d",
+    "map_disp", "map_Disp", "disp",   "refl",   "map_Pr", "map_Pm",   "map_Ps",   "map_Ke", "norm"};
 
-    // tinyobjloader cuts the names at blanks; a name may have some.
-    for (size_t i = 0; i < libraries.size() && !bytes; i++) {
-        if (libraries[i] != name && libraries[i].compare(0, name.size(), name) == 0) {
-            tried = libraries[i];
-            bytes = files_read(r.files, tried.c_str(), &size_bytes, reason);
+// A statement's word as tinyobjloader knows it, in whichever case the file has it.
+std::string statement_of(const std::string &word)
+{
+    const char *const *end = std::end(statements);
+    const char *const *same = std::find(std::begin(statements), end, word);
+    const char *const *found =
+        same != end ? same : std::find_if(std::begin(statements), end, [&](const char *known) {
+            return strcasecmp(known, word.c_str()) == 0;
+        });
+    return found != end ? *found : word;
+}
+
+// A material without Kd has the whole of its texture; tinyobjloader takes 0.6 of it, or nothing behind a material
+// that has one.
+std::string mend_library(const char *bytes, size_t size_bytes)
+{
+    const char *const end = bytes + size_bytes;
+    std::string out;
+    bool has_kd = true, has_map = false;
+    const auto finish = [&] {
+        if (has_map && !has_kd)
+            out += "Kd 1 1 1\n";
+    };
+
+    for (const char *at = bytes; at < end;) {
+        const char *stop = std::find_if(at, end, [](char c) { return c == '\n' || c == '\r'; });
+        const char *word = std::find_if(at, stop, [](char c) { return c != ' ' && c != '\t'; });
+        const char *behind = std::find_if(word, stop, [](char c) { return c == ' ' || c == '\t'; });
+        const std::string statement = statement_of(std::string(word, behind));
+        if (statement == "newmtl") {
+            finish();
+            has_kd = has_map = false;
         }
+        has_kd = has_kd || statement == "Kd";
+        has_map = has_map || statement == "map_Kd";
+        out += statement;
+        out.append(behind, stop);
+        out += '\n';
+        at = stop + 1;
     }
-    if (!bytes) {
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, tried.c_str(),
-                    "the material file '%.100s' cannot be used: %.100s", tried.c_str(), reason);
+    finish();
+    return out;
+}
+
+// False: the file cannot be used, `reason` says why.
+bool read_library(reader &r, const std::string &name, std::vector<tinyobj::material_t> &materials, char *reason)
+{
+    size_t size_bytes = 0;
+    const std::unique_ptr<unsigned char, free_bytes> bytes(files_read(r.files, name.c_str(), &size_bytes, reason));
+
+    if (!bytes)
+        return false;
+    if (!files_is_material_library(bytes.get(), size_bytes)) {
+        snprintf(reason, FILES_REASON_BYTES, "it has no statement 'newmtl'");
         return false;
     }
-    const std::unique_ptr<unsigned char, free_bytes> owner(bytes);
-    if (!files_is_material_library(bytes, size_bytes)) {
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, tried.c_str(),
-                    "the material file '%.100s' has no statement 'newmtl'", tried.c_str());
-        return false;
-    }
-    memory_stream stream(reinterpret_cast<const char *>(bytes), size_bytes);
+    const std::string text = mend_library(reinterpret_cast<const char *>(bytes.get()), size_bytes);
+    memory_stream stream(text.data(), text.size());
     std::istream input(&stream);
+    std::map<std::string, int> numbers;
     std::string warning, error;
-    tinyobj::LoadMtl(numbers, materials, &input, &warning, &error);
-    return !materials->empty();
+    tinyobj::LoadMtl(&numbers, &materials, &input, &warning, &error);
+    return true;
+}
+
+void note_library(reader &r, const std::string &name, const char *reason)
+{
+    import_note(r.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(),
+                "the material file '%.100s' cannot be used: %.100s", name.c_str(), reason);
+}
+} // namespace
+
+std::vector<tinyobj::material_t> read_libraries(reader &r, const std::vector<std::string> &libraries)
+{
+    std::vector<tinyobj::material_t> materials;
+    std::set<std::string> seen;
+
+    for (const std::string &whole : libraries) {
+        char reason[FILES_REASON_BYTES] = "";
+        if (!seen.insert(whole).second || read_library(r, whole, materials, reason))
+            continue;
+        std::istringstream words(whole);
+        std::string name;
+        const bool is_one = whole.find_first_of(" \t") == std::string::npos;
+        if (is_one)
+            note_library(r, whole, reason);
+        while (!is_one && words >> name)
+            if (seen.insert(name).second && !read_library(r, name, materials, reason))
+                note_library(r, name, reason);
+    }
+    return materials;
+}
+
+unsigned char *read_moved_image(import_scene *scene, struct files *files, const std::string &name,
+                                size_t *size_bytes, char *reason)
+{
+    char found[FILES_NAME_BYTES];
+    unsigned char *bytes = files_read_moved(files, name.c_str(), size_bytes, found, reason);
+
+    if (found[0] != '\0')
+        import_note(scene, PROTOCOL_SEVERITY_INFO, name.c_str(),
+                    "the image '%.200s' was found by its name alone, beside the model", found);
+    return bytes;
 }
 
 std::vector<uint32_t> add_materials(import_scene *scene, const image_source &read_image,

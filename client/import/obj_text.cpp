@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "obj.hpp"
+#include "origin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -63,13 +64,80 @@ bool has_continued_line(const char *begin, const char *end)
     return false;
 }
 
+bool is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
+// Corners such as 1/2/ lose what is for nothing: tinyobjloader takes the next corner's number for their normal's.
+// Numbers with a decimal comma, as some countries write them, get a point.
+void mend_line(char *at, char *end)
+{
+    while (at < end && is_blank(*at))
+        at++;
+    const bool is_face = end - at > 2 && at[0] == 'f' && is_blank(at[1]), is_vertex = end - at > 2 && at[0] == 'v';
+    for (char *one = end - 1; is_face && one > at; one--)
+        if (*one == '/' && (one + 1 == end || is_blank(one[1])))
+            *one = ' ';
+    for (char *one = at + 1; is_vertex && one + 1 < end; one++)
+        if (*one == ',' && is_digit(one[-1]) && is_digit(one[1]))
+            *one = '.';
+}
+
+void mend_lines(std::string &text)
+{
+    for (size_t at = 0; at < text.size();) {
+        const size_t stop = std::min(text.find_first_of("\r\n", at), text.size());
+        mend_line(&text[at], &text[0] + stop);
+        at = stop + 1;
+    }
+}
+
+// A slash before the end of a corner, or a comma between digits.
+bool has_odd_numbers(const char *begin, const char *end)
+{
+    for (const char *at = begin; at + 1 < end; at++)
+        if ((*at == '/' && (is_blank(at[1]) || at[1] == '\r' || at[1] == '\n')) ||
+            (*at == ',' && at > begin && is_digit(at[-1]) && is_digit(at[1])))
+            return true;
+    return begin < end && end[-1] == '/';
+}
+
 struct scan {
     reader &r;
     prepared &out;
     size_t line = 0;
     size_t vertices = 0;
-    bool seen_points_or_lines = false;
 };
+
+// Floats are a millimetre apart from here on.
+constexpr double exact_max = 8192;
+
+// The first vertex says whether places are kept as doubles.
+void keep_place(scan &s, const char *const *starts, size_t count)
+{
+    double place[3] = {0, 0, 0};
+
+    if (s.vertices > 1 && s.out.places.empty())
+        return;
+    for (size_t c = 0; c < 3 && c < count; c++)
+        place[c] = strtod(starts[c], nullptr);
+    if (s.vertices > 1 || std::any_of(place, place + 3, [](double value) { return std::fabs(value) > exact_max; }))
+        s.out.places.insert(s.out.places.end(), place, place + 3);
+}
+
+// Places that floats hold well enough, or around the origin, are left to the library.
+void settle_places(prepared &out)
+{
+    double lower[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+
+    for (size_t i = 0; i < out.places.size(); i++) {
+        lower[i % 3] = std::min(lower[i % 3], out.places[i]);
+        upper[i % 3] = std::max(upper[i % 3], out.places[i]);
+    }
+    if (!import_find_origin(lower, upper, out.origin))
+        out.places.clear();
+}
 
 // Up to six numbers of a `v` line. tinyobjloader takes what is no number for 0, which is not for us to show.
 bool scan_vertex(scan &s, const char *at, const char *end)
@@ -86,7 +154,7 @@ bool scan_vertex(scan &s, const char *at, const char *end)
         starts[count] = at;
         for (; at < end && !is_blank(*at); at++) {
             const char c = *at;
-            if (c >= '0' && c <= '9')
+            if (is_digit(c))
                 continue;
             if (c != '.' && c != '-' && c != '+' && c != 'e' && c != 'E') {
                 // The file has a NUL behind its last byte, so strtod() ends.
@@ -103,14 +171,14 @@ bool scan_vertex(scan &s, const char *at, const char *end)
         count++;
     }
     s.vertices++;
+    keep_place(s, starts, count);
     if (count < 6 && s.out.colours.empty())
         return true;
     for (size_t i = 3; i < count && count == 6; i++)
         values[i] = strtod(starts[i], nullptr);
-    s.out.colours.resize((s.vertices - 1) * 4, 255); // of vertices before the first coloured one
+    s.out.colours.resize((s.vertices - 1) * 3, 1); // of vertices before the first coloured one
     for (size_t i = 3; i < 6; i++)
-        s.out.colours.push_back(uint8_t(std::lround(std::min(std::max(values[i], 0.0), 1.0) * 255)));
-    s.out.colours.push_back(255);
+        s.out.colours.push_back(float(values[i]));
     return true;
 }
 
@@ -140,8 +208,8 @@ bool scan_line(scan &s, const char *at, const char *end)
         return scan_vertex(s, at + 2, end);
     if (at[0] == 'f' && is_blank(at[1]))
         return scan_face(s, at + 2, end);
-    if ((at[0] == 'p' || at[0] == 'l') && is_blank(at[1]))
-        s.seen_points_or_lines = true;
+    s.out.has_points = s.out.has_points || (at[0] == 'p' && is_blank(at[1]));
+    s.out.has_lines = s.out.has_lines || (at[0] == 'l' && is_blank(at[1]));
     if (end - at > 7 && memcmp(at, "mtllib", 6) == 0 && is_blank(at[6])) {
         const char *from = at + 7, *to = end;
         while (from < to && is_blank(*from))
@@ -185,7 +253,7 @@ std::string memory_stream::place() const
 
 prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
-    prepared out = {reinterpret_cast<const char *>(bytes), size_bytes, {}, {}, {}, false};
+    prepared out = {reinterpret_cast<const char *>(bytes), size_bytes, {}, {}, {}, {}, {}, false, false};
 
     if (size_bytes >= 2 && ((bytes[0] == 0xfe && bytes[1] == 0xff) || (bytes[0] == 0xff && bytes[1] == 0xfe)))
         out.mended = from_utf16(bytes, size_bytes, bytes[0] == 0xfe);
@@ -196,9 +264,14 @@ prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes)
             out.mended.assign(out.original, size_bytes);
         join_lines(out.mended);
     }
-    scan s = {r, out, 0, 0, false};
+    if (has_odd_numbers(out.begin(), out.begin() + out.size_bytes())) {
+        if (out.mended.empty())
+            out.mended.assign(out.original, size_bytes);
+        mend_lines(out.mended);
+    }
+    scan s = {r, out};
     scan_lines(s, out.begin(), out.begin() + out.size_bytes());
-    out.has_points_or_lines = s.seen_points_or_lines;
+    settle_places(out);
     return out;
 }
 } // namespace obj

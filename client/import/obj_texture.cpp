@@ -86,6 +86,10 @@ void read_images(building &b, const std::vector<const tinyobj::material_t *> &ma
             i.width = job.width;
             i.height = job.height;
             i.has_alpha = job.has_alpha;
+            char text[200];
+            texture_explain_reduction(&job, text);
+            if (job.reduced > 1)
+                import_note(b.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(), "the image %s", text);
             continue;
         }
         i.marked = true;

@@ -65,7 +65,17 @@ static bool holds(const struct corner *a, const struct corner *b, const struct c
     return area(a, b, p) >= 0 && area(b, c, p) >= 0 && area(c, a, p) >= 0;
 }
 
-/* An ear: a convex corner whose triangle holds no other corner, but for those at the same places as its own. */
+/* The tip of a spike without width, where the outline goes back on itself, or a corner that is given twice. */
+static bool is_tip(const struct corner *corners, uint32_t at)
+{
+    const struct corner *b = &corners[at], *a = &corners[b->previous], *c = &corners[b->next];
+    const double turned = (b->x - a->x) * (c->x - b->x) + (b->y - a->y) * (c->y - b->y), twice = area(a, b, c);
+
+    return turned <= 0 && !(twice < 0) && !(twice > 0);
+}
+
+/* An ear: a convex corner whose triangle holds no other corner, but for those at the same places as its own, or a
+ * tip, whose triangle is nothing. */
 static bool is_ear(const struct corner *corners, uint32_t at, uint64_t *budget)
 {
     const struct corner *b = &corners[at], *a = &corners[b->previous], *c = &corners[b->next];
@@ -85,31 +95,42 @@ static bool is_ear(const struct corner *corners, uint32_t at, uint64_t *budget)
     return true;
 }
 
+/* Returns the corner before. */
+static uint32_t cut_off(struct corner *corners, uint32_t at, uint32_t **triangles)
+{
+    const uint32_t before = corners[at].previous, behind = corners[at].next;
+
+    (*triangles)[0] = before;
+    (*triangles)[1] = at;
+    (*triangles)[2] = behind;
+    *triangles += 3;
+    corners[before].next = behind;
+    corners[behind].previous = before;
+    return before;
+}
+
+/* Spikes first: beside them, triangles out to their tips would be ears. */
 static bool clip(struct corner *corners, uint32_t count, uint32_t *triangles, uint64_t *budget)
 {
-    uint32_t at = 0, left = count, missed = 0;
+    uint32_t at = 0, left = count;
 
-    while (left > 3) {
+    for (uint32_t missed = 0; left > 3 && missed <= left;) {
+        const bool tip = is_tip(corners, at);
+
+        at = tip ? cut_off(corners, at, &triangles) : corners[at].next;
+        missed = tip ? 0 : missed + 1;
+        left -= tip;
+    }
+    for (uint32_t missed = 0; left > 3;) {
         if (*budget == 0 || missed > left)
             return false;
-        if (!is_ear(corners, at, budget)) {
-            at = corners[at].next;
-            missed++;
-            continue;
-        }
-        triangles[0] = corners[at].previous;
-        triangles[1] = at;
-        triangles[2] = corners[at].next;
-        triangles += 3;
-        corners[corners[at].previous].next = corners[at].next;
-        corners[corners[at].next].previous = corners[at].previous;
-        at = corners[at].previous;
-        left--;
-        missed = 0;
+        const bool ear = is_ear(corners, at, budget);
+
+        at = ear ? cut_off(corners, at, &triangles) : corners[at].next;
+        missed = ear ? 0 : missed + 1;
+        left -= ear;
     }
-    triangles[0] = corners[at].previous;
-    triangles[1] = at;
-    triangles[2] = corners[at].next;
+    cut_off(corners, at, &triangles);
     return true;
 }
 

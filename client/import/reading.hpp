@@ -73,6 +73,33 @@ template <typename type> type *copy_of(const std::vector<type> &from)
         memcpy(copy, from.data(), from.size() * sizeof(type));
     return copy;
 }
+// -1: it is none.
+inline int hex_value(char c)
+{
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+}
+
+// A percent sign with its two digits.
+inline bool is_escape(const std::string &uri, size_t at)
+{
+    return at + 2 < uri.size() && uri[at] == '%' && hex_value(uri[at + 1]) >= 0 && hex_value(uri[at + 2]) >= 0;
+}
+
+// With the percent signs resolved.
+inline std::string decoded_uri(const std::string &uri)
+{
+    std::string name;
+
+    for (size_t at = 0; at < uri.size(); at++) {
+        const bool escape = is_escape(uri, at);
+        name += escape ? char(hex_value(uri[at + 1]) << 4 | hex_value(uri[at + 2])) : uri[at];
+        at += escape ? 2 : 0;
+    }
+    return name;
+}
 } // namespace reading
 
 #endif

@@ -45,6 +45,15 @@ void texture_decode_environment(struct texture_job *job)
         reader->decode_environment(job);
 }
 
+void texture_explain_reduction(const struct texture_job *job, char text[200])
+{
+    snprintf(text, 200, "is larger than can be shown: it is reduced to a %s, %u x %u texels",
+             job->reduced == 2   ? "half"
+             : job->reduced == 4 ? "quarter"
+                                 : "part",
+             job->width, job->height);
+}
+
 unsigned char *texture_marker(void)
 {
     static const unsigned char texels[16] = {255, 0, 255, 255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 0, 255, 255};

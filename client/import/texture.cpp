@@ -21,8 +21,6 @@
 
 namespace
 {
-constexpr int edge_max = 16384;
-constexpr uint64_t image_bytes_max = 1ull << 30;
 constexpr size_t texel_bytes = 4;
 // Of all images of a model: many small files can hold large images.
 constexpr uint64_t all_images_bytes_max = 4ull << 30;
@@ -48,6 +46,26 @@ const signature signatures[] = {
     {"gif", 0, 6, "GIF89a"},
     {"pnm", 0, 2, "P6"},
 };
+
+// Formats that are known and not read.
+struct unread_format {
+    size_t offset, length;
+    const char *bytes, *reason;
+};
+const unread_format unread_formats[] = {
+    {0, 7, "\xabKTX 20", "is a KTX2 image, which is not read; " TEXTURE_KTX2_REMEDY},
+    {0, 4, "DDS ", "is a DDS image, which is not read; convert it to PNG, WebP or JPEG"},
+    {4, 8, "ftypavif", "is an AVIF image, which is not read; convert it to PNG, WebP or JPEG"},
+};
+
+std::string reason_of_unread(const unsigned char *bytes, size_t size_bytes)
+{
+    for (const unread_format &format : unread_formats)
+        if (size_bytes >= format.offset + format.length &&
+            memcmp(bytes + format.offset, format.bytes, format.length) == 0)
+            return format.reason;
+    return "is not an image of a known format";
+}
 
 bool looks_like_targa(const unsigned char *bytes, size_t size_bytes)
 {
@@ -86,18 +104,8 @@ bool spec_reasonable(const OIIO::ImageSpec &spec, std::string &reason)
         reason = "is not a flat image";
         return false;
     }
-    if (spec.width > edge_max || spec.height > edge_max) {
-        reason = "is " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " texels, more than " +
-                 std::to_string(edge_max) + " in one direction";
-        return false;
-    }
     if (spec.nchannels < 1 || spec.nchannels > 64) {
         reason = "has " + std::to_string(spec.nchannels) + " channels";
-        return false;
-    }
-    const uint64_t texels = uint64_t(spec.width) * uint64_t(spec.height);
-    if (texels * uint64_t(std::max(spec.nchannels, 4)) * 4 > image_bytes_max) {
-        reason = "would need more than 1 GiB";
         return false;
     }
     return true;
@@ -143,6 +151,57 @@ void expand(const uint8_t *from, unsigned char *to, size_t texels, int channels)
     }
 }
 
+// Its size in the job, and room in what all images may take. False: the job or the reason says why.
+bool settle_size(const opened_image &image, texture_job &job, std::string &reason)
+{
+    job.reduced = texture_reduction(&job, uint64_t(image.spec.width), uint64_t(image.spec.height));
+    if (job.reduced == 0) {
+        reason = job.reason;
+        return false;
+    }
+    if (job.reduced > 1 && image.spec.tile_width > 0) {
+        reason = "is stored in tiles and larger than can be shown: save it in rows, or smaller";
+        return false;
+    }
+    job.width = (uint32_t(image.spec.width) + job.reduced - 1) / job.reduced;
+    job.height = (uint32_t(image.spec.height) + job.reduced - 1) / job.reduced;
+    const uint64_t bytes = uint64_t(job.width) * job.height * texel_bytes;
+    if (all_images_bytes.fetch_add(bytes) > all_images_bytes_max - bytes) {
+        reason = "would need, with the images before it, more than 4 GiB";
+        return false;
+    }
+    return true;
+}
+
+// The first channels, each texel the mean of those that it stands for.
+bool read_floats(opened_image &image, const texture_job &job, int channels, std::vector<float> &pixels,
+                 std::string &reason)
+{
+    const int by = int(job.reduced), width = image.spec.width, height = image.spec.height;
+    bool good = true;
+
+    pixels.assign(size_t(job.width) * job.height * size_t(channels), 0);
+    if (by == 1) {
+        good = image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels.data());
+    } else {
+        std::vector<float> rows(size_t(by) * size_t(width) * size_t(channels));
+        for (int y = 0; good && y < height; y += by) {
+            const int count = std::min(by, height - y);
+            good = image.input->read_scanlines(0, 0, image.spec.y + y, image.spec.y + y + count, 0, 0, channels,
+                                               OIIO::TypeDesc::FLOAT, rows.data());
+            float *out = &pixels[size_t(y / by) * job.width * size_t(channels)];
+            for (int x = 0; x < width; x++)
+                for (int k = 0; k < count; k++)
+                    for (int c = 0; c < channels; c++)
+                        out[x / by * channels + c] += rows[size_t((k * width + x) * channels + c)] /
+                                                      float(count * std::min(by, width - x / by * by));
+        }
+    }
+    if (!good)
+        reason = image.input->geterror();
+    return good;
+}
+
 bool decode_bytes(opened_image &image, texture_job &job, size_t texels, std::string &reason)
 {
     const int channels = image.spec.nchannels;
@@ -162,21 +221,20 @@ bool decode_bytes(opened_image &image, texture_job &job, size_t texels, std::str
     return true;
 }
 
-bool decode_floats(opened_image &image, texture_job &job, size_t texels, std::string &reason)
+// `linear`: the values are light, not encoded as the texels are.
+bool decode_floats(opened_image &image, texture_job &job, size_t texels, bool linear, std::string &reason)
 {
     const int channels = std::min(image.spec.nchannels, 4);
-    std::vector<float> pixels(texels * size_t(channels));
+    std::vector<float> pixels;
 
-    if (!image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels.data())) {
-        reason = image.input->geterror();
+    if (!read_floats(image, job, channels, pixels, reason))
         return false;
-    }
     for (size_t i = 0; i < texels; i++) {
         const float *from = &pixels[i * size_t(channels)];
         unsigned char *to = job.texels + i * texel_bytes;
         for (int c = 0; c < 3; c++) {
             const float value = from[channels >= 3 ? c : 0];
-            to[c] = byte_of(job.srgb ? srgb_from_linear_f(std::max(0.0f, value)) : value);
+            to[c] = byte_of(job.srgb && linear ? srgb_from_linear_f(std::max(0.0f, value)) : value);
         }
         to[3] = channels == 4 ? byte_of(from[3]) : channels == 2 ? byte_of(from[1]) : 255;
     }
@@ -187,27 +245,22 @@ bool decode(texture_job &job, std::string &reason)
 {
     const char *reader = reader_of(job.bytes, job.size_bytes);
     if (!reader) {
-        reason = "is not an image of a known format";
+        reason = reason_of_unread(job.bytes, job.size_bytes);
         return false;
     }
     opened_image image(job.bytes, job.size_bytes);
-    if (!image.open(reader, reason))
+    if (!image.open(reader, reason) || !settle_size(image, job, reason))
         return false;
-    const size_t texels = size_t(image.spec.width) * size_t(image.spec.height);
-    if (all_images_bytes.fetch_add(texels * texel_bytes) > all_images_bytes_max - texels * texel_bytes) {
-        reason = "would need, with the images before it, more than 4 GiB";
-        return false;
-    }
+    const size_t texels = size_t(job.width) * job.height;
     job.texels = static_cast<unsigned char *>(calloc(texels, texel_bytes));
     if (!job.texels) {
         reason = "out of memory";
         return false;
     }
-    job.width = uint32_t(image.spec.width);
-    job.height = uint32_t(image.spec.height);
     job.has_alpha = image.spec.nchannels == 2 || image.spec.nchannels == 4;
-    return image.spec.format.is_floating_point() ? decode_floats(image, job, texels, reason)
-                                                 : decode_bytes(image, job, texels, reason);
+    const bool linear = image.spec.format.is_floating_point();
+    return linear || job.reduced > 1 ? decode_floats(image, job, texels, linear, reason)
+                                     : decode_bytes(image, job, texels, reason);
 }
 
 void run(texture_job &job, bool (*decoder)(texture_job &, std::string &)) noexcept
@@ -255,12 +308,10 @@ bool decode_halves(texture_job &job, std::string &reason)
     if (!image.open(reader, reason))
         return false;
     const int channels = std::min(image.spec.nchannels, 3);
-    const size_t texels = size_t(image.spec.width) * size_t(image.spec.height);
-    std::vector<float> pixels(texels * size_t(channels));
-    if (!image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels.data())) {
-        reason = image.input->geterror();
+    std::vector<float> pixels;
+    if (!settle_size(image, job, reason) || !read_floats(image, job, channels, pixels, reason))
         return false;
-    }
+    const size_t texels = size_t(job.width) * job.height;
     uint16_t *halves = static_cast<uint16_t *>(calloc(texels, 4 * sizeof(uint16_t)));
     if (!halves) {
         reason = "out of memory";
@@ -270,8 +321,6 @@ bool decode_halves(texture_job &job, std::string &reason)
         for (size_t c = 0; c < 3; c++)
             halves[i * 4 + c] = half_of_radiance(pixels[i * size_t(channels) + (channels == 3 ? c : 0)]);
     job.texels = reinterpret_cast<unsigned char *>(halves);
-    job.width = uint32_t(image.spec.width);
-    job.height = uint32_t(image.spec.height);
     return true;
 }
 } // namespace

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -20,9 +21,40 @@ struct texture_job {
     /* Result. */
     unsigned char *texels; /* malloc'd, 4 bytes each, rows from the top; NULL: `reason` says why */
     uint32_t width, height;
+    uint32_t
+        reduced; /* each texel is the mean of so many by so many of the file, as it is too large; 0 or 1: of one */
     bool has_alpha;
     char reason[200];
 };
+
+#define TEXTURE_KTX2_REMEDY                                                                                       \
+    "convert its textures to PNG, as 'gltf-transform ktxdecompress IN OUT' does, or to WebP or JPEG"
+
+/* Images are reduced to this, by powers of 2, but none beyond what can be read within a minute. */
+#define TEXTURE_EDGE_MAX 16384u
+#define TEXTURE_TEXELS_MAX (UINT64_C(1) << 26)
+#define TEXTURE_FILE_EDGE_MAX 65536u
+#define TEXTURE_FILE_TEXELS_MAX (UINT64_C(1) << 30)
+/* The factor of an image of a file; 0: it is too large for that, and the job says so. */
+static inline uint32_t texture_reduction(struct texture_job *job, uint64_t width, uint64_t height)
+{
+    uint32_t factor = 1;
+    if (width < 1 || height < 1)
+        return (void)snprintf(job->reason, sizeof(job->reason), "is not a flat image"), 0u;
+    if (width > TEXTURE_FILE_EDGE_MAX || height > TEXTURE_FILE_EDGE_MAX ||
+        width * height > TEXTURE_FILE_TEXELS_MAX)
+        return (void)snprintf(job->reason, sizeof(job->reason),
+                              "is %llu x %llu texels; up to %u in one direction and %llu in all are read",
+                              (unsigned long long)width, (unsigned long long)height, TEXTURE_FILE_EDGE_MAX,
+                              (unsigned long long)TEXTURE_FILE_TEXELS_MAX),
+               0u;
+    while ((width + factor - 1) / factor > TEXTURE_EDGE_MAX || (height + factor - 1) / factor > TEXTURE_EDGE_MAX ||
+           width * height / factor / factor > TEXTURE_TEXELS_MAX)
+        factor *= 2;
+    return factor;
+}
+/* "is 16384 x 16384 texels, too large: it is shown at 8192 x 8192", for a note. */
+void texture_explain_reduction(const struct texture_job *job, char text[200]);
 
 /* What the module exports, under the name `texture_reader`. */
 struct texture_reader {

@@ -14,8 +14,6 @@
 #include <turbojpeg.h>
 
 /* As in texture.cpp. */
-#define EDGE_MAX 16384
-#define IMAGE_TEXELS_MAX (UINT64_C(1) << 26)
 #define ALL_TEXELS_MAX (UINT64_C(1) << 30)
 #define TEXEL_BYTES 4
 
@@ -40,15 +38,12 @@ static bool is_plain(const struct texture_job *job)
 static bool take_texels(struct texture_job *job, uint64_t width, uint64_t height)
 {
     char *reason = job->reason;
-    if (width < 1 || height < 1)
-        return snprintf(reason, sizeof(job->reason), "is not a flat image"), false;
-    if (width > EDGE_MAX || height > EDGE_MAX)
-        return snprintf(reason, sizeof(job->reason), "is %llu x %llu texels, more than %d in one direction",
-                        (unsigned long long)width, (unsigned long long)height, EDGE_MAX),
-               false;
+    job->reduced = texture_reduction(job, width, height);
+    if (job->reduced == 0)
+        return false;
+    width = (width + job->reduced - 1) / job->reduced;
+    height = (height + job->reduced - 1) / job->reduced;
     const uint64_t texels = width * height;
-    if (texels > IMAGE_TEXELS_MAX)
-        return snprintf(reason, sizeof(job->reason), "would need more than 1 GiB"), false;
     if (atomic_fetch_add(&all_texels, texels) > ALL_TEXELS_MAX - texels)
         return snprintf(reason, sizeof(job->reason), "would need, with the images before it, more than 4 GiB"),
                false;
@@ -66,6 +61,8 @@ struct png_bytes {
     struct texture_job *job;
     size_t at;
     png_bytep *rows;
+    unsigned char *row; /* of an image that is reduced .. */
+    uint32_t *sums;     /* .. and those of a row of the result */
 };
 
 static void read_png(png_structp png, png_bytep to, size_t count)
@@ -105,6 +102,36 @@ static void ask_for_bytes(png_structp png, png_infop info, struct texture_job *j
     png_read_update_info(png, info);
 }
 
+/* Means of bytes as they are encoded: at such sizes neighbours are alike. */
+static void read_reduced(png_structp png, png_infop info, struct png_bytes *bytes)
+{
+    struct texture_job *job = bytes->job;
+    const uint32_t width = png_get_image_width(png, info), height = png_get_image_height(png, info),
+                   by = job->reduced;
+    if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE)
+        png_error(png, "is interlaced and too large: save it without interlacing, or smaller");
+    bytes->row = malloc((size_t)width * TEXEL_BYTES);
+    bytes->sums = malloc((size_t)job->width * TEXEL_BYTES * sizeof(*bytes->sums));
+    if (!bytes->row || !bytes->sums)
+        png_error(png, "out of memory");
+    for (uint32_t y = 0; y < job->height; y++) {
+        const uint32_t rows = height - y * by < by ? height - y * by : by;
+        memset(bytes->sums, 0, (size_t)job->width * TEXEL_BYTES * sizeof(*bytes->sums));
+        for (uint32_t k = 0; k < rows; k++) {
+            png_read_row(png, bytes->row, NULL);
+            for (uint32_t x = 0; x < width; x++)
+                for (uint32_t c = 0; c < TEXEL_BYTES; c++)
+                    bytes->sums[x / by * TEXEL_BYTES + c] += bytes->row[(size_t)x * TEXEL_BYTES + c];
+        }
+        for (uint32_t x = 0; x < job->width; x++) {
+            const uint32_t columns = width - x * by < by ? width - x * by : by, count = rows * columns;
+            for (uint32_t c = 0; c < TEXEL_BYTES; c++)
+                job->texels[((size_t)y * job->width + x) * TEXEL_BYTES + c] =
+                    (unsigned char)((bytes->sums[x * TEXEL_BYTES + c] + count / 2) / count);
+        }
+    }
+}
+
 /* An error of libpng ends it by a jump: it keeps nothing in variables that the caller must free. */
 static bool read_png_texels(png_structp png, png_infop info, struct png_bytes *bytes)
 {
@@ -117,6 +144,10 @@ static bool read_png_texels(png_structp png, png_infop info, struct png_bytes *b
     if (!take_texels(job, png_get_image_width(png, info), png_get_image_height(png, info)))
         return false;
     ask_for_bytes(png, info, job);
+    if (job->reduced > 1) {
+        read_reduced(png, info, bytes);
+        return true;
+    }
     bytes->rows = malloc(job->height * sizeof(*bytes->rows));
     if (!bytes->rows)
         png_error(png, "out of memory");
@@ -138,6 +169,8 @@ static bool decode_png(struct texture_job *job)
         snprintf(job->reason, sizeof(job->reason), "out of memory");
     png_destroy_read_struct(&png, &info, NULL);
     free(bytes.rows);
+    free(bytes.row);
+    free(bytes.sums);
     return decoded;
 }
 
@@ -164,12 +197,14 @@ static bool decode_jpeg_with(tjhandle handle, struct texture_job *job)
         return false;
     const bool inks = space == TJCS_CMYK || space == TJCS_YCCK;
     /* What is cut off stays grey, as with a warning. */
-    if (tjDecompress2(handle, job->bytes, size, job->texels, width, 0, height, inks ? TJPF_CMYK : TJPF_RGBA,
-                      TJFLAG_LIMITSCANS) < 0 &&
+    if (job->reduced > 8)
+        return snprintf(job->reason, sizeof(job->reason), "is too large"), false;
+    if (tjDecompress2(handle, job->bytes, size, job->texels, (int)job->width, 0, (int)job->height,
+                      inks ? TJPF_CMYK : TJPF_RGBA, TJFLAG_LIMITSCANS) < 0 &&
         tjGetErrorCode(handle) != TJERR_WARNING)
         return false;
     if (inks)
-        rgb_from_cmyk(job->texels, (size_t)width * (size_t)height);
+        rgb_from_cmyk(job->texels, (size_t)job->width * job->height);
     return true;
 }
 
@@ -244,8 +279,8 @@ static float *decode_hdr(const struct texture_job *job, int *width, int *height)
         return NULL;
     bytes = whole;
     if (!stbi_info_from_callbacks(&calls, &bytes, width, height, &channels) || *width < 1 || *height < 1 ||
-        *width > EDGE_MAX || *height > EDGE_MAX || (uint64_t)*width * (uint64_t)*height > IMAGE_TEXELS_MAX ||
-        !holds_rows_of_hdr(job, *width, *height))
+        *width > (int)TEXTURE_EDGE_MAX || *height > (int)TEXTURE_EDGE_MAX ||
+        (uint64_t)*width * (uint64_t)*height > TEXTURE_TEXELS_MAX || !holds_rows_of_hdr(job, *width, *height))
         return NULL;
     bytes = whole;
     float *pixels = stbi_loadf_from_callbacks(&calls, &bytes, width, height, &channels, 3);

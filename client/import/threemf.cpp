@@ -105,7 +105,7 @@ class model_file
     instance read_instance() const
     {
         const char *path = attribute("path"), *text = attribute("transform");
-        instance made = {{path ? path + (path[0] == '/') : name, needed("objectid")}, {}};
+        instance made = {{part_name(path ? path : name), needed("objectid")}, {}};
 
         import_identity(made.parent_from_object);
         for (size_t i = 0; text && i < 12; i++)
@@ -163,7 +163,7 @@ class model_file
     {
         if (!mesh.triangles.empty())
             building.mesh = add_mesh(r, building.name, mesh, groups);
-        r.objects[{name, object_id}] = std::move(building);
+        r.objects[{part_name(name), object_id}] = std::move(building);
         mesh = {};
         object_id = none;
     }

@@ -56,6 +56,9 @@ struct reader : reading::base {
 };
 
 // ---- threemf_archive.cpp
+// A part's name as it is compared: without the first slash, with slashes for the backslashes of some programs,
+// small letters (Open Packaging Conventions, 6.2.2.3) and its percent signs resolved.
+std::string part_name(const std::string &name);
 using taker = std::function<void(const char *bytes, size_t size_bytes, bool is_last)>;
 // Calls `begin` with the name of each model in the archive, the main one last, and what that returns with its
 // bytes, a part at a time.

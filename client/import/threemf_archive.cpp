@@ -3,13 +3,24 @@
 #include "threemf.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <memory>
 
+#include <expat.h>
 #include <minizip/unzip.h>
 
 namespace threemf
 {
+std::string part_name(const std::string &name)
+{
+    std::string out = reading::decoded_uri(name);
+
+    for (char &c : out)
+        c = c == '\\' ? '/' : char(tolower(static_cast<unsigned char>(c)));
+    return out.compare(0, 1, "/") == 0 ? out.substr(1) : out;
+}
+
 namespace
 {
 constexpr size_t part_bytes = 1 << 16;
@@ -74,13 +85,13 @@ std::string current_name(unzFile zip)
     char name[1024] = "";
     if (unzGetCurrentFileInfo64(zip, nullptr, name, sizeof(name) - 1, nullptr, 0, nullptr, 0) != UNZ_OK)
         return "";
-    return name[0] == '/' ? name + 1 : name;
+    return name;
 }
 
 bool is_model(const std::string &name)
 {
-    const std::string ending = ".model";
-    return name.size() > ending.size() && name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
+    const std::string ending = ".model", part = part_name(name);
+    return part.size() > ending.size() && part.compare(part.size() - ending.size(), ending.size(), ending) == 0;
 }
 
 template <typename Take>
@@ -104,24 +115,59 @@ void inflate_current(reader &r, unzFile zip, const std::string &name, uint64_t &
         fail(r, name, "the 3MF file cannot be read: the checksum of '%.100s' is wrong", name.c_str());
 }
 
-// By the archive's relations; the usual place where they do not say.
-std::string main_model(reader &r, unzFile zip, uint64_t &left)
-{
-    std::string relations;
+struct relations {
+    std::string model; // of the archive; empty: they do not say
+};
 
-    if (unzLocateFile(zip, "_rels/.rels", 2) != UNZ_OK)
-        fail(r, "", "it is no 3MF file: there is no '_rels/.rels' in it");
-    inflate_current(r, zip, "_rels/.rels", left, [&](const char *bytes, size_t size_bytes, bool) {
-        relations.append(bytes, std::min(size_bytes, part_bytes));
-    });
-    const size_t kind = relations.find("/3dmodel\""), begin = relations.rfind('<', kind);
-    const std::string target = "Target=\"";
-    const size_t at = kind == std::string::npos ? kind : relations.find(target, begin);
-    if (at == std::string::npos || at > relations.find('>', kind))
-        return "3D/3dmodel.model";
-    const size_t name = at + target.size();
-    const std::string found = relations.substr(name, relations.find('"', name) - name);
-    return found.compare(0, 1, "/") == 0 ? found.substr(1) : found;
+void XMLCALL on_relation(void *user, const char *, const char **attributes)
+{
+    std::string &model = static_cast<relations *>(user)->model;
+    const std::string ending = "/3dmodel";
+    std::string type, target;
+
+    for (; attributes[0]; attributes += 2) {
+        if (strcmp(attributes[0], "Type") == 0)
+            type = attributes[1];
+        if (strcmp(attributes[0], "Target") == 0)
+            target = attributes[1];
+    }
+    if (model.empty() && type.size() >= ending.size() &&
+        type.compare(type.size() - ending.size(), ending.size(), ending) == 0)
+        model = part_name(target);
+}
+
+// By the archive's relations; else the usual place, or the only model that there is.
+std::string main_model(reader &r, unzFile zip, const std::vector<std::string> &models, uint64_t &left)
+{
+    relations found;
+    const std::unique_ptr<XML_ParserStruct, void (*)(XML_Parser)> parser(XML_ParserCreate(nullptr),
+                                                                         XML_ParserFree);
+
+    if (!parser)
+        throw std::bad_alloc();
+    XML_SetUserData(parser.get(), &found);
+    XML_SetStartElementHandler(parser.get(), on_relation);
+    if (unzLocateFile(zip, "_rels/.rels", 2) == UNZ_OK)
+        inflate_current(r, zip, "_rels/.rels", left, [&](const char *bytes, size_t size_bytes, bool is_last) {
+            XML_Parse(parser.get(), bytes, int(size_bytes), is_last); // what is broken says nothing
+        });
+    for (const std::string &wanted : {found.model, std::string("3d/3dmodel.model")})
+        if (std::find(models.begin(), models.end(), wanted) != models.end())
+            return wanted;
+    if (models.empty())
+        fail(r, "", "it is no 3MF file: there is no model in it");
+    if (models.size() > 1)
+        fail(r, "", "the 3MF file cannot be read: its relations name none of its %zu models", models.size());
+    return models[0];
+}
+
+// Calls `visit` with the name of each file, where the archive then stands.
+template <typename Visit> void each_file(unzFile zip, Visit visit)
+{
+    size_t count = 0;
+
+    for (int at = unzGoToFirstFile(zip); at == UNZ_OK && count < files_max; at = unzGoToNextFile(zip), count++)
+        visit(current_name(zip));
 }
 } // namespace
 
@@ -133,20 +179,19 @@ void each_model(reader &r, const unsigned char *bytes, size_t size_bytes,
                                      seek_memory, do_nothing,  do_nothing,    &m};
     const std::unique_ptr<void, close_archive> zip(unzOpen2_64("", &functions));
     uint64_t left = FILES_BYTES_MAX;
-    size_t count = 0;
+    std::vector<std::string> models;
 
     if (!zip)
         fail(r, "", "the 3MF file cannot be read: it is no zip archive, or is cut off");
-    const std::string main = main_model(r, zip.get(), left);
-    for (int at = unzGoToFirstFile(zip.get()); at == UNZ_OK && count < files_max;
-         at = unzGoToNextFile(zip.get()), count++) {
-        const std::string name = current_name(zip.get());
-        if (is_model(name) && name != main)
-            inflate_current(r, zip.get(), name, left, begin(name, false));
-    }
-    if (unzLocateFile(zip.get(), main.c_str(), 2) != UNZ_OK &&
-        unzLocateFile(zip.get(), ("/" + main).c_str(), 2) != UNZ_OK)
-        fail(r, "", "the 3MF file cannot be read: its model '%.100s' is not in it", main.c_str());
-    inflate_current(r, zip.get(), main, left, begin(main, true));
+    each_file(zip.get(), [&](const std::string &name) {
+        if (is_model(name))
+            models.push_back(part_name(name));
+    });
+    const std::string main = main_model(r, zip.get(), models, left);
+    for (const bool is_main : {false, true})
+        each_file(zip.get(), [&](const std::string &name) {
+            if (is_model(name) && (part_name(name) == main) == is_main)
+                inflate_current(r, zip.get(), name, left, begin(name, is_main));
+        });
 }
 } // namespace threemf

@@ -153,6 +153,9 @@ struct fl_import_stats {
     uint64_t upload_ns; /* from sending the first to the acknowledgement of the last */
     uint64_t commit_ns; /* from commit to the answer: the daemon's work */
     uint64_t revision;
+    /* Subtracted from all places of models that are far from the origin; 0: nothing was. A place of the model is
+     * one of the scene and this. */
+    double origin[3];
 };
 
 struct fl_note {
@@ -641,6 +644,7 @@ struct fl_export_options {
     unsigned quality;   /* JPEG and WebP; 0: 95 */
     const struct fl_export_text *texts; /* to be drawn into it, if it has the format rgba8 */
     size_t text_count;
+    double origin[3]; /* for the metadata: that of the scene's import statistics */
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);

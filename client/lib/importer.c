@@ -264,6 +264,8 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
         importer->stats.parse_ns = message->import_done.parse_ns;
         importer->stats.hash_ns = message->import_done.hash_ns;
         importer->stats.import_ns = message->import_done.total_ns;
+        for (unsigned i = 0; i < 3; i++)
+            importer->stats.origin[i] = (double)message->import_done.origin[i];
         return true;
     default:
         return true;

@@ -123,9 +123,9 @@ bool fl_text_size(const char *text, uint32_t *width, uint32_t *height, struct fl
     return true;
 }
 
-bool fl_text_vector(const char *text, float vector[3], struct fl_error *error)
+bool fl_text_place(const char *text, double place[3], struct fl_error *error)
 {
-    float read[3] = {0, 0, 0};
+    double read[3] = {0, 0, 0};
     const char *at = text;
     for (unsigned i = 0; i < 3; i++) {
         const size_t length = strcspn(at, ",");
@@ -134,10 +134,20 @@ bool fl_text_vector(const char *text, float vector[3], struct fl_error *error)
         const bool separated = i < 2 ? at[length] == ',' : at[length] == '\0';
         if (end != at + length || !separated || !(fabs(value) <= 1e12))
             return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not three numbers X,Y,Z", text);
-        read[i] = (float)value;
+        read[i] = value;
         at += length + 1;
     }
-    memcpy(vector, read, sizeof(read));
+    memcpy(place, read, sizeof(read));
+    return true;
+}
+
+bool fl_text_vector(const char *text, float vector[3], struct fl_error *error)
+{
+    double read[3];
+    if (!fl_text_place(text, read, error))
+        return false;
+    for (unsigned i = 0; i < 3; i++)
+        vector[i] = (float)read[i];
     return true;
 }
 

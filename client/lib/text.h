@@ -22,6 +22,7 @@ bool fl_text_duration(const char *text, double max_s, double *seconds, struct fl
 bool fl_text_size(const char *text, uint32_t *width, uint32_t *height, struct fl_error *error);
 /* "X,Y,Z" */
 bool fl_text_vector(const char *text, float vector[3], struct fl_error *error);
+bool fl_text_place(const char *text, double place[3], struct fl_error *error);
 /* "#RRGGBB" as displays have it, to linear. */
 bool fl_text_colour(const char *text, float linear[3], struct fl_error *error);
 /* "A", "A-B" or "A-B:STEP"; A <= B, STEP >= 1. */

@@ -39,6 +39,7 @@ struct image {
     bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */
     struct image_window window;              /* EXR; no width: pixels are the whole picture */
     const char *model;                       /* for the metadata; may be empty */
+    const float *origin;                     /* for the metadata: subtracted from all places; NULL or 0: nothing */
     const struct message_frame_begin *begin; /* encoding raw */
     const struct message_frame_end *end;
     const uint8_t *pixels;

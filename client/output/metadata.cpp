@@ -87,6 +87,12 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     std::snprintf(digest, sizeof(digest), "%016" PRIx64, begin.digest);
     std::vector<metadata_entry> entries;
     add_text(entries, "model", image.model);
+    if (image.origin && (image.origin[0] != 0 || image.origin[1] != 0 || image.origin[2] != 0)) {
+        char origin[64];
+        std::snprintf(origin, sizeof(origin), "%.9g,%.9g,%.9g", static_cast<double>(image.origin[0]),
+                      static_cast<double>(image.origin[1]), static_cast<double>(image.origin[2]));
+        add_text(entries, "origin", origin);
+    }
     add_count(entries, "frame", begin.frame);
     if (image.full_metadata)
         add_count(entries, "revision", begin.revision);

@@ -25,6 +25,7 @@ struct request {
     uint32_t number;
     char path[4097], format[17], model[4097];
     bool half, named;
+    float origin[3];
     unsigned quality;
     struct text *texts; /* to be drawn into it */
     size_t text_count;
@@ -45,6 +46,7 @@ static void start_request(struct request *request, uint32_t number, const struct
     *request = (struct request){.number = number, .named = true};
     request->half = wanted->half != 0;
     request->quality = wanted->quality;
+    memcpy(request->origin, wanted->origin, sizeof(request->origin));
     snprintf(request->path, sizeof(request->path), "%s", wanted->path);
     snprintf(request->format, sizeof(request->format), "%s", wanted->format);
     snprintf(request->model, sizeof(request->model), "%s", wanted->model);
@@ -112,6 +114,7 @@ static void write_image(struct exporter *exporter, const struct message_frame_en
                                 .full_metadata = exporter->options->full_metadata,
                                 .window = exporter->options->window,
                                 .model = request->model,
+                                .origin = request->origin,
                                 .begin = &request->incoming.begin,
                                 .end = end,
                                 .pixels = request->incoming.pixels};

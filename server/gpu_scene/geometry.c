@@ -437,8 +437,9 @@ static void classify_material(struct gpu_scene *gpu, const struct scene *scene, 
     gpu->has_tangents |= material->textures[MATERIAL_NORMAL].texture ||
                          material->textures[MATERIAL_BUMP].texture ||
                          material->textures[MATERIAL_CLEARCOAT_NORMAL].texture || material->anisotropy != 0.0f;
-    bool varies = material->textures[MATERIAL_BASE_COLOUR].texture ||
-                  material->textures[MATERIAL_TRANSMISSION].texture || (*geometry_flags & GEOMETRY_HAS_COLOURS);
+    bool varies =
+        material->textures[MATERIAL_BASE_COLOUR].texture || material->textures[MATERIAL_TRANSMISSION].texture ||
+        material->textures[MATERIAL_METALLIC_ROUGHNESS].texture || (*geometry_flags & GEOMETRY_HAS_COLOURS);
     gpu->has_varied_alpha |= varies && (material->alpha_mode != ALPHA_OPAQUE || material->transmission > 0.0f);
 }
 

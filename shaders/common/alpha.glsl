@@ -88,7 +88,12 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, 
         return vec3(0.0);
     vec3 through = vec3(0.0);
 #ifdef HAS_TRANSMISSION // else only alpha is needed, and no colour is decoded
-    float transmission = m.transmission * (1.0 - m.metallic);
+    float metallic = m.metallic;
+#ifndef EVEN_ALPHA
+    if (metallic > 0.0 && m.texture_metallic_roughness != 0u)
+        metallic *= sample_slot(m.texture_metallic_roughness, point.uv01).b;
+#endif
+    float transmission = m.transmission * (1.0 - metallic);
 #ifndef EVEN_ALPHA
     if (transmission > 0.0 && m.texture_transmission != 0u)
         transmission *= sample_slot(m.texture_transmission, point.uv01).r;

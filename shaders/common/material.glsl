@@ -149,9 +149,9 @@ mat2x3 footprint_edges(vec3 geometric, vec3 direction, float width)
 
 #ifdef HAS_ANISOTROPY_MAP
 // KHR_materials_anisotropy: by the texture's direction, and weakened by its strength. Directions are complex numbers.
-vec3 turned_grain(vec3 grain, vec3 texel)
+vec3 turned_grain(vec3 grain, vec3 texel, hit h, texture_slot slot)
 {
-    vec2 turn = texel.rg * 2.0 - 1.0;
+    vec2 turn = turned_by_slot(h, slot, texel.rg * 2.0 - 1.0);
     turn = dot(turn, turn) > 1e-6 ? normalize(turn) : vec2(1.0, 0.0);
     return vec3(grain.x * turn.x - grain.y * turn.y, grain.x * turn.y + grain.y * turn.x, grain.z * texel.b);
 }
@@ -202,7 +202,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
             colour *= texel;
         } else if (i == NORMAL) {
             if ((h.material & HIT_HAS_TANGENT) != 0u)
-                s.normal = mapped_normal(h, s.normal, texel.xyz, slot.strength);
+                s.normal = mapped_normal(h, s.normal, texel.xyz, slot);
         } else if (i == METALLIC_ROUGHNESS) {
             s.metallic *= texel.b;
             s.roughness *= texel.g;
@@ -223,7 +223,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
             s.coat_roughness *= texel.g;
         } else if (i == COAT_NORMAL) {
             if ((h.material & HIT_HAS_TANGENT) != 0u)
-                s.coat_normal = mapped_normal(h, unmapped, texel.xyz, slot.strength);
+                s.coat_normal = mapped_normal(h, unmapped, texel.xyz, slot);
 #endif
 #ifdef HAS_IRIDESCENCE
         } else if (i == FILM) {
@@ -245,7 +245,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 #endif
 #ifdef HAS_ANISOTROPY_MAP
         } else if (i == GRAIN) {
-            s.grain = turned_grain(s.grain, texel.rgb);
+            s.grain = turned_grain(s.grain, texel.rgb, h, slot);
 #endif
         } else {
             s.transmission *= texel.r;

@@ -82,10 +82,29 @@ vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, texture_footpri
 #endif
 
 #ifdef HAS_TEXTURES
-vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
+// Whether the tangent at a hit is one of the mesh, which is made for the image as it lies there.
+bool has_own_tangent(hit h)
+{
+    return h.instance != HIT_NO_PRIMITIVE && (geometry_at(instance_at(h.instance).geometry).flags & GEOMETRY_HAS_TANGENTS) != 0u;
+}
+
+// A direction of an image, x along its columns and y up, as one of the texture coordinates, along which the tangent runs:
+// a slot may turn and mirror the image on the surface.
+vec2 turned_by_slot(hit h, texture_slot slot, vec2 direction)
+{
+    vec2 along = slot.uv_matrix.wz; // the first row of the inverse, but for its length; v runs down and y up
+    float turns = slot.uv_matrix.x * slot.uv_matrix.w - slot.uv_matrix.y * slot.uv_matrix.z;
+    bool keeps = along.y == 0.0 && along.x > 0.0 && turns > 0.0;
+    if (keeps || turns == 0.0 || has_own_tangent(h))
+        return direction;
+    along *= sign(turns) * inversesqrt(dot(along, along));
+    return direction.x * along + direction.y * sign(turns) * vec2(-along.y, along.x);
+}
+
+vec3 mapped_normal(hit h, vec3 normal, vec3 texel, texture_slot slot)
 {
     texel = texel * 2.0 - 1.0;
-    texel.xy *= strength;
+    texel.xy = turned_by_slot(h, slot, texel.xy * slot.strength);
     vec4 tangent = unpack_tangent(h.tangent);
     vec3 along = tangent.xyz - dot(tangent.xyz, normal) * normal;
     float squared = dot(along, along);

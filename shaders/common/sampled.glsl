@@ -59,13 +59,18 @@ float sample_transmission(uvec4 words)
     return sample_share(words.z, int(SAMPLE_TRANSMISSION_SHIFT), 4);
 }
 
+float sample_metallic(uvec4 words)
+{
+    return sample_share(words.z, int(SAMPLE_METALLIC_SHIFT), 4);
+}
+
 surface_sample unpack_sample(uvec4 words)
 {
     surface_sample s;
     s.base_colour = sample_base_colour(words);
     s.normal = unpack_unit(words.y);
     s.material = sample_material(words);
-    s.metallic = sample_share(words.z, int(SAMPLE_METALLIC_SHIFT), 4);
+    s.metallic = sample_metallic(words);
     s.transmission = sample_transmission(words);
     s.roughness = sample_share(words.w, 0, 8);
     s.occlusion = sample_share(words.w, 8, 8);

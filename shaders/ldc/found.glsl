@@ -31,7 +31,7 @@ vec3 transmittance_of_sample(uvec4 words)
     material m = material_at(sample_material(words));
     vec3 through = vec3(0.0);
 #ifdef HAS_TRANSMISSION
-    float transmission = m.transmission * (1.0 - m.metallic) * sample_transmission(words);
+    float transmission = m.transmission * (1.0 - m.metallic * sample_metallic(words)) * sample_transmission(words);
     if (transmission > 0.0)
         through = transmission * clamp(m.base_colour.rgb * sample_base_colour(words).rgb, 0.0, 1.0) *
                   vec3(m.body_red, m.body_green, m.body_blue);

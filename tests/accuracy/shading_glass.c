@@ -119,6 +119,47 @@ TEST(a_body_takes_light_by_the_way_through_it)
         }
 }
 
+/* A pane between the light and what is seen. */
+static float lit_through(struct fixture *fixture, float metallic, bool has_texture)
+{
+    static const float above[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2},
+                       down[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 3};
+    static const uint8_t no_metal[4] = {255, 255, 0, 255};
+    fixture_clear((void **)&fixture);
+    struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
+    texture->base.id = fixture->next_id++;
+    texture->width = texture->height = 1;
+    texture->format = TEXTURE_RGBA8_LINEAR;
+    texture->texels = fixture_blob(no_metal, sizeof(no_metal));
+    const struct texture_use use = {
+        .texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
+    struct scene_material *glass = clear_glass(fixture, 1.5);
+    glass->metallic = metallic;
+    if (has_texture)
+        glass->textures[MATERIAL_METALLIC_ROUGHNESS] = use;
+    fixture_square(fixture, 10.0f, glass->base.id, above);
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    struct scene_light *light = &fixture_edit(fixture, OBJECT_LIGHT)->set.light;
+    light->base.id = fixture->next_id++;
+    light->kind = LIGHT_DIRECTIONAL;
+    light->colour[0] = light->colour[1] = light->colour[2] = (float)PI;
+    fixture_node(fixture, NODE_LIGHT, light->base.id, down);
+    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture_look(fixture, 0.0f, 0.0f, 1.0f, 0.5f);
+    struct frame_result result = fixture_render(fixture);
+    const float value = fixture_pixel(&result, 16, 16)[0];
+    frame_result_finish(&result);
+    return value;
+}
+
+TEST(light_passes_glass_whose_texture_says_that_it_is_no_metal)
+{
+    const float clear = lit_through(*state, 0.0f, false);
+    assert_true(clear > 0.5f);
+    assert_near(lit_through(*state, 1.0f, true), clear, 1e-6);
+    assert_near(lit_through(*state, 1.0f, false), 0.0, 1e-6);
+}
+
 TEST(light_is_totally_reflected_inside_glass)
 {
     struct fixture *fixture = *state;

@@ -39,16 +39,32 @@ static float render_middle(struct fixture *fixture)
     return value;
 }
 
-static float render_normal_map(struct fixture *fixture, uint8_t red, uint8_t green, float light_x, float light_y)
+/* KHR_texture_transform: the image turned by so many radians, and scaled. */
+static void turn_slot(struct texture_use *use, double angle, double scale_u, double scale_v)
+{
+    const float rows[6] = {(float)(cos(angle) * scale_u),  (float)(sin(angle) * scale_v), 0.0f,
+                           (float)(-sin(angle) * scale_u), (float)(cos(angle) * scale_v), 0.0f};
+    memcpy(use->uv_transform, rows, sizeof(rows));
+}
+
+static float render_placed_normal_map(struct fixture *fixture, uint8_t red, uint8_t green, const double place[3],
+                                      float light_x, float light_y)
 {
     fixture_clear((void **)&fixture);
     const uint8_t texel[4] = {red, green, 218, 255};
     struct texture_use use = one_texture(fixture, 1, 1, texel, 1.0f);
+    turn_slot(&use, place[0], place[1], place[2]);
     struct scene_material *material = fixture_material(fixture);
     material->textures[MATERIAL_NORMAL] = use;
     fixture_square(fixture, 1.0f, material->base.id, NULL);
     light_from(fixture, light_x, light_y);
     return render_middle(fixture);
+}
+
+static float render_normal_map(struct fixture *fixture, uint8_t red, uint8_t green, float light_x, float light_y)
+{
+    static const double as_it_is[3] = {0, 1, 1};
+    return render_placed_normal_map(fixture, red, green, as_it_is, light_x, light_y);
 }
 
 ALL_TESTS(fixture_setup, fixture_teardown)
@@ -62,6 +78,24 @@ TEST(a_normal_map_tilts_red_to_the_right_and_green_up)
     assert_near(render_normal_map(*state, 218, 128, -1.0f, 0.0f), 0.0, 0.01);
     assert_near(render_normal_map(*state, 128, 218, 0.0f, 1.0f), 1.0, 0.01);
     assert_near(render_normal_map(*state, 128, 218, 0.0f, -1.0f), 0.0, 0.01);
+}
+
+TEST(a_normal_map_turns_with_its_image_on_the_surface)
+{
+    /* turn and scale of the slot; where red and green point then */
+    static const struct {
+        double place[3];
+        float red[2], green[2];
+    } rows[] = {{{PI / 2, 1, 1}, {0, -1}, {1, 0}},  {{PI, 1, 1}, {-1, 0}, {0, -1}},
+                {{-PI / 2, 2, 2}, {0, 1}, {-1, 0}}, {{0, -1, 1}, {-1, 0}, {0, 1}},
+                {{0, 1, -1}, {1, 0}, {0, -1}},      {{0, -3, -3}, {-1, 0}, {0, -1}},
+                {{PI / 2, -1, 1}, {0, -1}, {-1, 0}}};
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        const float *red = rows[i].red, *green = rows[i].green;
+        assert_near(render_placed_normal_map(*state, 218, 128, rows[i].place, red[0], red[1]), 1.0, 0.01);
+        assert_near(render_placed_normal_map(*state, 218, 128, rows[i].place, -red[0], -red[1]), 0.0, 0.01);
+        assert_near(render_placed_normal_map(*state, 128, 218, rows[i].place, green[0], green[1]), 1.0, 0.01);
+    }
 }
 
 static float render_bump_ramp(struct fixture *fixture, float strength, float light_x)
@@ -160,7 +194,7 @@ TEST(the_environment_turns_about_y_for_the_eye_and_for_surfaces_alike)
 
 /* KHR_materials_anisotropy: red and green are a direction about the tangent, blue a share of the strength; the
  * same as a rotation and a strength of the material, with the same random numbers. */
-static void expect_turned_grain(struct fixture *fixture, unsigned integrator)
+static void expect_turned_grain(struct fixture *fixture, unsigned integrator, double turn)
 {
     static const uint8_t texel[4] = {64, 224, 128, 255};
     const double x = 2.0 * 64 / 255 - 1.0, y = 2.0 * 224 / 255 - 1.0;
@@ -172,9 +206,11 @@ static void expect_turned_grain(struct fixture *fixture, unsigned integrator)
         brushed->metallic = 1.0f;
         brushed->roughness = 0.3f;
         brushed->anisotropy = way == 0 ? 0.9f : 0.9f * 128 / 255;
-        brushed->anisotropy_rotation = way == 1 ? 0.4f + (float)atan2(y, x) : 0.4f;
-        if (way == 0)
+        brushed->anisotropy_rotation = way == 1 ? 0.4f + (float)(atan2(y, x) - turn) : 0.4f;
+        if (way == 0) {
             brushed->textures[MATERIAL_ANISOTROPY] = one_texture(fixture, 1, 1, texel, 1.0f);
+            turn_slot(&brushed->textures[MATERIAL_ANISOTROPY], turn, 1, 1);
+        }
         fixture_square(fixture, 10.0f, brushed->base.id, NULL);
         light_from(fixture, 0.3f, 0.1f);
         fixture->request.integrator = integrator;
@@ -199,5 +235,6 @@ TEST(a_texture_turns_the_grain_and_weakens_it)
                                            INTEGRATOR_RAYCAST};
     const size_t count = getenv("FARLIGHT_TEST_LONG") ? sizeof(integrators) / sizeof(integrators[0]) : 1;
     for (size_t i = 0; i < count; i++)
-        expect_turned_grain(*state, integrators[i]);
+        expect_turned_grain(*state, integrators[i], 0);
+    expect_turned_grain(*state, INTEGRATOR_PATH, 1.1); /* the image lies turned on the surface */
 }

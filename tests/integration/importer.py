@@ -120,7 +120,7 @@ class Result:
         self.status = None
         self.stderr = ""
         self.seconds = 0.0
-        self.times = None
+        self.times = self.origin = None
 
     def of(self, kind):
         return [edit for edit_kind, edit in self.edits if edit_kind == kind]
@@ -244,7 +244,8 @@ class Peer:
                 self.ok(request)
         elif kind == IMPORT_DONE:
             result.done = True
-            result.times = Fields(payload).take("5Q")
+            fields = Fields(payload)
+            result.times, result.origin = fields.take("5Q"), fields.take("3f")
         elif kind == IMPORT_BOUNDS:
             values = Fields(payload).take("II6f")
             if not all(lower <= upper for lower, upper in zip(values[2:5], values[5:])):

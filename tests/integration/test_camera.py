@@ -3,7 +3,7 @@
 import json
 import math
 
-from farlight_test import OneDaemon, bundled_scenes, farlight, read_png
+from farlight_test import OneDaemon, bundled_scenes, exr_attributes, farlight, read_png
 
 COLOURS = {"front": (1, 0, 0), "back": (0, 1, 0), "left": (0, 0, 1), "right": (1, 1, 0), "top": (0, 1, 1), "bottom": (1, 0, 1)}
 # x -2 .. 2, y 0 .. 1, z -0.5 .. 0.5: each side has its colour.
@@ -33,6 +33,35 @@ class Sides(OneDaemon):
         rows = [y for y, row in enumerate(picture) if any(p[3] > 127 for p in row)]
         columns = [x for x in range(len(picture[0])) if any(row[x][3] > 127 for row in picture)]
         return columns[0], columns[-1], rows[0], rows[-1]
+
+    def test_places_of_the_camera_are_those_of_a_model_far_from_the_origin(self):
+        """By options, keys and a shot; half a metre is lost in floats there."""
+        far = self.folder / "far.obj"
+        base = (452340.0, 312.0, 5411190.0)
+        far.write_text("mtllib box.mtl\n" + "".join(f"v {' '.join(str(a + b) for a, b in zip(base, corner))}\n" for corner in CORNERS) +
+                       "".join(f"usemtl {name}\nf {' '.join(str(i) for i in corners)}\n" for name, corners in SIDES.items()))
+
+        def places(origin, *all_places):
+            return [[round(a + b, 3) for a, b in zip(origin, place)] for place in all_places]
+        made = []
+        # The middle of the box is 0, 0.5, 0, which is rounded to whole metres.
+        for model, origin in ((self.box, (0, 0, 0)), (far, base)):
+            eye, target, other = places(origin, (3.125, 2.25, 6.375), (0.25, 0.5, 0), (-3, 2, 6))
+            texts = [",".join(map(str, one)) for one in (eye, target)]
+            keys, shot = self.folder / "keys.json", self.folder / "shot.json"
+            keys.write_text(json.dumps([{"time": i, "eye": one, "look_at": target} for i, one in enumerate((eye, other))]))
+            shot.write_text(json.dumps({"model": model.name, "frames": "1-2", "camera": {"eye": eye, "look_at": target, "dolly": {"to": other}}}))
+            pictures = [self.render(f"--eye={texts[0]}", f"--look-at={texts[1]}", model=model, size="48x27")]
+            for options in ((model, "--keys", keys, "--frames", "1-2"), ("--script", shot)):
+                self.expect(farlight("animate", *options, "-o", self.folder / "f-%d.png", "--size", "48x27", "--samples", "4"), 0)
+                pictures += [read_png(self.folder / f"f-{i}.png") for i in (1, 2)]
+            made.append(pictures)
+        self.assertEqual(made[0][0], made[1][0])
+        self.expect(farlight("render", far, "-o", self.folder / "x.exr", "--size", "8x8", "--samples", "1"), 0)
+        self.assertIn(b"452340,313,5411190", exr_attributes(self.folder / "x.exr")["farlight/origin"])
+        # Places of keys and shots are floats, which are half a metre apart there.
+        for near, away in zip(made[0][1:], made[1][1:]):
+            self.assertLess(sum(a != b for a, b in zip(b"".join(near[2]), b"".join(away[2]))), len(near[2]) * len(near[2][0]) // 2)
 
     def test_each_side_is_the_one_that_it_is_called(self):
         for name, colour in COLOURS.items():

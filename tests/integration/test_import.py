@@ -130,7 +130,8 @@ class Hostile(Case):
                     with open(path + ".report.json", encoding="utf-8") as file:
                         accepted = json.load(file)["issues"]["numErrors"] == 0
                     nowhere = any(path.endswith(ending) for ending in NOT_TO_BE_HAD)
-                    self.assertFalse(accepted and result.status == (0 if nowhere else 1), result.text())
+                    shows_nothing = "contains nothing that can be shown" in result.text()
+                    self.assertFalse(accepted and not shows_nothing and result.status == (0 if nowhere else 1), result.text())
                 imported += result.status == 0
                 refused += result.status == 1
         print("hostile: %d imported, %d refused" % (imported, refused))
@@ -340,7 +341,7 @@ class Written(importer.Written):
         self.assertEqual(result.of(SET_MESH)[0]["triangles"], 12)
         moved = {"mode": 1, "attributes": {"POSITION": 0}, "targets": [{"POSITION": 0}]}
         self.assertIn("at rest", self.run_modes(moved).text())
-        self.assertIn("without positions", self.run_modes({"mode": 3, "attributes": {}}).text())
+        self.assertIn("without positions", self.run_modes({"mode": 3, "attributes": {}}, status=1).text())
         for mode in (0, 1):
             wrong = self.run_modes({"mode": mode, "attributes": {"POSITION": 0}, "indices": 2}, last=4, status=1)
             self.assertIn("index 4 (number 3) is beyond the 4 vertices", wrong.text())

@@ -130,7 +130,7 @@ class ThreeMf(importer.Written):
         for name, data, expected in (
                 ("checksum.3mf", self.with_other_checksum(whole), "checksum of '3D/main.model' is wrong"),
                 ("bytes.3mf", whole[:at] + bytes(40) + whole[at + 40:], "the 3MF file cannot be read: "),
-                ("elsewhere.3mf", whole.replace(b"3D/main.model", b"3D/mair.model"), "its model '3D/main.model' is not in it")):
+                ("elsewhere.3mf", whole.replace(b"3D/main.model", b"3D/main.modem"), "there is no model in it")):
             with self.subTest(name):
                 self.assertIn(expected, self.import_text(name, data, 1).text())
 

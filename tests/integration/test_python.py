@@ -547,6 +547,8 @@ esac
         with self.assertRaises(farlight.ImportFailed) as raised:
             farlight.load(bundled_scenes() / "teapot.glb", max_bytes=1000)
         self.assertEqual(raised.exception.field, "max_bytes")
+        (self.folder / "far.obj").write_text("v 452340 312 5411190\nv 452342 312 5411190\nv 452340 314 5411190\nf 1 2 3\n")
+        self.assertEqual(farlight.load(self.folder / "far.obj").origin, (452341, 313, 5411190))
 
     @long_test
     def test_the_man_page_has_every_option_of_the_command_line(self):

@@ -416,8 +416,9 @@ class ThroughADaemon(Case):
         with tempfile.TemporaryDirectory(prefix="farlight-test-") as folder:
             path = os.path.join(folder, "names.gltf")
             with open(path, "w", encoding="utf-8") as file:
-                json.dump({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
-                           "nodes": [{"camera": 0, "name": name}],
+                json.dump({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+                           "nodes": [{"camera": 0, "name": name}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}],
+                           "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point"}]}},
                            "cameras": [{"type": "perspective", "name": name, "perspective": {"yfov": 1, "znear": 1}}]}, file)
             table = self.expect(farlight("info", path), 0).stdout
             line = self.expect(farlight("info", path, "--json"), 0).stdout

@@ -155,7 +155,7 @@ class Client:
             self._link = None
 
     def _ensure(self) -> None:
-        """Connects, and again if the connection was lost, or is found to be."""
+        """Connects, and again if the connection was lost, or is found to be; anew in a forked process."""
         if self._closed:
             raise ConnectionLost("the client is closed", retryable=False)
         self._leave_parent()

@@ -67,6 +67,8 @@ class _Import:
         elif isinstance(message, messages.EditCommit):
             self.out += framing.pack(messages.Ok(1), request)
         elif isinstance(message, messages.ImportDone):
+            x, y, z = message.origin
+            self.scene.origin = (x, y, z)
             self.is_done = True
         elif isinstance(message, messages.ImportProgress):
             if self.progress is not None:

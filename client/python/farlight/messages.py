@@ -2729,6 +2729,7 @@ class ImportDone(Message):
     parse_ns: parsing and decoding
     hash_ns: hashing blobs
     total_ns: from the start of main to here
+    origin: subtracted from all places of models that are far from the origin; 0: nothing was
     """
     TYPE: ClassVar[int] = 0x8304
     SENDER: ClassVar[str] = "local"
@@ -2739,12 +2740,14 @@ class ImportDone(Message):
         _f.whole("parse_ns", "Q", 0, 18446744073709551615),
         _f.whole("hash_ns", "Q", 0, 18446744073709551615),
         _f.whole("total_ns", "Q", 0, 18446744073709551615),
+        _f.real("origin", -1e12, 1e12, 3),
     )
     read_bytes: int = 0
     read_ns: int = 0
     parse_ns: int = 0
     hash_ns: int = 0
     total_ns: int = 0
+    origin: Sequence[float] = (0.0, 0.0, 0.0)
 
 
 @dataclass
@@ -2784,6 +2787,7 @@ class ExportImage(Message):
 
     half: EXR: 1 stores half floats
     quality: JPEG and WebP
+    origin: for the metadata: subtracted from all places of the model; 0: nothing was
     path: PNG, JPEG, EXR, HDR, WebP, TIFF or GIF by its ending; written under a temporary name and renamed
     format: the ending to assume if the path has none; may be empty
     model: for the metadata
@@ -2794,12 +2798,14 @@ class ExportImage(Message):
     FIELDS: ClassVar[tuple[Field, ...]] = (
         _f.whole("half", "I", 0, 1),
         _f.whole("quality", "I", 1, 100),
+        _f.real("origin", -1e12, 1e12, 3),
         _f.text("path", 4096),
         _f.text("format", 16),
         _f.text("model", 4096),
     )
     half: int = 0
     quality: int = 1
+    origin: Sequence[float] = (0.0, 0.0, 0.0)
     path: str = ""
     format: str = ""
     model: str = ""

@@ -28,10 +28,11 @@ Textures = Union[Object, Mapping[Union[int, str], Object], None]
 
 class Scene(Objects):
     """Objects by number. `sharing`: who else may attach to it, and whether it lingers (private, kept, shared; the last
-    two need a name)."""
+    two need a name). `origin`: what farlight.load() subtracted from all places of a model that is far from the origin."""
 
     def __init__(self, name: str = "", sharing: Sharing | str = Sharing.PRIVATE) -> None:
         super().__init__(name, sharing)
+        self.origin = (0.0, 0.0, 0.0)
         self._unplaced: dict[Object, None] = {}  # meshes and spheres that no node shows yet
 
     def set(self, edit: Message) -> Object:

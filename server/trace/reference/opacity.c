@@ -32,13 +32,15 @@ static void take_material(struct opacity_material *out, const struct scene *scen
     *out = (struct opacity_material){
         .alpha_mode = in->alpha_mode,
         .alpha_cutoff = in->alpha_cutoff,
-        .transmission = in->transmission * (1.0f - in->metallic),
+        .transmission = in->transmission,
+        .metallic = in->metallic,
     };
     memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
     for (int i = 0; i < 3; i++)
         out->body_tint[i] = scene_material_body_tint(in, i);
     take_texture(&out->base_colour_texture, scene, &in->textures[MATERIAL_BASE_COLOUR]);
     take_texture(&out->transmission_texture, scene, &in->textures[MATERIAL_TRANSMISSION]);
+    take_texture(&out->metallic_texture, scene, &in->textures[MATERIAL_METALLIC_ROUGHNESS]);
 }
 
 bool opacity_materials_init(struct opacity_materials *materials, const struct scene *scene,
@@ -63,6 +65,7 @@ void opacity_materials_finish(struct opacity_materials *materials)
     for (uint32_t i = 0; i < materials->count && materials->list; i++) {
         blob_unref(materials->list[i].base_colour_texture.texels);
         blob_unref(materials->list[i].transmission_texture.texels);
+        blob_unref(materials->list[i].metallic_texture.texels);
     }
     free(materials->list);
     hashmap_finish(&materials->index_by_id);
@@ -298,15 +301,17 @@ void opacity_transmittance(const struct opacity_surface *surface, const struct o
     if (!lets_light_pass(material))
         return;
     const struct attributes at = attributes_at(surface, point);
-    float colour[4], texel[4] = {1.0f, 1.0f, 1.0f, 1.0f};
+    float colour[4], texel[4] = {1.0f, 1.0f, 1.0f, 1.0f}, metal[4] = {1.0f, 1.0f, 1.0f, 1.0f};
     base_colour_at(material, &at, colour);
     bool is_open = is_cutout(material) && colour[3] < material->alpha_cutoff;
     if (material->transmission > 0.0f)
         reference_texture_sample(&material->transmission_texture, at.uv, texel);
+    if (material->transmission > 0.0f)
+        reference_texture_sample(&material->metallic_texture, at.uv, metal);
     float alpha = material->alpha_mode == ALPHA_BLEND ? fminf(fmaxf(colour[3], 0.0f), 1.0f) : 1.0f;
     for (int k = 0; k < 3; k++) {
-        float through =
-            material->transmission * texel[0] * fminf(fmaxf(colour[k], 0.0f), 1.0f) * material->body_tint[k];
+        float through = material->transmission * (1.0f - material->metallic * metal[2]) * texel[0] *
+                        fminf(fmaxf(colour[k], 0.0f), 1.0f) * material->body_tint[k];
         transmittance[k] = is_open ? 1.0f : stops ? 0.0f : (1.0f - alpha) + alpha * through;
     }
 }

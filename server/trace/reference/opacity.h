@@ -24,9 +24,9 @@ struct opacity_material {
     enum alpha_mode alpha_mode;
     float base_colour[4];
     float alpha_cutoff;
-    float transmission; /* of what is not metal */
+    float transmission, metallic;
     float body_tint[3]; /* scene_material_body_tint() */
-    struct opacity_texture base_colour_texture, transmission_texture;
+    struct opacity_texture base_colour_texture, transmission_texture, metallic_texture;
 };
 
 struct opacity_materials {
