@@ -158,6 +158,7 @@ static int animate(int argc, char **argv, bool is_turntable)
     struct animation animation = {0};
     bool good = read_all(&animation, argc, argv);
     animation.job.is_orbit |= is_turntable;
+    animation.job.filters = true;
     good = good && cli_series_complete(&animation.job);
     const int status = good ? run(&animation) : cli_report(&animation.job.error);
     cli_series_finish(&animation.job);

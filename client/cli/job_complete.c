@@ -402,15 +402,26 @@ static bool complete_crop(struct cli_job *job)
     return fl_error_remedy(&job->error, "leave out one of them");
 }
 
+/* Files in linear light are for programs that have filters of their own. */
+static void complete_denoise(struct cli_job *job)
+{
+    const bool is_shown = job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8;
+    if (!job->has_denoise && job->filters && is_shown && job->options.crop_width == 0)
+        job->options.denoise = PROTOCOL_DENOISE_AUTO;
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job) || !complete_format(job))
         return false;
     complete_samples(job, is_series);
     complete_integrator(job);
-    return cli_views_complete(job, is_series) && complete_noise(job) && complete_crop(job) &&
-           complete_ground(job) && complete_tracer(job) && complete_clips(job) &&
-           complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
+    if (!cli_views_complete(job, is_series) || !complete_noise(job) || !complete_crop(job) ||
+        !complete_ground(job) || !complete_tracer(job) || !complete_clips(job) ||
+        !complete_outputs(job, is_series) || !complete_encoding(job) || !complete_camera(job))
+        return false;
+    complete_denoise(job);
+    return true;
 }
 
 bool cli_job_complete_view(struct cli_job *job)

@@ -111,7 +111,8 @@ static const struct argp_option special[] = {
      "Show the shadows of the model on a ground beneath it, which is not seen itself; also over no background",
      CLI_GROUP_OUTPUT},
     {"denoise", KEY_DENOISE, "on|off|auto", OPTION_ARG_OPTIONAL,
-     "Filter the noise of few samples out of the picture (default: off; of views: auto, up to 64 samples)",
+     "Filter the noise of few samples out of the picture (default: auto, up to 64 samples; off for EXR and HDR "
+     "files, --crop and comparisons)",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
@@ -360,6 +361,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         job->options.ground = 1;
         return 0;
     case KEY_DENOISE:
+        job->has_denoise = true;
         return protocol_denoise_parse(value ? value : "on", &job->options.denoise)
                    ? 0
                    : cli_unknown_value(job, field, "denoise", value);

@@ -88,6 +88,7 @@ static bool complete(struct thumbnails *wanted)
         job->options.samples = SAMPLES;
         job->has_samples = true;
     }
+    job->filters = true;
     job->model = wanted->models.entries[0].path;
     job->output = wanted->to_folder ? "model.png" : wanted->output;
     if (!cli_job_complete(job, false))
@@ -326,7 +327,6 @@ int cli_thumbnail(int argc, char **argv)
     struct message_render defaults = fl_render_defaults();
     struct thumbnails wanted = {.columns = 0};
     defaults.width = defaults.height = CELL_PIXELS;
-    defaults.denoise = PROTOCOL_DENOISE_AUTO;
     const bool good =
         cli_job_begin(&wanted.job, defaults) && cli_parse(&argp, argc, argv, 0, &wanted) == 0 && complete(&wanted);
     const int status = good ? thumbnails(&wanted) : cli_report(&wanted.job.error);

@@ -21,9 +21,9 @@ FIGURES = farlight_test.ROOT / "tests/integration/figures.json"
 # and where it sends single paths another way. Any fault of shading does far more.
 TOLERANCE = 2.0
 ROOM = "cornell.glb"
-# Samples that stay in their pixel, or differences between integrators would be the filter's; and first hits as software finds
-# them, which a GPU chooses by what is faster.
-COMMON = ["--size", "96x54", "--samples", "4", "--filter", "box", "--primary", "raster"]
+# Samples that stay in their pixel, and no filter of noise, or differences between integrators would be the filters'; and first
+# hits as software finds them, which a GPU chooses by what is faster.
+COMMON = ["--size", "96x54", "--samples", "4", "--filter", "box", "--denoise=off", "--primary", "raster"]
 STORED = {
     "room": [ROOM, "--integrator", "whitted"],
     "textures": ["teapot.glb", "--integrator", "whitted"],
@@ -141,7 +141,7 @@ class Pictures(OneDaemon):
             return digests[options]
         for common, one, sign, other in (
                 (path, [], "!", ["--seed", "7"]), (path, ["--progressive=4"], "=", ["--progressive=2"]),
-                (path, ["--bounces", "2"], "=", ["--depth", "2"]), (path, [], "=", ["--denoise=off"]), (path, [], "!", ["--denoise"]),
+                (path, ["--bounces", "2"], "=", ["--depth", "2"]), (path, [], "!", ["--denoise"]),
                 (path, ["--denoise"], "=", ["--denoise=auto"]), (path, [], "!", ["--brdf", "ward"]), (bright, [], "=", ["--clamp", "1.25"]),
                 (bright, [], "!", ["--clamp", "0"]), ([*bright, "--samples", "16"], [], "=", ["--clamp", "2.5"]),
                 (ao, [], "!", ["--ao-distance", "0.01"]), (ao, ["--ao-distance", "10"], "!", ["--ao-distance", "10", "--ao-falloff", "4"]),
@@ -149,6 +149,17 @@ class Pictures(OneDaemon):
                 (abuffer, ["--abuffer-voxels", "auto"], "=", ["--abuffer-voxels", "32"])):
             with self.subTest(common=common, one=one, sign=sign, other=other):
                 (self.assertEqual if sign == "=" else self.assertNotEqual)(digest(*common, *one), digest(*common, *other))
+
+    def test_pictures_to_look_at_are_denoised_where_nothing_is_said(self):
+        """Not those in linear light, nor parts of a picture."""
+        def digest(name, *options):
+            result = farlight("render", bundled_scenes() / ROOM, "--size", "32x18", "--integrator", "path", "--samples", "4", *options,
+                              "-o", self.folder / name, "--timings=json")
+            return frames_of(self.expect(result, 0))[-1]["digest"]
+        for name, usual in (("x.png", "on"), ("x.jpg", "on"), ("x.exr", "off")):
+            with self.subTest(name):
+                self.assertEqual([digest(name) == digest(name, f"--denoise={word}") for word in ("on", "off")], [usual == "on", usual == "off"])
+        self.assertEqual(digest("x.png", "--crop", "8,8,8,8"), digest("x.png", "--crop", "8,8,8,8", "--denoise=off"))
 
     def test_wireframe_draws_edges_as_wide_as_asked(self):
         """One square, 40 pixels wide: of the row through its upper half lines 4 pixels wide cover 2 at each border, whose other
@@ -280,7 +291,7 @@ class Denoised(OneDaemon):
                 truth = self.picture(*options, "--samples", "128", "--seed", "7")
                 for samples in ("1", "4", "16"):
                     noisy, denoised = (math.dist(self.picture(*options, "--samples", samples, *more), truth)
-                                       for more in ((), ("--denoise",)))
+                                       for more in (("--denoise=off",), ()))
                     left = 0.65 if (scene, integrator, samples) == (ROOM, "path", "4") else self.AS_GOOD
                     self.assertLessEqual(denoised, left * noisy, (scene, integrator, samples))
 
