@@ -283,6 +283,7 @@ struct cli_job {
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
         is_orbit;
     bool has_samples, auto_samples; /* --samples auto */
+    bool without_studio;            /* --studio off */
     bool has_denoise, filters;      /* filters: 8-bit pictures are denoised where nothing is said */
     uint32_t usual_samples;         /* where nothing is said and the integrator has no number of its own; 0: 1 */
     char depth_field[24];           /* the option that set the depth, for messages; empty: none */

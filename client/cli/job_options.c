@@ -33,6 +33,7 @@ enum key {
     KEY_POINT_SIZE,
     KEY_BACKGROUND,
     KEY_GROUND,
+    KEY_STUDIO,
     KEY_DENOISE,
     KEY_CAMERA,
     KEY_EYE,
@@ -109,6 +110,9 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"ground", KEY_GROUND, NULL, 0,
      "Show the shadows of the model on a ground beneath it, which is not seen itself; also over no background",
+     CLI_GROUP_OUTPUT},
+    {"studio", KEY_STUDIO, "on|off", 0,
+     "Add what a model lacks for a picture: a sky beside its own lights (default on; not in rooms)",
      CLI_GROUP_OUTPUT},
     {"denoise", KEY_DENOISE, "on|off|auto", OPTION_ARG_OPTIONAL,
      "Filter the noise of few samples out of the picture (default: auto, up to 64 samples; off for EXR and HDR "
@@ -360,6 +364,10 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_GROUND:
         job->options.ground = 1;
         return 0;
+    case KEY_STUDIO:
+        job->without_studio = strcmp(value, "off") == 0;
+        return job->without_studio || strcmp(value, "on") == 0 ? 0
+                                                               : cli_unknown_value(job, field, "studio", value);
     case KEY_DENOISE:
         job->has_denoise = true;
         return protocol_denoise_parse(value ? value : "on", &job->options.denoise)

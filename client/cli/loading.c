@@ -50,6 +50,7 @@ static void fill_options(struct cli_loading *loading)
                                              .input_format = job->model_format,
                                              .environment = job->environment,
                                              .environment_degrees = job->environment_degrees,
+                                             .without_studio = job->without_studio,
                                              .variant = job->variant,
                                              .point_size = job->point_size,
                                              .note = on_note,

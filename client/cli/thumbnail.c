@@ -156,6 +156,7 @@ static struct fl_load_options load_options(const struct thumbnails *wanted, size
     return (struct fl_load_options){.model = wanted->models.entries[index].path,
                                     .environment = wanted->job.environment,
                                     .environment_degrees = wanted->job.environment_degrees,
+                                    .without_studio = wanted->job.without_studio,
                                     .point_size = wanted->job.point_size};
 }
 

@@ -197,6 +197,7 @@ struct fl_load_options {
     struct fl_import *started;     /* by fl_import_start; the load takes it over, also when it fails. `model`,
                                       its environment and `timeout_ms` are those given at its start */
     const char *variant;           /* of the model's materials, by name; NULL: the file's choice */
+    bool without_studio;           /* a model with lights has these alone, and no sky beside them */
     bool will_reload;              /* for fl_scene_reload: what is loaded is remembered, some bytes an object */
 };
 

@@ -26,9 +26,10 @@ ROOM = "cornell.glb"
 COMMON = ["--size", "96x54", "--samples", "4", "--filter", "box", "--denoise=off", "--primary", "raster"]
 STORED = {
     "room": [ROOM, "--integrator", "whitted"],
-    "textures": ["teapot.glb", "--integrator", "whitted"],
+    "textures": ["teapot.glb", "--integrator", "whitted", "--studio", "off"],
+    "sky beside lights": ["teapot.glb", "--integrator", "distributed"],
     "spheres": ["sphereflake-2.nff", "--integrator", "whitted"],
-    "moved": ["carousel.glb", "--integrator", "whitted", "--clip", "ride", "--time", "0.7", "--samples", "1"],
+    "moved": ["carousel.glb", "--integrator", "whitted", "--clip", "ride", "--time", "0.7", "--samples", "1", "--studio", "off"],
     "distributed": [ROOM, "--integrator", "distributed"],
     "raycast": [ROOM, "--integrator", "raycast"],
     "ao": [ROOM, "--integrator", "ao", "--ao-rays", "8"],
@@ -247,7 +248,7 @@ class Pictures(OneDaemon):
         """With an environment, or another model: the light that a display emits for its numbers, with the tone map's curve."""
         scene, sky = self.write_nff("l 0 0 7\nf 1 1 1 0.5 0 0 0 1\n" + self.SQUARE.format(0)), self.folder / "black.hdr"
         sky.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + bytes(8))
-        for more in (["--environment", sky], [bundled_scenes() / "teapot.glb", "--at", "50,0,0"]):
+        for more in (["--environment", sky], [bundled_scenes() / "teapot.glb", "--at", "50,0,0", "--studio", "off"]):
             plain, aces = (self.middle(scene, *more, "--tone-map", tone_map, "--size", "9x9", "--eye", "0,0,4", "--look-at", "0,0,0")[0]
                            for tone_map in ("none", "aces"))
             self.assertAlmostEqual(plain, 127.5, delta=1.5, msg=more)
