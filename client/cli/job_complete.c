@@ -217,8 +217,8 @@ static bool complete_camera(struct cli_job *job)
                          job->has_eye ? "--look-at" : "--eye") == 0;
     if (has_key && job->camera)
         return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
-    if (!has_key && job->has_up)
-        return cli_usage(job, "--up", "needs --eye and --look-at") == 0;
+    if (!has_key && job->has_up && !cli_turn_models(job))
+        return false;
     if (job->has_framing && (has_key || job->camera))
         return cli_usage(
                    job, job->camera ? "--camera" : "--eye",
@@ -262,6 +262,18 @@ bool cli_find_camera(struct message_render *render, const char *camera, const ch
         render->camera_node = first->node;
     }
     return true;
+}
+
+void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene)
+{
+    const bool shows = render->integrator == PROTOCOL_INTEGRATOR_WHITTED ||
+                       render->integrator == PROTOCOL_INTEGRATOR_DISTRIBUTED ||
+                       render->integrator == PROTOCOL_INTEGRATOR_PATH;
+    if (job->filters && !job->without_studio && !job->scene && shows &&
+        render->format == PROTOCOL_PIXEL_FORMAT_RGBA8 && render->background == PROTOCOL_BACKGROUND_ENVIRONMENT &&
+        render->camera_path != PROTOCOL_CAMERA_NODE && render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS &&
+        !fl_scene_is_lit(scene))
+        render->ground = 1;
 }
 
 /* Lenses, shutters and several samples need the integrator distributed; one sharp sample needs no random choices,

@@ -112,7 +112,8 @@ static const struct argp_option special[] = {
      "Show the shadows of the model on a ground beneath it, which is not seen itself; also over no background",
      CLI_GROUP_OUTPUT},
     {"studio", KEY_STUDIO, "on|off", 0,
-     "Add what a model lacks for a picture: a sky beside its own lights (default on; not in rooms)",
+     "Add what a model lacks for a picture: a ground where it has no light, else a sky beside its lights, but in "
+     "rooms (default on)",
      CLI_GROUP_OUTPUT},
     {"denoise", KEY_DENOISE, "on|off|auto", OPTION_ARG_OPTIONAL,
      "Filter the noise of few samples out of the picture (default: auto, up to 64 samples; off for EXR and HDR "
@@ -126,7 +127,9 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"eye", KEY_EYE, "X,Y,Z", 0, "Place of the camera; needs --look-at", CLI_GROUP_OUTPUT},
     {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "What is in the middle of the picture", CLI_GROUP_OUTPUT},
-    {"up", KEY_UP, "X,Y,Z", 0, "Upward direction (default 0,1,0)", CLI_GROUP_OUTPUT},
+    {"up", KEY_UP, "X,Y,Z|x|y|z", 0,
+     "Upward direction (default y); without --eye models are turned that were made with such an axis up",
+     CLI_GROUP_OUTPUT},
     {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45; 40 of a camera that sees all)",
      CLI_GROUP_OUTPUT},
     {"view", KEY_VIEW, "NAME", 0,
@@ -204,6 +207,17 @@ static error_t set_vector(struct cli_job *job, const char *field, const char *va
 {
     *is_set = true;
     return fl_text_vector(value, vector, &job->error) ? 0 : name_field(job, field);
+}
+
+/* "z" and "-z" as vectors. */
+static const char *axis_of(const char *value)
+{
+    static const char *const axes[][2] = {{"x", "1,0,0"},   {"y", "0,1,0"},   {"z", "0,0,1"},
+                                          {"-x", "-1,0,0"}, {"-y", "0,-1,0"}, {"-z", "0,0,-1"}};
+    for (size_t i = 0; i < sizeof(axes) / sizeof(axes[0]); i++)
+        if (strcmp(value, axes[i][0]) == 0)
+            return axes[i][1];
+    return value;
 }
 
 /* Formats of pictures and of models have no name in common. */
@@ -381,6 +395,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_LOOK_AT:
         return set_vector(job, field, value, job->key.look_at_world, &job->has_look_at);
     case KEY_UP:
+        value = axis_of(value);
         return set_vector(job, field, value, job->key.up_world, &job->has_up);
     case KEY_HALF:
         job->half_pixels = true;

@@ -150,6 +150,8 @@ void cli_loading_close(struct cli_loading *loading)
 
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error)
 {
-    return cli_find_camera(&job->options, job->camera, job->framed, job->has_framing || job->is_orbit, scene,
-                           error);
+    if (!cli_find_camera(&job->options, job->camera, job->framed, job->has_framing || job->is_orbit, scene, error))
+        return false;
+    cli_choose_ground(job, &job->options, scene);
+    return true;
 }

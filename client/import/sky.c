@@ -153,8 +153,8 @@ static bool has_environment(const struct import_scene *scene)
 /* As shared/sky.h of the shaders has it. */
 static void sky_at(double up, float radiance[3])
 {
-    static const float zenith[3] = {0.20f, 0.28f, 0.44f}, horizon[3] = {0.46f, 0.49f, 0.52f},
-                       ground[3] = {0.13f, 0.12f, 0.11f};
+    static const float zenith[3] = {0.15f, 0.20f, 0.30f}, horizon[3] = {0.34f, 0.36f, 0.38f},
+                       ground[3] = {0.10f, 0.095f, 0.09f};
     const float share = (float)(up < 0 ? fmin(-up * 4, 1) : up), *end = up < 0 ? ground : zenith;
     for (int c = 0; c < 3; c++)
         radiance[c] = horizon[c] + (end[c] - horizon[c]) * share;

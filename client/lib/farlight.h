@@ -273,6 +273,8 @@ FL_API bool fl_scene_find_clip(const struct fl_scene *scene, const char *which, 
  * they fit; other kinds are not known by name. */
 FL_API bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
                                  uint32_t *id, struct fl_error *error);
+/* Whether the models, as they were loaded, brought lights or an environment, or one was given. */
+FL_API bool fl_scene_is_lit(const struct fl_scene *scene);
 /* Whether such a light has a size that can change: a rectangle or a sphere. */
 FL_API bool fl_scene_light_has_size(const struct fl_scene *scene, uint32_t light);
 /* An unused identifier for an edit of the caller's, a new one at each call; 0: none left.

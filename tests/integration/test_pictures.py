@@ -162,6 +162,25 @@ class Pictures(OneDaemon):
                 self.assertEqual([digest(name) == digest(name, f"--denoise={word}") for word in ("on", "off")], [usual == "on", usual == "off"])
         self.assertEqual(digest("x.png", "--crop", "8,8,8,8"), digest("x.png", "--crop", "8,8,8,8", "--denoise=off"))
 
+    def test_a_model_without_light_of_its_own_stands_on_a_ground(self):
+        """In pictures to look at, and not where the command or the file says what is around it. An axis turns what had it up."""
+        model, sky = self.folder / "square.obj", ["--environment", bundled_scenes() / "sky.hdr"]
+        model.write_text("v -1 0 -1\nv 1 0 -1\nv 1 2 -1\nv -1 2 -1\nf 1 2 3 4\n")
+        view = ["--size", "32x18", "--samples", "1", "--integrator", "whitted"]
+
+        def digest(*options, name="x.png"):
+            result = farlight("render", *view, *options, "-o", self.folder / name, "--timings=json")
+            return frames_of(self.expect(result, 0))[-1]["digest"]
+        usual, bare = digest(model), digest(model, "--studio", "off")
+        self.assertNotEqual(usual, bare)
+        self.assertEqual(usual, digest(model, "--studio", "off", "--ground"))
+        for options in ([model, "--background", "#ffffff"], [model, *sky, "--integrator", "distributed"]):
+            self.assertNotEqual(digest(*options), digest(*options, "--ground"), options)
+        self.assertNotEqual(digest(model, name="x.exr"), digest(model, "--ground", name="x.exr"))
+        self.assertEqual(digest(model, "--up", "z"), digest(model, "--at", "0,0,0:-90,0,0"))
+        self.assertNotEqual(usual, digest(model, "--up", "z"))
+        self.assertIn("axis", self.expect(farlight("render", model, "--up", "1,1,0", "-o", "x.png"), 2).stderr)
+
     def test_wireframe_draws_edges_as_wide_as_asked(self):
         """One square, 40 pixels wide: of the row through its upper half lines 4 pixels wide cover 2 at each border, whose other
         halves lie outside, and sqrt(2) times 4 where the diagonal is crossed, which goes on to both sides of the edge."""
