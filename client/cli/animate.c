@@ -7,6 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Of a model that turns each edge is seen to creep. */
+#define TURNTABLE_SAMPLES 8u
+
 enum key {
     KEY_SHARD = 0x400,
     KEY_CHUNK,
@@ -173,6 +176,9 @@ static int animate(int argc, char **argv, bool is_turntable)
     struct animation animation = {0};
     bool good = read_all(&animation, argc, argv);
     animation.job.is_orbit |= is_turntable;
+    animation.job.filters = true;
+    if (is_turntable && animation.job.usual_samples == 0)
+        animation.job.usual_samples = TURNTABLE_SAMPLES;
     good = good && cli_series_complete(&animation.job);
     const int status = good ? run(&animation) : cli_report(&animation.job.error);
     cli_series_finish(&animation.job);

@@ -127,6 +127,8 @@ struct cli_job;
  * is shown once more for each further place. */
 error_t cli_set_model(struct cli_job *job, const char *path);
 error_t cli_set_place(struct cli_job *job, const char *field, const char *value);
+/* Turns the models so that --up, an axis of theirs, is y; those that are placed stay. */
+bool cli_turn_models(struct cli_job *job);
 bool cli_has_input(const struct cli_job *job); /* a model is standard input */
 /* Whether the files of models and environment can be read. */
 bool cli_check_models(const struct cli_job *job, struct fl_error *error);
@@ -290,6 +292,8 @@ struct cli_job {
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
         is_orbit;
     bool has_samples, auto_samples; /* --samples auto */
+    bool without_studio;            /* --studio off */
+    bool has_denoise, filters;      /* filters: 8-bit pictures are denoised where nothing is said */
     uint32_t usual_samples;         /* where nothing is said and the integrator has no number of its own; 0: 1 */
     char depth_field[24];           /* the option that set the depth, for messages; empty: none */
     unsigned file_quality;          /* of JPEG, WebP and video files; 0: default */
@@ -383,6 +387,9 @@ bool cli_loading_again(struct cli_loading *loading, struct fl_error *error);
 /* That `what` is new, and how much of it was sent; on standard error, unless the job is quiet. */
 void cli_loading_print_sent(const struct cli_loading *loading, const char *what);
 void cli_loading_close(struct cli_loading *loading);
+/* Shows a ground beneath models that bring no light, in pictures to look at, unless a camera of theirs is used. */
+void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene);
+/* Sets the job's camera if the command line leaves it to the model. */
 /* A camera by name or number; without one the model's first, unless keys or something else place it. `framed`: the
  * node that is to be in view, name or number; NULL: all. */
 bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,

@@ -220,8 +220,8 @@ static bool complete_camera(struct cli_job *job)
                          job->has_eye ? "--look-at" : "--eye") == 0;
     if (has_key && job->camera)
         return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
-    if (!has_key && job->has_up)
-        return cli_usage(job, "--up", "needs --eye and --look-at") == 0;
+    if (!has_key && job->has_up && !cli_turn_models(job))
+        return false;
     if (job->has_framing && (has_key || job->camera))
         return cli_usage(
                    job, job->camera ? "--camera" : "--eye",
@@ -310,6 +310,18 @@ bool cli_find_camera(struct message_render *render, const char *camera, const ch
         render->camera_node = first->node;
     }
     return true;
+}
+
+void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene)
+{
+    const bool shows = render->integrator == PROTOCOL_INTEGRATOR_WHITTED ||
+                       render->integrator == PROTOCOL_INTEGRATOR_DISTRIBUTED ||
+                       render->integrator == PROTOCOL_INTEGRATOR_PATH;
+    if (job->filters && !job->without_studio && !job->scene && shows &&
+        render->format == PROTOCOL_PIXEL_FORMAT_RGBA8 && render->background == PROTOCOL_BACKGROUND_ENVIRONMENT &&
+        render->camera_path != PROTOCOL_CAMERA_NODE && render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS &&
+        !fl_scene_is_lit(scene))
+        render->ground = 1;
 }
 
 /* Lenses, shutters and several samples need the integrator distributed; one sharp sample needs no random choices,
@@ -450,15 +462,26 @@ static bool complete_crop(struct cli_job *job)
     return fl_error_remedy(&job->error, "leave out one of them");
 }
 
+/* Files in linear light are for programs that have filters of their own. */
+static void complete_denoise(struct cli_job *job)
+{
+    const bool is_shown = job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8;
+    if (!job->has_denoise && job->filters && is_shown && job->options.crop_width == 0)
+        job->options.denoise = PROTOCOL_DENOISE_AUTO;
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job) || !complete_format(job))
         return false;
     complete_samples(job, is_series);
     complete_integrator(job);
-    return cli_views_complete(job, is_series) && complete_noise(job) && complete_crop(job) &&
-           complete_ground(job) && complete_tracer(job) && complete_clips(job) &&
-           complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
+    if (!cli_views_complete(job, is_series) || !complete_noise(job) || !complete_crop(job) ||
+        !complete_ground(job) || !complete_tracer(job) || !complete_clips(job) ||
+        !complete_outputs(job, is_series) || !complete_encoding(job) || !complete_camera(job))
+        return false;
+    complete_denoise(job);
+    return true;
 }
 
 bool cli_job_complete_view(struct cli_job *job)

@@ -32,6 +32,7 @@ enum key {
     KEY_POINT_SIZE,
     KEY_BACKGROUND,
     KEY_GROUND,
+    KEY_STUDIO,
     KEY_DENOISE,
     KEY_CAMERA,
     KEY_EYE,
@@ -113,8 +114,13 @@ static const struct argp_option special[] = {
     {"ground", KEY_GROUND, NULL, 0,
      "Show the shadows of the model on a ground beneath it, which is not seen itself; also over no background",
      CLI_GROUP_OUTPUT},
+    {"studio", KEY_STUDIO, "on|off", 0,
+     "Add what a model lacks for a picture: a ground where it has no light, else a sky beside its lights, but in "
+     "rooms (default on)",
+     CLI_GROUP_OUTPUT},
     {"denoise", KEY_DENOISE, "on|off|auto", OPTION_ARG_OPTIONAL,
-     "Filter the noise of few samples out of the picture (default: off; of views: auto, up to 64 samples)",
+     "Filter the noise of few samples out of the picture (default: auto, up to 64 samples; off for EXR and HDR "
+     "files, --crop and comparisons)",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
@@ -124,7 +130,9 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"eye", KEY_EYE, "X,Y,Z", 0, "Place of the camera; needs --look-at", CLI_GROUP_OUTPUT},
     {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "What is in the middle of the picture", CLI_GROUP_OUTPUT},
-    {"up", KEY_UP, "X,Y,Z", 0, "Upward direction (default 0,1,0)", CLI_GROUP_OUTPUT},
+    {"up", KEY_UP, "X,Y,Z|x|y|z", 0,
+     "Upward direction (default y); without --eye models are turned that were made with such an axis up",
+     CLI_GROUP_OUTPUT},
     {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45; 40 of a camera that sees all)",
      CLI_GROUP_OUTPUT},
     {"view", KEY_VIEW, "NAME", 0,
@@ -217,6 +225,17 @@ static error_t set_place(struct cli_job *job, const char *field, const char *val
         rest[i] = read[i] - (double)place[i];
     }
     return 0;
+}
+
+/* "z" and "-z" as vectors. */
+static const char *axis_of(const char *value)
+{
+    static const char *const axes[][2] = {{"x", "1,0,0"},   {"y", "0,1,0"},   {"z", "0,0,1"},
+                                          {"-x", "-1,0,0"}, {"-y", "0,-1,0"}, {"-z", "0,0,-1"}};
+    for (size_t i = 0; i < sizeof(axes) / sizeof(axes[0]); i++)
+        if (strcmp(value, axes[i][0]) == 0)
+            return axes[i][1];
+    return value;
 }
 
 /* Formats of pictures and of models have no name in common. */
@@ -379,7 +398,12 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_GROUND:
         job->options.ground = 1;
         return 0;
+    case KEY_STUDIO:
+        job->without_studio = strcmp(value, "off") == 0;
+        return job->without_studio || strcmp(value, "on") == 0 ? 0
+                                                               : cli_unknown_value(job, field, "studio", value);
     case KEY_DENOISE:
+        job->has_denoise = true;
         return protocol_denoise_parse(value ? value : "on", &job->options.denoise)
                    ? 0
                    : cli_unknown_value(job, field, "denoise", value);
@@ -391,6 +415,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_LOOK_AT:
         return set_place(job, field, value, job->key.look_at_world, job->look_at_rest, &job->has_look_at);
     case KEY_UP:
+        value = axis_of(value);
         return set_vector(job, field, value, job->key.up_world, &job->has_up);
     case KEY_HALF:
         job->half_pixels = true;

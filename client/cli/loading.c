@@ -51,6 +51,7 @@ static void fill_options(struct cli_loading *loading)
                                              .input_format = job->model_format,
                                              .environment = job->environment,
                                              .environment_degrees = job->environment_degrees,
+                                             .without_studio = job->without_studio,
                                              .variant = job->variant,
                                              .point_size = job->point_size,
                                              .note = on_note,
@@ -152,6 +153,8 @@ bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct
 {
     if (!job->scene)
         cli_move_camera(job, fl_scene_import_stats(scene)->origin);
-    return cli_find_camera(&job->options, job->camera, job->framed, job->has_framing || job->is_orbit, scene,
-                           error);
+    if (!cli_find_camera(&job->options, job->camera, job->framed, job->has_framing || job->is_orbit, scene, error))
+        return false;
+    cli_choose_ground(job, &job->options, scene);
+    return true;
 }

@@ -73,6 +73,30 @@ error_t cli_set_place(struct cli_job *job, const char *field, const char *value)
     return 0;
 }
 
+bool cli_turn_models(struct cli_job *job)
+{
+    static const float degrees[3][2][3] = {
+        {{0, 0, 90}, {0, 0, -90}}, {{0, 0, 0}, {180, 0, 0}}, {{-90, 0, 0}, {90, 0, 0}}};
+    const float *up = job->key.up_world;
+    int axis = -1;
+    for (int i = 0; i < 3; i++)
+        if (up[i] != 0 && up[(i + 1) % 3] == 0 && up[(i + 2) % 3] == 0)
+            axis = i;
+    if (axis < 0 || job->model_count == 0) {
+        cli_usage(job, "--up",
+                  axis < 0 ? "is no axis, and there is no --eye" : "turns model files, and none is named");
+        return fl_error_remedy(&job->error, "x, y, z, -x, -y or -z, or any direction with --eye and --look-at");
+    }
+    for (size_t i = 0; i < job->model_count; i++) {
+        struct fl_model *model = &job->models[i];
+        if (model->is_placed)
+            continue;
+        memcpy(model->degrees, degrees[axis][up[axis] < 0], sizeof(model->degrees));
+        model->is_placed = true;
+    }
+    return true;
+}
+
 static bool is_input(const char *path)
 {
     return strcmp(path, "-") == 0;

@@ -77,6 +77,7 @@ static bool complete_watch(struct cli_job *job)
 static bool complete(struct cli_job *job)
 {
     job->usual_samples = STILL_SAMPLES;
+    job->filters = true;
     if (!cli_job_complete(job, false) || !complete_watch(job))
         return false;
     if (job->progressive && cli_writes_to_stdout(job)) {

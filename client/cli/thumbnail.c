@@ -25,7 +25,8 @@ struct thumbnails {
     bool to_folder;
     char folder[4097]; /* of the files */
     struct fl_connection *connection;
-    struct fl_import *ahead; /* of the next model */
+    struct fl_import *ahead;   /* of the next model */
+    struct fl_model placed[2]; /* the model and the next one, as --up turns them */
     struct fl_exporter *exporter;
     struct sheet sheet;
     struct cli_progress progress;
@@ -88,7 +89,10 @@ static bool complete(struct thumbnails *wanted)
         job->options.samples = SAMPLES;
         job->has_samples = true;
     }
+    job->filters = true;
     job->model = wanted->models.entries[0].path;
+    if (job->has_up && !job->has_eye)
+        job->models[job->model_count++] = (struct fl_model){.path = job->model}; /* which is turned, as all are */
     job->output = wanted->to_folder ? "model.png" : wanted->output;
     if (!cli_job_complete(job, false))
         return false;
@@ -150,11 +154,19 @@ static bool write_sheet(struct thumbnails *wanted, const char *path, struct fl_e
 
 /* ---- one model ---- */
 
-static struct fl_load_options load_options(const struct thumbnails *wanted, size_t index)
+static struct fl_load_options load_options(struct thumbnails *wanted, size_t index)
 {
+    struct fl_model *placed = &wanted->placed[index % 2];
+    if (wanted->job.model_count > 0) {
+        *placed = wanted->job.models[0];
+        placed->path = wanted->models.entries[index].path;
+    }
     return (struct fl_load_options){.model = wanted->models.entries[index].path,
+                                    .models = placed,
+                                    .model_count = wanted->job.model_count,
                                     .environment = wanted->job.environment,
                                     .environment_degrees = wanted->job.environment_degrees,
+                                    .without_studio = wanted->job.without_studio,
                                     .point_size = wanted->job.point_size};
 }
 
@@ -175,6 +187,7 @@ static struct fl_frame *render(const struct thumbnails *wanted, struct fl_scene 
     struct message_render options = wanted->job.options;
     if (!cli_find_camera(&options, wanted->job.camera, NULL, wanted->job.has_framing, scene, error))
         return NULL;
+    cli_choose_ground(&wanted->job, &options, scene);
     struct fl_job *job = fl_render_start(scene, &options, error);
     struct fl_frame *frame = job ? fl_render_next(job, error) : NULL;
     fl_render_destroy(job);
@@ -338,7 +351,6 @@ int cli_thumbnail(int argc, char **argv)
     struct message_render defaults = fl_render_defaults();
     struct thumbnails wanted = {.columns = 0};
     defaults.width = defaults.height = CELL_PIXELS;
-    defaults.denoise = PROTOCOL_DENOISE_AUTO;
     const bool good =
         cli_job_begin(&wanted.job, defaults) && cli_parse(&argp, argc, argv, 0, &wanted) == 0 && complete(&wanted);
     const int status = good ? thumbnails(&wanted) : cli_report(&wanted.job.error);

@@ -9,6 +9,7 @@
 #include "model.h"
 #include "origin.h"
 #include "send.h"
+#include "sky.h"
 #include "source.h"
 #include "texture.h"
 #include "threemf.h"
@@ -37,7 +38,7 @@ struct options {
     double environment_degrees;
     const char *variant;
     double point_size; /* 0: chosen by the points */
-    bool no_model;
+    bool no_model, no_sky;
     struct source *sources;
     size_t source_count;
 };
@@ -53,7 +54,8 @@ enum {
     OPTION_POINT_SIZE,
     OPTION_NO_MODEL,
     OPTION_AT,
-    OPTION_FORMAT
+    OPTION_FORMAT,
+    OPTION_NO_SKY
 };
 
 static const struct argp_option option_rows[] = {
@@ -70,6 +72,8 @@ static const struct argp_option option_rows[] = {
      "place the MODEL named before: metres, degrees about x, then y, then z, and a factor", 0},
     {"format", OPTION_FORMAT, "NAME", 0,
      "take the MODEL named before for such a file, as glb (default: by its name, else its first bytes)", 0},
+    {"no-sky", OPTION_NO_SKY, NULL, 0,
+     "leave a model's lights alone (default: a sky beside them, but not in rooms)", 0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
@@ -152,6 +156,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case OPTION_FORMAT:
         last_source(state, options, "format")->format = argument;
+        return 0;
+    case OPTION_NO_SKY:
+        options->no_sky = true;
         return 0;
     case ARGP_KEY_ARG:
         add_source(state, options, argument);
@@ -347,7 +354,11 @@ static bool import_all(struct import_scene *scene, struct files *surroundings, s
     if (options->environment &&
         !import_environment(scene, surroundings, file_part(options->environment), options->environment_degrees))
         return false;
-    return import_settle_origin(scene);
+    if (!import_settle_origin(scene))
+        return false;
+    if (!options->no_sky)
+        import_add_sky(scene);
+    return !scene->failed;
 }
 
 static bool read_files(struct import_scene *scene, struct files *surroundings, const struct options *options)

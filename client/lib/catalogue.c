@@ -108,6 +108,7 @@ static bool observe_light(struct fl_catalogue *catalogue, const struct message_s
 
 bool fl_catalogue_observe(struct fl_catalogue *catalogue, const struct message *message, struct fl_error *error)
 {
+    catalogue->is_lit |= message->type == MESSAGE_SET_LIGHT || message->type == MESSAGE_SET_ENVIRONMENT;
     switch (message->type) {
     case MESSAGE_SET_NODE:
         return observe_node(catalogue, &message->set_node, error);

@@ -31,6 +31,7 @@ struct fl_catalogue {
     struct fl_clip_info *clips;
     size_t clip_count, clip_capacity;
     uint32_t max_id[PROTOCOL_OBJECT_COUNT];
+    bool is_lit; /* it has a light or an environment */
 };
 
 /* Looks at one message of an importer's. */

@@ -200,6 +200,7 @@ struct fl_load_options {
     struct fl_import *started;     /* by fl_import_start; the load takes it over, also when it fails. `model`,
                                       its environment and `timeout_ms` are those given at its start */
     const char *variant;           /* of the model's materials, by name; NULL: the file's choice */
+    bool without_studio;           /* a model with lights has these alone, and no sky beside them */
     bool will_reload;              /* for fl_scene_reload: what is loaded is remembered, some bytes an object */
 };
 
@@ -275,6 +276,8 @@ FL_API bool fl_scene_find_clip(const struct fl_scene *scene, const char *which, 
  * they fit; other kinds are not known by name. */
 FL_API bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
                                  uint32_t *id, struct fl_error *error);
+/* Whether the models, as they were loaded, brought lights or an environment, or one was given. */
+FL_API bool fl_scene_is_lit(const struct fl_scene *scene);
 /* Whether such a light has a size that can change: a rectangle or a sphere. */
 FL_API bool fl_scene_light_has_size(const struct fl_scene *scene, uint32_t light);
 /* An unused identifier for an edit of the caller's, a new one at each call; 0: none left.

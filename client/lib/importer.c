@@ -93,6 +93,8 @@ static bool fill_command(struct command *command, const struct fl_load_options *
         if (!add_made(command, error, "--environment-rotation=%.9g", options->environment_degrees))
             return false;
     }
+    if (options->without_studio)
+        add_word(command, "--no-sky");
     if (options->variant) {
         add_word(command, "--variant");
         add_word(command, options->variant);

@@ -125,6 +125,11 @@ bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kin
     return fl_catalogue_find(&scene->catalogue, kind, which, id, error);
 }
 
+bool fl_scene_is_lit(const struct fl_scene *scene)
+{
+    return scene->catalogue.is_lit;
+}
+
 bool fl_scene_light_has_size(const struct fl_scene *scene, uint32_t light)
 {
     return fl_catalogue_light_has_size(&scene->catalogue, light);

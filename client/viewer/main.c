@@ -306,6 +306,7 @@ static void fill(struct command_line *line)
     viewer->input_fd = job->input_fd;
     viewer->environment = job->environment;
     viewer->environment_degrees = job->environment_degrees;
+    viewer->without_studio = job->without_studio;
     viewer->variant = job->variant;
     viewer->edits = job->edits;
     viewer->edit_count = job->edit_count;

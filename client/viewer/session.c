@@ -79,6 +79,7 @@ static struct fl_load_options load_options(struct session *session)
                                     .input_fd = options->input_fd,
                                     .environment = options->environment,
                                     .environment_degrees = options->environment_degrees,
+                                    .without_studio = options->without_studio,
                                     .variant = options->variant,
                                     .point_size = options->point_size,
                                     .note = on_note,

@@ -15,6 +15,7 @@ struct session_options {
     size_t model_count;
     int input_fd; /* likewise */
     double environment_degrees, point_size;
+    bool without_studio;
     const char *variant;
     const struct fl_assignment *edits; /* of what is loaded, each time */
     size_t edit_count;

@@ -17,6 +17,7 @@ struct viewer_options {
     const struct fl_assignment *edits; /* likewise */
     size_t edit_count;
     double environment_degrees, point_size; /* likewise */
+    bool without_studio;                    /* likewise */
     /* From the command line; width and height are the window's, in pixels of the desktop. */
     struct message_render view;      /* of one eye */
     bool stereo, stereo_over;        /* two views from the beginning; the left one above the other */

@@ -131,15 +131,18 @@ static bool is_black(const float colour[3])
     return colour[0] <= 0.0f && colour[1] <= 0.0f && colour[2] <= 0.0f;
 }
 
-static bool make_default_light(struct environment *environment, struct gpu_device *device, struct error *error)
+static bool make_default_lights(struct environment *environment, struct gpu_device *device, struct error *error)
 {
-    struct light key = {
-        .position_kind = {0.0f, 0.0f, 0.0f, (float)LIGHT_KIND_DIRECTIONAL},
-        .direction_range = {SKY_KEY_DIRECTION, 0.0f},
-        .colour = {SKY_KEY_IRRADIANCE, 0.0f},
+    static const struct light lights[SKY_LIGHTS] = {
+        {.position_kind = {0.0f, 0.0f, 0.0f, (float)LIGHT_KIND_DIRECTIONAL},
+         .direction_range = {SKY_KEY_DIRECTION, 0.0f},
+         .colour = {SKY_KEY_IRRADIANCE, 0.0f}},
+        {.position_kind = {0.0f, 0.0f, 0.0f, (float)LIGHT_KIND_DIRECTIONAL},
+         .direction_range = {SKY_RIM_DIRECTION, 0.0f},
+         .colour = {SKY_RIM_IRRADIANCE, 0.0f}},
     };
     return environment->default_lights.name ||
-           gpu_buffer_upload(device, &environment->default_lights, &key, sizeof(key), error);
+           gpu_buffer_upload(device, &environment->default_lights, lights, sizeof(lights), error);
 }
 
 bool environment_update(struct environment *environment, struct gpu_device *device, const struct gpu_scene *gpu,
@@ -155,7 +158,7 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
     else if (given->backdrop)
         kind = ENVIRONMENT_BACKDROP;
     environment->default_light = kind == ENVIRONMENT_SKY;
-    if (environment->default_light && !make_default_light(environment, device, error))
+    if (environment->default_light && !make_default_lights(environment, device, error))
         return false;
     if (environment->known && environment->revision == given->revision && environment->kind == kind)
         return true;
@@ -190,7 +193,7 @@ void environment_fill_uniforms(const struct environment *environment, struct fra
     for (int i = 0; i < 9; i++)
         memcpy(uniforms->irradiance[i], environment->irradiance[i], sizeof(environment->irradiance[i]));
     uniforms->environment_kind = environment->kind;
-    uniforms->light_count = environment->default_light ? 1 : gpu->light_count;
+    uniforms->light_count = environment->default_light ? SKY_LIGHTS : gpu->light_count;
 }
 
 struct gpu_buffer *environment_lights(struct environment *environment, struct gpu_scene *gpu)

@@ -18,7 +18,7 @@ struct environment {
     uint32_t kind;          /* ENVIRONMENT_* */
     float irradiance[9][3]; /* of the environment itself; the colour that multiplies an image included */
     bool default_light;
-    struct gpu_buffer default_lights; /* one struct light */
+    struct gpu_buffer default_lights; /* SKY_LIGHTS of struct light */
     /* Of an image that is being integrated: */
     uint64_t summed_revision; /* 0: none is */
     uint32_t summed_rows;

@@ -37,8 +37,13 @@ float highlight_estimate(vec3 normal, vec3 half_way, float alpha)
     return wide / (PI * spread * spread);
 }
 
-// An estimate of a light's unshadowed radiance at the eye: positive wherever the true one is.
-float light_estimate(uint index, light_receiver r)
+// What is known of a light before a point of it is chosen.
+struct light_outlook {
+    float scattered, mirrored; // estimates of its unshadowed radiance at the eye: one is positive wherever the true one is
+    float reach;               // the distance of its points from its centre, as a share of the distance to it
+};
+
+light_outlook light_outlook_of(uint index, light_receiver r)
 {
     light l = light_at(index);
     int kind = int(l.position_kind.w);
@@ -52,7 +57,6 @@ float light_estimate(uint index, light_receiver r)
     if (kind == LIGHT_KIND_SPOT)
         power *= light_cone(l, direction);
 #ifdef HAS_AREA_LIGHTS
-    // The distance of its points from its centre, as a share of the distance to the light.
     if (kind == LIGHT_KIND_RECTANGLE) {
         float radius = length(l.half_u_inner.xyz) + length(l.half_v_outer.xyz);
         power *= max(-dot(l.direction_range.xyz, direction), 0.0) * radius * radius;
@@ -68,11 +72,21 @@ float light_estimate(uint index, light_receiver r)
     highlight += r.coat_mirrored * highlight_estimate(r.coat_normal, half_way, r.coat_alpha + 0.5 * reach);
     cosine = max(cosine, dot(r.coat_normal, direction));
 #endif
-    float estimate = cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
+    light_outlook outlook = light_outlook(0.0, 0.0, reach);
+    if (cosine + reach > 0.0) {
+        outlook.scattered = power * r.scattered * min(cosine + reach, 1.0);
+        outlook.mirrored = power * highlight;
+    }
 #ifdef HAS_DIFFUSE_TRANSMISSION
-    estimate += power * r.passed * clamp(reach - dot(r.normal, direction), 0.0, 1.0);
+    outlook.scattered += power * r.passed * clamp(reach - dot(r.normal, direction), 0.0, 1.0);
 #endif
-    return estimate;
+    return outlook;
+}
+
+float light_estimate(uint index, light_receiver r)
+{
+    light_outlook outlook = light_outlook_of(index, r);
+    return outlook.scattered + outlook.mirrored;
 }
 
 // Where there are emitters beside the lights (common/emitter.glsl): the probability of asking for a light. By the

@@ -9,8 +9,16 @@
 // facet, or, from inside, keeps it as the flat surface would. So glass loses no light at any roughness, and needs no
 // table of what single facets lose.
 
+#include "common/environment.glsl"
 #include "common/grain.glsl"
 #include "common/scattering.glsl"
+
+// The minimum chance of a mirror beside a window where surfaces shine, which rays alone find: few samples find them.
+#ifdef HAS_EMITTERS
+const float MIRROR_CHANCE_MIN = 0.125;
+#else
+const float MIRROR_CHANCE_MIN = 0.0;
+#endif
 
 struct lobe {
     vec3 direction;    // unit
@@ -145,6 +153,35 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     return f;
 }
 
+// What a ray of weight 1 may find that way, by an environment that is an image: at least white.
+float brightness_beyond(vec3 direction)
+{
+#ifdef HAS_ENVIRONMENT_TABLE
+    return max(max_component(environment_radiance(direction)), 1.0);
+#else
+    return 1.0;
+#endif
+}
+
+// The chances of mirror, mirrors in turn and window, by what they send and may find.
+vec3 facet_chances(surface s, facet_lobes f)
+{
+    float window = f.window_size;
+    if (window > 0.0 && in_glass(s)) // else there is no direction, or it goes into the glass
+        window *= brightness_beyond(f.bent);
+    vec3 sizes = vec3(max_component(f.mirror) * brightness_beyond(f.reflected), max_component(f.again), window);
+    float all_ = sizes.x + sizes.y + sizes.z;
+    if (!(all_ > 0.0))
+        return vec3(0.0);
+    sizes /= all_;
+    if (sizes.x > 0.0 && sizes.z > 0.0) {
+        float both = sizes.x + sizes.z;
+        sizes.x = max(sizes.x, MIRROR_CHANCE_MIN * both);
+        sizes.z = both - sizes.x;
+    }
+    return sizes;
+}
+
 #ifdef HAS_CLEARCOAT
 // The chance of its lobe among all that are sent on.
 float coat_chance_of(split parts)
@@ -166,8 +203,7 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     facet_lobes f = facet_lobes_of(s, parts, NoV, direction, facet, rough, choice);
     vec3 scattered = leaves ? s.base * (f.enters * (1.0 - s.transmission)) : parts.scattered;
     lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false, s.roughness);
-    float mirror_size = max_component(f.mirror), again_size = max_component(f.again);
-    float all_ = mirror_size + again_size + f.window_size;
+    vec3 chances = facet_chances(s, f);
 #ifdef HAS_CLEARCOAT
     // Before the facet below, by what is known of all of them.
     float coat_chance = coat_chance_of(parts);
@@ -176,9 +212,9 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     if (coated)
         return coat_lobe(s, parts, direction, coat_chance, u);
 #endif
-    if (!(all_ > 0.0))
+    if (!(chances.x + chances.y + chances.z > 0.0))
         return result;
-    float first = mirror_size / all_, second = again_size / all_;
+    float first = chances.x, second = chances.y;
     bool mirrored = choice < first, is_again = !mirrored && choice < first + second;
     float before = mirrored ? 0.0 : is_again ? first : first + second;
     float chance = mirrored ? first : is_again ? second : 1.0 - first - second;
@@ -214,13 +250,12 @@ vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 ligh
     vec3 facet = normalize(view + light);
     float number = 0.5;
     facet_lobes f = facet_lobes_of(s, parts, NoV, -view, facet, true, number);
-    float VoH = clamp(dot(view, facet), 1e-4, 1.0), mirror_size = max_component(f.mirror);
-    float all_ = mirror_size + max_component(f.again) + f.window_size;
+    float VoH = clamp(dot(view, facet), 1e-4, 1.0);
     vec3 x, y;
     vec3 local_view = facet_frame(s, NoV, -view, x, y), local = vec3(dot(facet, x), dot(facet, y), dot(facet, s.normal));
     float mirrored = visible_facet_density(local, local_view, VoH, sampled_alpha(s)) / (4.0 * VoH);
     float again_size = max_component(parts.again), again_all = max_component(parts.mirror + parts.refracted) + again_size;
-    density = mirror_size / max(all_, 1e-30) * mirrored + again_size / max(again_all, 1e-30) * NoL * INVERSE_PI;
+    density = facet_chances(s, f).x * mirrored + again_size / max(again_all, 1e-30) * NoL * INVERSE_PI;
     return f.mirror * mirrored + parts.again * (again_share(s, parts, light) * NoL * INVERSE_PI);
 }
 
@@ -251,3 +286,56 @@ vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out
 #endif
     return sent;
 }
+
+#ifdef HAS_AREA_LIGHTS
+// The surface whose facets mirror lights: none is smoother than a highlight.
+surface surface_of_highlights(surface s)
+{
+    s.roughness = max(s.roughness, ROUGHNESS_MIN_LIGHT);
+#ifdef HAS_CLEARCOAT
+    s.coat_roughness = max(s.coat_roughness, ROUGHNESS_MIN_LIGHT);
+#endif
+    return s;
+}
+
+float coat_share_of_highlights(split parts)
+{
+#ifdef HAS_CLEARCOAT
+    return parts.coat.mirrors / max(parts.coat.mirrors + max_component(parts.mirror), 1e-9);
+#else
+    return 0.0;
+#endif
+}
+
+// The direction (unit) from which a facet of such a surface, or of its coat, mirrors light to the eye.
+vec3 highlight_choose(surface s, split parts, float NoV, vec3 view, vec2 u)
+{
+    float unused;
+#ifdef HAS_CLEARCOAT
+    if (is_in(coat_share_of_highlights(parts), u.x)) {
+        vec3 x, y;
+        tangent_frame(s.coat_normal, x, y);
+        vec3 local = visible_facet(normalize(vec3(dot(view, x), dot(view, y), coat_cosine(s, view))),
+                                   vec2(square(s.coat_roughness)), u);
+        return reflect(-view, local.x * x + local.y * y + local.z * s.coat_normal);
+    }
+#endif
+    return reflect(-view, facet_seen(s, NoV, -view, u, unused));
+}
+
+// Its density per steradian.
+float highlight_density(surface s, split parts, float NoV, vec3 view, vec3 light)
+{
+    vec3 facet = normalize(view + light), x, y, local_view = facet_frame(s, NoV, -view, x, y);
+    float VoH = clamp(dot(view, facet), 1e-4, 1.0), coat = coat_share_of_highlights(parts);
+    vec3 local = vec3(dot(facet, x), dot(facet, y), dot(facet, s.normal));
+    float density = (1.0 - coat) * visible_facet_density(local, local_view, VoH, sampled_alpha(s));
+#ifdef HAS_CLEARCOAT
+    tangent_frame(s.coat_normal, x, y);
+    local_view = normalize(vec3(dot(view, x), dot(view, y), coat_cosine(s, view)));
+    local = vec3(dot(facet, x), dot(facet, y), dot(facet, s.coat_normal));
+    density += coat * visible_facet_density(local, local_view, VoH, vec2(square(s.coat_roughness)));
+#endif
+    return density / (4.0 * VoH);
+}
+#endif

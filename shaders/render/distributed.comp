@@ -8,6 +8,10 @@
 //   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
 //               rough surface sends it, or several in turn
 //
+// Lights with an extent are found by shadow rays alone, at a point that is chosen on the light or by a facet that mirrors
+// it. Rays are chosen, and end by chance, by what they may bring of an image about the scene, as it may be far brighter
+// than white.
+//
 // Emissive triangles are asked for the light that is scattered: no child brings that. What a rough surface mirrors of
 // them, and of the bright parts of an image about the scene, shadow rays and children both find (common/two_ways.glsl).
 // Children see them through glass as it bends light, and through blended surfaces; so translucent surfaces stop the
@@ -58,6 +62,7 @@ struct shadow_choice {
     float light_chance; // of that one of the lights
     vec2 u;             // x: the choice, then both: the place
     uint ray_normal;    // with which emitters are chosen: packed
+    float by_facets;    // of a light with an extent: of looking for it where facets mirror
 };
 
 // The roughness of the mirrors and windows that a path has met: they blur what it sees. A light's highlight on a smooth
@@ -73,11 +78,25 @@ float emitter_chance(shadow_choice c)
     return (1.0 - c.environment) * (1.0 - c.lights);
 }
 
+// The chance that a ray of that weight is traced.
+float survival_of(vec3 carried, vec3 direction)
+{
+    return max_component(carried) * brightness_beyond(direction) / ROULETTE;
+}
+
+// lobe_mirrored(), with the density of the rays that are traced.
+vec3 mirrored_light(eye_hit e, vec3 light, out float found)
+{
+    vec3 sent = lobe_mirrored(e.s, e.parts, e.NoV, e.view, light, found);
+    found *= found > 0.0 ? min(survival_of(e.weight * sent / found, light), 1.0) : 0.0;
+    return sent;
+}
+
 void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
 {
     path p = e.p;
     vec3 carried = e.weight * chosen.weight;
-    float survival = max_component(carried) / ROULETTE;
+    float survival = survival_of(carried, chosen.direction);
     if (!(choice < survival)) // also if it is NaN
         return;
     uint roughness = uint(max(path_roughness(p), chosen.roughness) * 65535.0 + 0.5);
@@ -86,7 +105,7 @@ void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
 #ifdef TWO_WAYS
     float found = 0.0;
     if (chosen.back && chosen.solid_angle > 0.0) // no shadow ray asks for what is smooth
-        lobe_mirrored(e.s, e.parts, e.NoV, e.view, chosen.direction, found);
+        mirrored_light(e, chosen.direction, found);
 #endif
 #ifdef HAS_EMITTERS
     p.light_number = c.ray_normal | ratio_code(emitter_chance(c) * c.mirrored, found) << PATH_LIGHT_BITS;
@@ -99,12 +118,33 @@ void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
               sample_solid_angle(chosen.solid_angle));
 }
 
+#ifdef HAS_AREA_LIGHTS
+// The chance of looking for the chosen light in the directions that facets mirror, not at a point of it: by the share of
+// its highlight, and by how much wider the light is than these.
+float by_facets_chance(shadow_choice c, light_receiver r)
+{
+    const float CHANCE_MAX = 0.8;
+    if (c.light_chance <= 0.0)
+        return 0.0;
+    light_outlook outlook = light_outlook_of(c.light_number, r);
+    float both = outlook.scattered + outlook.mirrored, alpha = r.alpha;
+#ifdef HAS_CLEARCOAT
+    alpha = r.coat_mirrored > 0.0 ? min(alpha, r.coat_alpha) : alpha;
+#endif
+    float wide = square(square(outlook.reach)), narrow = square(4.0 * PI * square(alpha)); // squares of solid angles
+    return both > 0.0 && wide > 0.0 ? CHANCE_MAX * (outlook.mirrored / both) * (wide / (wide + narrow)) : 0.0;
+}
+#endif
+
 shadow_choice choose_shadow_ray(eye_hit e, vec2 u)
 {
-    shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, u, 0u);
+    shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, u, 0u, 0.0);
     light_receiver receiver = light_receiver_of(e.blurred, e.blurred_parts, e.origin, e.view, e.NoV);
     float all_;
     c.light_number = light_choose(receiver, frame.light_count, c.u.x, c.light_chance, all_);
+#ifdef HAS_AREA_LIGHTS
+    c.by_facets = by_facets_chance(c, receiver);
+#endif
 #ifdef TWO_WAYS
     bool mirrors = lobes_are_rough(e.s) && last_wave == 0u &&
                    (e.p.flags & PATH_BOUNCES_MASK) < frame.depth;
@@ -149,7 +189,7 @@ bool ask_for_emitter(eye_hit e, shadow_choice c)
     float NoL = dot(e.s.normal, sampled.direction);
     vec3 sent = vec3(0.0);
     if (mirrored)
-        sent = lobe_mirrored(e.s, e.parts, e.NoV, e.view, sampled.direction, found);
+        sent = mirrored_light(e, sampled.direction, found);
     else if (side * NoL > 0.0) // the chance is of that side
         sent = brdf_scattered(e.s, e.parts, e.view, e.NoV, sampled.direction) * abs(NoL);
     vec3 arriving = vec3(0.0);
@@ -167,10 +207,38 @@ bool ask_for_environment(eye_hit e, shadow_choice c)
     float probability, found;
     vec3 direction = environment_choose(e.s.normal, c.u, probability);
     probability *= c.environment;
-    vec3 arriving = vec3(0.0), sent = lobe_mirrored(e.s, e.parts, e.NoV, e.view, direction, found);
+    vec3 arriving = vec3(0.0), sent = mirrored_light(e, direction, found);
     if (probability > 0.0 && found > 0.0)
         arriving = e.weight * sent * environment_radiance(direction) * (heuristic(probability, found) / probability);
     return add_shadow_ray_from(e.j, e.p, e.origin, direction, RAY_STOPS_T_MIN, FAR, limited(e.p, 0u, arriving));
+}
+#endif
+
+#ifdef HAS_AREA_LIGHTS
+// A point of the light, or the one that a facet mirrors: one sample of both techniques, with the balance heuristic (Veach,
+// Guibas 1995, section 5.2). A point alone would be in a narrow highlight once in many samples.
+light_sample light_of_two_ways(eye_hit e, shadow_choice c, inout vec3 origin)
+{
+    if (c.by_facets <= 0.0)
+        return light_seen(e.s, e.distance_, c.light_number, c.u, origin);
+    light l = light_at(c.light_number);
+    surface s = surface_of_highlights(e.blurred);
+    light_sample sampled;
+    float probability;
+    if (is_in(c.by_facets, c.u.x)) {
+        sampled.direction = highlight_choose(s, e.blurred_parts, e.NoV, e.view, c.u);
+        sampled.distance_ = light_meet(l, origin, sampled.direction, probability);
+        bool above = dot(sampled.direction, e.s.geometric) > 0.0;
+        sampled.irradiance = above && sampled.distance_ > 0.0 ? l.colour.rgb / probability : vec3(0.0);
+    } else {
+        sampled = light_seen(e.s, e.distance_, c.light_number, c.u, origin);
+        probability = light_probability(l, sampled);
+    }
+    float found = 0.0;
+    if (dot(sampled.direction, e.s.geometric) > 0.0)
+        found = c.by_facets * highlight_density(s, e.blurred_parts, e.NoV, e.view, sampled.direction);
+    sampled.irradiance *= probability / max((1.0 - c.by_facets) * probability + found, 1e-30);
+    return sampled;
 }
 #endif
 
@@ -192,7 +260,11 @@ bool ask_for_light(eye_hit e, shadow_choice c)
         return false;
     }
     vec3 from = e.origin;
+#ifdef HAS_AREA_LIGHTS
+    light_sample sampled = light_of_two_ways(e, c, from);
+#else
     light_sample sampled = light_seen(e.s, e.distance_, c.light_number, c.u, from);
+#endif
     float shine = light_shine(c.light_number, e.s.roughness);
     vec3 sent = reflected(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction, shine);
     vec3 arriving = e.weight * (sent * sampled.irradiance / probability);
@@ -250,7 +322,7 @@ void main()
 #endif
         e.blurred_parts = split_light(e.blurred, e.view, e.NoV);
         bool asks = !in_glass(e.s);
-        shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, vec2(0.0), 0u);
+        shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, vec2(0.0), 0u, 0.0);
         if (asks)
             c = choose_shadow_ray(e, sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
         lobe chosen = lobe_choose(e.s, e.parts, e.NoV, direction, choice,

@@ -724,6 +724,8 @@ TEST_LONG(rough_mirrors_show_as_much_of_lights_however_they_are_found)
                  {LAMP_BEHIND_VEIL, {0.3f, 1, 0}},
                  {LAMP_BEHIND_GLASS, {0.3f, 1, 0}},
                  {LAMP_BESIDE_LIGHTS, {0.3f, 0.5f, 0}},
+                 {RECTANGLE_LIGHT, {0.1f, 0, 0}},
+                 {RECTANGLE_LIGHT, {0.4f, 0.5f, 0.3f}},
                  {SUN, {0.3f, 1, 0}},
                  {SUN, {0.7f, 1, 0}},
                  {SUN_BESIDE_LIGHTS, {0.4f, 1, 0}}};
@@ -811,6 +813,31 @@ TEST_LONG(rough_metal_shows_no_specks_of_lamps_and_the_sun)
         assert_true(both < (sun ? 0.8 : error_of(pictures[2], pictures[1], INFINITY) / 20.0));
         for (int k = 0; k < 3 - sun; k++)
             free(pictures[k]);
+    }
+}
+
+/* A dielectric mirrors a small share of what is bright: light that is found by chance is a speck. */
+TEST(what_dielectrics_mirror_of_bright_lights_makes_no_specks)
+{
+    struct fixture *fixture = *state;
+    static const struct {
+        enum mirrored what;
+        float look[3];
+        double error; /* a quarter more than was measured */
+    } cases[] = {{RECTANGLE_LIGHT, {0.1f, 0, 0}, 0.08},
+                 {SUN_BESIDE_LIGHTS, {0.9f, 0, 0}, 0.021},
+                 {SUN, {0.1f, 0, 0}, 0.01}};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        float *pictures[2];
+        for (int k = 0; k < 2; k++) {
+            a_rough_mirror(fixture, INTEGRATOR_DISTRIBUTED, cases[i].what, HALF, cases[i].look);
+            pictures[k] = path_render_pixels(fixture, k ? 256 : 16, (uint64_t)k);
+        }
+        const double error = error_of(pictures[0], pictures[1], INFINITY);
+        print_message("case %zu: error of 16 samples, by the mean: %.4f\n", i, error);
+        assert_true(error < cases[i].error);
+        free(pictures[0]);
+        free(pictures[1]);
     }
 }
 

@@ -21,7 +21,7 @@ import zlib
 
 import importer
 from farlight_test import LONG, SHARED_SCENES, farlight, needs_shared_scenes
-from importer import SET_CHANNEL, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_TEXTURE, Peer, import_files
+from importer import SET_CHANNEL, SET_ENVIRONMENT, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_TEXTURE, Peer, import_files
 
 MEMORY = 1 << 30  # bytes of addresses, of which libraries take a third
 FLOAT, U8, I8, U16, I16, U32 = 5126, 5121, 5120, 5123, 5122, 5125
@@ -441,6 +441,31 @@ class Instances(Gltf):
         self.assert_refused([self.instanced(TRANSLATION=[(0, 0, 0)], SCALE=[(1, 1, 1)] * 2), endless,
                              self.instanced(TRANSLATION=[(0, 0, float("inf"))])],
                             "where another attribute has 1|more than 1048576 instances|not finite")
+
+
+class Sky(Gltf):
+    def lit(self, *nodes, lights=({"type": "point", "intensity": 30},), **more):
+        """A cube from the origin to 1, 1, 1, lights, and further nodes."""
+        model = Model().cube()
+        model.json["extensionsUsed"] = ["KHR_lights_punctual"]
+        model.json["extensions"] = {"KHR_lights_punctual": {"lights": list(lights)}}
+        model.json["nodes"] += [{"translation": [3, 5, 4], "extensions": {"KHR_lights_punctual": {"light": i}}} for i in range(len(lights))]
+        model.json["nodes"] += nodes
+        model.json["scenes"][0]["nodes"] = list(range(len(model.json["nodes"])))
+        model.json.update(more)
+        return model
+
+    def test_lights_have_a_sky_beside_them_but_not_in_a_room(self):
+        """As scenes without any light have one of the daemon's."""
+        cameras = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}]
+        for at, sky in (([9, 1, 9], 1), ([0.5, 0.4, 0.45], 0)):
+            with self.subTest(at):
+                camera = {"camera": 0, "translation": at}
+                environments = self.run_model(self.lit(camera, cameras=cameras)).of(SET_ENVIRONMENT)
+                self.assertEqual(len(environments), sky)
+        self.assertEqual(len(self.run_model(self.lit()).of(SET_ENVIRONMENT)), 1)
+        self.assertEqual(importer.import_file(str(self.write("lit.gltf", self.lit().text())), "--no-sky").of(SET_ENVIRONMENT), [])
+        self.assertEqual(self.run_model(Model().cube()).of(SET_ENVIRONMENT), [])
 
 
 class Shown(Gltf):

@@ -21,14 +21,15 @@ FIGURES = farlight_test.ROOT / "tests/integration/figures.json"
 # and where it sends single paths another way. Any fault of shading does far more.
 TOLERANCE = 2.0
 ROOM = "cornell.glb"
-# Samples that stay in their pixel, or differences between integrators would be the filter's; and first hits as software finds
-# them, which a GPU chooses by what is faster.
-COMMON = ["--size", "96x54", "--samples", "4", "--filter", "box", "--primary", "raster"]
+# Samples that stay in their pixel, and no filter of noise, or differences between integrators would be the filters'; and first
+# hits as software finds them, which a GPU chooses by what is faster.
+COMMON = ["--size", "96x54", "--samples", "4", "--filter", "box", "--denoise=off", "--primary", "raster"]
 STORED = {
     "room": [ROOM, "--integrator", "whitted"],
-    "textures": ["teapot.glb", "--integrator", "whitted"],
+    "textures": ["teapot.glb", "--integrator", "whitted", "--studio", "off"],
+    "sky beside lights": ["teapot.glb", "--integrator", "distributed"],
     "spheres": ["sphereflake-2.nff", "--integrator", "whitted"],
-    "moved": ["carousel.glb", "--integrator", "whitted", "--clip", "ride", "--time", "0.7", "--samples", "1"],
+    "moved": ["carousel.glb", "--integrator", "whitted", "--clip", "ride", "--time", "0.7", "--samples", "1", "--studio", "off"],
     "distributed": [ROOM, "--integrator", "distributed"],
     "raycast": [ROOM, "--integrator", "raycast"],
     "ao": [ROOM, "--integrator", "ao", "--ao-rays", "8"],
@@ -141,7 +142,7 @@ class Pictures(OneDaemon):
             return digests[options]
         for common, one, sign, other in (
                 (path, [], "!", ["--seed", "7"]), (path, ["--progressive=4"], "=", ["--progressive=2"]),
-                (path, ["--bounces", "2"], "=", ["--depth", "2"]), (path, [], "=", ["--denoise=off"]), (path, [], "!", ["--denoise"]),
+                (path, ["--bounces", "2"], "=", ["--depth", "2"]), (path, [], "!", ["--denoise"]),
                 (path, ["--denoise"], "=", ["--denoise=auto"]), (path, [], "!", ["--brdf", "ward"]), (bright, [], "=", ["--clamp", "1.25"]),
                 (bright, [], "!", ["--clamp", "0"]), ([*bright, "--samples", "16"], [], "=", ["--clamp", "2.5"]),
                 (ao, [], "!", ["--ao-distance", "0.01"]), (ao, ["--ao-distance", "10"], "!", ["--ao-distance", "10", "--ao-falloff", "4"]),
@@ -149,6 +150,36 @@ class Pictures(OneDaemon):
                 (abuffer, ["--abuffer-voxels", "auto"], "=", ["--abuffer-voxels", "32"])):
             with self.subTest(common=common, one=one, sign=sign, other=other):
                 (self.assertEqual if sign == "=" else self.assertNotEqual)(digest(*common, *one), digest(*common, *other))
+
+    def test_pictures_to_look_at_are_denoised_where_nothing_is_said(self):
+        """Not those in linear light, nor parts of a picture."""
+        def digest(name, *options):
+            result = farlight("render", bundled_scenes() / ROOM, "--size", "32x18", "--integrator", "path", "--samples", "4", *options,
+                              "-o", self.folder / name, "--timings=json")
+            return frames_of(self.expect(result, 0))[-1]["digest"]
+        for name, usual in (("x.png", "on"), ("x.jpg", "on"), ("x.exr", "off")):
+            with self.subTest(name):
+                self.assertEqual([digest(name) == digest(name, f"--denoise={word}") for word in ("on", "off")], [usual == "on", usual == "off"])
+        self.assertEqual(digest("x.png", "--crop", "8,8,8,8"), digest("x.png", "--crop", "8,8,8,8", "--denoise=off"))
+
+    def test_a_model_without_light_of_its_own_stands_on_a_ground(self):
+        """In pictures to look at, and not where the command or the file says what is around it. An axis turns what had it up."""
+        model, sky = self.folder / "square.obj", ["--environment", bundled_scenes() / "sky.hdr"]
+        model.write_text("v -1 0 -1\nv 1 0 -1\nv 1 2 -1\nv -1 2 -1\nf 1 2 3 4\n")
+        view = ["--size", "32x18", "--samples", "1", "--integrator", "whitted"]
+
+        def digest(*options, name="x.png"):
+            result = farlight("render", *view, *options, "-o", self.folder / name, "--timings=json")
+            return frames_of(self.expect(result, 0))[-1]["digest"]
+        usual, bare = digest(model), digest(model, "--studio", "off")
+        self.assertNotEqual(usual, bare)
+        self.assertEqual(usual, digest(model, "--studio", "off", "--ground"))
+        for options in ([model, "--background", "#ffffff"], [model, *sky, "--integrator", "distributed"]):
+            self.assertNotEqual(digest(*options), digest(*options, "--ground"), options)
+        self.assertNotEqual(digest(model, name="x.exr"), digest(model, "--ground", name="x.exr"))
+        self.assertEqual(digest(model, "--up", "z"), digest(model, "--at", "0,0,0:-90,0,0"))
+        self.assertNotEqual(usual, digest(model, "--up", "z"))
+        self.assertIn("axis", self.expect(farlight("render", model, "--up", "1,1,0", "-o", "x.png"), 2).stderr)
 
     def test_wireframe_draws_edges_as_wide_as_asked(self):
         """One square, 40 pixels wide: of the row through its upper half lines 4 pixels wide cover 2 at each border, whose other
@@ -236,7 +267,7 @@ class Pictures(OneDaemon):
         """With an environment, or another model: the light that a display emits for its numbers, with the tone map's curve."""
         scene, sky = self.write_nff("l 0 0 7\nf 1 1 1 0.5 0 0 0 1\n" + self.SQUARE.format(0)), self.folder / "black.hdr"
         sky.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + bytes(8))
-        for more in (["--environment", sky], [bundled_scenes() / "teapot.glb", "--at", "50,0,0"]):
+        for more in (["--environment", sky], [bundled_scenes() / "teapot.glb", "--at", "50,0,0", "--studio", "off"]):
             plain, aces = (self.middle(scene, *more, "--tone-map", tone_map, "--size", "9x9", "--eye", "0,0,4", "--look-at", "0,0,0")[0]
                            for tone_map in ("none", "aces"))
             self.assertAlmostEqual(plain, 127.5, delta=1.5, msg=more)
@@ -280,7 +311,7 @@ class Denoised(OneDaemon):
                 truth = self.picture(*options, "--samples", "128", "--seed", "7")
                 for samples in ("1", "4", "16"):
                     noisy, denoised = (math.dist(self.picture(*options, "--samples", samples, *more), truth)
-                                       for more in ((), ("--denoise",)))
+                                       for more in (("--denoise=off",), ()))
                     left = 0.65 if (scene, integrator, samples) == (ROOM, "path", "4") else self.AS_GOOD
                     self.assertLessEqual(denoised, left * noisy, (scene, integrator, samples))
 

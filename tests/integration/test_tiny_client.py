@@ -269,7 +269,7 @@ class Session(Case):
         digest = client.next_frame().digest
         result = self.expect(farlight("render", self.folder / "triangle.gltf", "--size", "40x30", "--samples", "1", "--eye", "0,1,5",
                                       "--look-at", "0,0,0", "--fov", math.degrees(0.8), "-o", self.folder / "a.png",
-                                      "--server", self.daemon.address, "--timings=json"), 0)
+                                      "--server", self.daemon.address, "--studio", "off", "--timings=json"), 0)
         self.assertEqual(int(frames_of(result)[0]["digest"], 16), digest)
 
     def test_a_view_shows_the_requested_camera_and_ends(self):

@@ -8,7 +8,7 @@ WIDTH, HEIGHT = 40, 28
 # Along the axes of the world, and sums that floats hold: the eyes of views are exactly those of the single pictures.
 EYE, LOOK_AT, APART = (0.25, 1.0, 3.5), (0.25, 1.0, 0.0), 0.25
 SHARP = ["--integrator", "whitted"]
-NOISY = ["--integrator", "distributed", "--samples", "3", "--aperture", "0.125", "--focus", "3"]
+NOISY = ["--denoise=off", "--integrator", "distributed", "--samples", "3", "--aperture", "0.125", "--focus", "3"]
 
 
 def place(point, across, up):

@@ -99,26 +99,26 @@ pictures() {
     picture 4 orbit/%04d.png '24 frames once around a sphereflake' \
         animate "$private/scenes/sphereflake-3.nff" --size 480x270 --orbit --frames 1-24 --fps 24 \
         --eye 2.1,1.3,1.7 --look-at 0,0,0 --up 0,0,1 --fov 45
-    picture 7 lens.png 'a lens that is in focus on the nearest pot' \
+    picture 28 lens.png 'a lens that is in focus on the nearest pot' \
         render "$carousel" --environment "$dusk" --clip ride --time 0.7 --size 640x360 \
-        --samples 16 --aperture 0.3 --focus 7.4 --timings
+        --samples 64 --aperture 0.3 --focus 7.4 --timings
     picture 7 ldc.png 'layered depth cubes beside an exact tracer' \
         compare "$teapot" --environment "$sky" --size 480x270 --tracers ldc,bvh
-    picture 5 abuffer.png 'ambient occlusion by A-buffers beside an exact tracer' \
-        compare "$private/scenes/cornell.glb" --size 320x240 --integrator ao --samples 1 --tracers abuffer,bvh
-    picture 6 path.png 'path tracing, refined in passes of 4 samples' \
-        render "$teapot" --environment "$sky" --size 400x225 --integrator path --samples 16 --progressive=4
+    picture 16 abuffer.png 'ambient occlusion by A-buffers beside an exact tracer' \
+        compare "$private/scenes/cornell.glb" --size 320x240 --integrator ao --samples 4 --tracers abuffer,bvh
+    picture 24 path.png 'path tracing, refined in passes of 16 samples' \
+        render "$teapot" --environment "$sky" --size 400x225 --integrator path --samples 64 --progressive=16
     picture 2 layers.exr 'albedo, normals, depth and objects as channels' \
         render "$teapot" --environment "$sky" --size 480x270 --layers beauty,albedo,normal,depth,id
-    picture 6 quadtree.png 'reflections and shadows by the depth layers of a cube round the eye' \
-        render "$teapot" --environment "$sky" --size 480x270 --tracer quadtree
+    picture 7 quadtree.png 'reflections and shadows by the depth layers of a cube round the eye' \
+        render "$carousel" --environment "$dusk" --size 480x270 --tracer quadtree
     picture 3 stereo.png 'two eyes, made from the depth layers of one view' \
-        render "$teapot" --environment "$sky" --size 480x270 --stereo 0.065
-    picture 54 shot.mp4 'a shot script that moves camera, focus and light' \
-        animate --script "$private/scenes/shot.json" --fps 8 --frames 1-24 --size 320x180 --samples 6
-    picture 104 carousel.mp4 'a clip with soft shadows, gloss and motion blur' \
+        render "$teapot" --environment "$sky" --size 480x270 --stereo 0.065 --integrator whitted --depth 6
+    picture 105 shot.mp4 'a shot script that moves camera, focus and light' \
+        animate --script "$private/scenes/shot.json" --fps 8 --frames 1-24 --size 320x180 --samples 12
+    picture 200 carousel.mp4 'a clip with soft shadows, gloss and motion blur' \
         animate "$carousel" --environment "$dusk" --clip ride --fps 12 --frames 1-36 \
-        --size 480x270 --samples 6 --shutter 0.5
+        --size 480x270 --samples 12 --shutter 0.5
 }
 
 : >"$out/demo.log"

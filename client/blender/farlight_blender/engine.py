@@ -18,7 +18,7 @@ from .viewport import Viewport
 
 NOTHING_THERE = 1e10  # what Blender's depth has where there is no surface
 ALBEDO = "Denoising Albedo"
-FULLY_DENOISED = 64  # from so many samples on a daemon's `auto` leaves noise as it is
+FULLY_DENOISED = 128  # from so many samples on a daemon's `auto` leaves noise as it is
 
 
 def _wanted_layers(layer: bpy.types.RenderLayer) -> tuple[str, ...]:

@@ -133,8 +133,10 @@ def _write(options: argparse.Namespace, frame: Frame) -> None:
 def _values(options: argparse.Namespace) -> dict[str, Any]:
     samples = options.samples if options.samples is not None else SAMPLES.get(options.integrator, OTHER_SAMPLES)
     integrator = options.integrator or ("distributed" if samples > 1 else "whitted")
+    denoise = messages.Denoise.AUTO if options.output.endswith(".png") else messages.Denoise.OFF
     return {"width": options.size[0], "height": options.size[1], "samples": samples, "integrator": integrator,
-            "tracer": options.tracer, "clamp": usual_clamp(samples), "primary": messages.Primary.AUTO, **dict(options.set)}
+            "tracer": options.tracer, "clamp": usual_clamp(samples), "primary": messages.Primary.AUTO,
+            "denoise": denoise, **dict(options.set)}
 
 
 def _layers(options: argparse.Namespace) -> tuple[str, ...]:

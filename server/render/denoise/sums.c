@@ -11,7 +11,7 @@
 
 /* Of DENOISE_AUTO: up to half of these samples a picture gets all of it, with all of them none
  * (protocol/words.def). */
-#define AUTO_SAMPLES 64u
+#define AUTO_SAMPLES 128u
 
 float denoise_strength(const struct frame_request *request, uint32_t samples)
 {

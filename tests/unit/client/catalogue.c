@@ -82,6 +82,18 @@ TEST(a_light_is_also_known_by_the_node_that_shows_it)
     assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "0"), 7);
 }
 
+TEST(lights_and_environments_light_a_scene)
+{
+    const struct message environment = {.type = MESSAGE_SET_ENVIRONMENT};
+    see_node(1, "ceiling", PROTOCOL_NODE_GROUP, 0);
+    assert_false(catalogue.is_lit);
+    assert_true(fl_catalogue_observe(&catalogue, &environment, &error));
+    assert_true(catalogue.is_lit);
+    fl_catalogue_finish(&catalogue);
+    see_light(7, "", PROTOCOL_LIGHT_POINT);
+    assert_true(catalogue.is_lit);
+}
+
 TEST(only_some_lights_have_a_size)
 {
     for (int kind = 0; kind < PROTOCOL_LIGHT_COUNT; kind++) {
