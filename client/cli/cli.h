@@ -389,7 +389,6 @@ void cli_loading_print_sent(const struct cli_loading *loading, const char *what)
 void cli_loading_close(struct cli_loading *loading);
 /* Shows a ground beneath models that bring no light, in pictures to look at, unless a camera of theirs is used. */
 void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene);
-/* Sets the job's camera if the command line leaves it to the model. */
 /* A camera by name or number; without one the model's first, unless keys or something else place it. `framed`: the
  * node that is to be in view, name or number; NULL: all. */
 bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,
