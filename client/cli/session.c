@@ -47,6 +47,7 @@ struct session {
     uint64_t frame_ns;      /* when the picture before it had come */
     double written_seconds; /* from then until it had */
     char written_path[4352];
+    uint32_t written_samples; /* of a pixel */
     uint64_t begin_ns, export_ns;
 };
 
@@ -235,8 +236,10 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
         const bool written = write_frame(session, frame, error), wanted = is_wanted(session, frame);
         session->noise = frame->noise;
         session->failures = 0;
-        if (written && wanted)
+        if (written && wanted) {
+            session->written_samples = frame->samples;
             note_frame(session, frame);
+        }
         fl_frame_destroy(frame);
         if (!written)
             return false;
@@ -273,11 +276,11 @@ static void print_held(const char *path, uint32_t held)
 }
 
 /* After an interruption: completes the file that is being written. False: the interruption is an error. */
-static bool end_passes(struct session *session, uint32_t held, struct fl_error *error)
+static bool end_passes(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
     struct fl_error failure = {0};
-    if (error->code != FL_ERROR_INTERRUPTED || held == 0 || !job->progressive)
+    if (error->code != FL_ERROR_INTERRUPTED || session->written_samples == 0 || !job->progressive)
         return false;
     if (!finish_sinks(session, &failure)) {
         *error = failure;
@@ -285,7 +288,7 @@ static bool end_passes(struct session *session, uint32_t held, struct fl_error *
     }
     cli_progress_clear(&session->progress);
     if (!job->quiet)
-        print_held(job->outputs[0].path, held);
+        print_held(job->outputs[0].path, session->written_samples);
     if (job->endless)
         *error = (struct fl_error){0};
     return job->endless;
@@ -306,7 +309,7 @@ static bool render_passes(struct session *session, struct fl_error *error)
         options.samples = pass_samples(job, held, total, options.samples, pass_ns);
         session->rendering = fl_render_start(session->loading.scene, &options, error);
         if (!session->rendering || !take_frames(session, &still, error))
-            return end_passes(session, held, error);
+            return end_passes(session, error);
         fl_render_destroy(session->rendering);
         session->rendering = NULL;
         pass_ns = monotonic_now_ns() - begin_ns;
