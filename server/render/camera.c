@@ -56,29 +56,6 @@ bool frame_camera_look_at(struct frame_camera *camera, const float eye[3], const
     return true;
 }
 
-/* The corners of a box, or points on the two rims of the cylinder that it stands in as it turns. */
-#define POINTS_OF_BOX 8
-#define POINTS_OF_TURN 64
-
-static unsigned points_of(double points[POINTS_OF_TURN][3], const float lower[3], const float upper[3], bool turns)
-{
-    const unsigned count = turns ? POINTS_OF_TURN : POINTS_OF_BOX;
-    double middle[3], half[3];
-    for (int i = 0; i < 3; i++) {
-        middle[i] = ((double)lower[i] + (double)upper[i]) / 2.0;
-        half[i] = ((double)upper[i] - (double)lower[i]) / 2.0;
-    }
-    /* Of the polygon about the circle, not in it. */
-    const double radius = hypot(half[0], half[2]) / cos(2.0 * PI / POINTS_OF_TURN);
-    for (unsigned i = 0; i < count; i++) {
-        const double angle = (i / 2) * (4.0 * PI / POINTS_OF_TURN);
-        points[i][0] = middle[0] + (turns ? radius * cos(angle) : (i & 2) ? half[0] : -half[0]);
-        points[i][1] = middle[1] + ((i & 1) ? half[1] : -half[1]);
-        points[i][2] = middle[2] + (turns ? radius * sin(angle) : (i & 4) ? half[2] : -half[2]);
-    }
-    return count;
-}
-
 /* The picture's axes, not by an upward direction: seen from above there is none. */
 struct axes {
     double right[3], above[3], back[3];
@@ -141,16 +118,15 @@ void frame_camera_around(struct frame_camera *camera, const struct frame_framing
 void frame_camera_auto(struct frame_camera *camera, const struct frame_framing *framing, const float lower[3],
                        const float upper[3], float aspect)
 {
-    double directions[FRAME_CAMERA_DIRECTIONS][3], supports[FRAME_CAMERA_DIRECTIONS], points[POINTS_OF_TURN][3];
+    double directions[FRAME_CAMERA_DIRECTIONS][3], supports[FRAME_CAMERA_DIRECTIONS];
     double size = 0.0;
     frame_camera_directions(directions, framing, aspect);
     for (int i = 0; i < 3; i++)
         size += fabs((double)upper[i] - (double)lower[i]);
-    const unsigned count = points_of(points, lower, upper, framing->turns);
     for (unsigned k = 0; k < FRAME_CAMERA_DIRECTIONS; k++) {
-        supports[k] = -INFINITY;
-        for (unsigned i = 0; i < count; i++)
-            supports[k] = fmax(supports[k], dot3(points[i], directions[k]));
+        supports[k] = 0.0;
+        for (int i = 0; i < 3; i++)
+            supports[k] += directions[k][i] * (double)(directions[k][i] > 0.0 ? upper[i] : lower[i]);
     }
     frame_camera_around(camera, framing, aspect, supports, size);
 }

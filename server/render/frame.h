@@ -226,7 +226,6 @@ struct frame_framing {
     float fov_y;              /* before the zoom */
     float margin; /* share of the picture that stays free beside the bounds, at each edge, before the zoom */
     float zoom;   /* scales the picture about its middle */
-    bool turns;   /* all stays in view where the eye turns about the vertical in the middle of the bounds */
 };
 /* A camera that sees all, as near as that allows: two opposite edges of the picture, or of the margin, are
  * touched. What it depends on is how far all reaches in these directions: the greatest dot product with a point

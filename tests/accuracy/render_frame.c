@@ -339,25 +339,6 @@ TEST(the_automatic_camera_is_as_near_as_its_margin_allows)
     }
 }
 
-/* A square of 2 m is 2.83 m wide where it is seen by its edge: what is as near as that shows all of it from every
- * side. */
-TEST(a_camera_that_turns_sees_all_from_every_side)
-{
-    const float lower[3] = {-1.0f, 0.0f, -1.0f}, upper[3] = {1.0f, 0.1f, 1.0f}, around = sqrtf(2.0f);
-    struct frame_framing framing = usual_framing;
-    struct frame_camera turns, wide;
-    framing.azimuth = framing.elevation = 0.0f;
-    frame_camera_auto(&wide, &framing, (float[]){-around, 0.0f, -around}, (float[]){around, 0.1f, around}, 1.0f);
-    framing.turns = true;
-    frame_camera_auto(&turns, &framing, lower, upper, 1.0f);
-    /* nearer than to the square about the circle, whose corners stick out, and farther than to the circle's radius
-     */
-    assert_true(turns.world_from_view[11] < wide.world_from_view[11]);
-    const double half = tan((double)framing.fov_y / 2.0) * 0.94,
-                 circle = (double)around * sqrt(1.0 + 1.0 / (half * half));
-    assert_true((double)turns.world_from_view[11] > circle && (double)turns.world_from_view[11] < 1.01 * circle);
-}
-
 TEST(a_camera_needs_a_view_direction_and_an_upward_one)
 {
     struct frame_camera camera;

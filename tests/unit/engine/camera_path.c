@@ -295,6 +295,43 @@ TEST(an_orbit_without_a_key_turns_about_the_middle_of_the_scene)
     }
 }
 
+/* Of the picture's half, by how much the rim of a disc that lies about (x, 0, 0) reaches out of its middle. */
+static double reach_of(const struct frame_camera *camera, double x, double radius, double aspect)
+{
+    const float *m = camera->world_from_view;
+    const double slope = tan((double)camera->fov_y / 2);
+    double reach = 0;
+    for (int k = 0; k < 360; k++) {
+        const double place[3] = {x + radius * cos(k * PI / 180), 0, radius * sin(k * PI / 180)};
+        double view[3] = {0};
+        for (int axis = 0; axis < 3; axis++)
+            for (int row = 0; row < 3; row++)
+                view[axis] += (double)m[4 * row + axis] * (place[row] - (double)m[4 * row + 3]);
+        reach = fmax(reach, fmax(fabs(view[0]) / aspect, fabs(view[1])) / -view[2] / slope);
+    }
+    return reach;
+}
+
+TEST(what_an_orbit_goes_around_is_as_large_as_its_margin_allows)
+{
+    struct scene_edit disc = {.kind = EDIT_SET, .object = OBJECT_DISC};
+    disc.set.disc.base.id = 1;
+    disc.set.disc.centre_world[0] = 3;
+    disc.set.disc.normal_world[1] = 1;
+    disc.set.disc.radius = 2;
+    struct error error = {0};
+    assert_true(scene_commit(scene, &disc, 1, &error));
+    struct engine_job job = job_of(CAMERA_ORBIT, NULL, 0);
+    job.orbit_turn = job.orbit_seconds = 1;
+    job.framing.fov_y = 0.2f; /* so that the eye is not as near as it may be */
+    const double aspect = (double)job.frame.width / job.frame.height, wanted = 1 - 2 * (double)job.framing.margin;
+    for (uint32_t frame = 0; frame < 60; frame += 7) {
+        const struct frame_camera camera = camera_at(&job, frame);
+        /* A disc is all of its poses: it touches the margin in each. */
+        assert_true(fabs(reach_of(&camera, 3, 2, aspect) - wanted) < 0.01);
+    }
+}
+
 TEST(an_empty_scene_has_an_automatic_camera_too)
 {
     struct engine_job job = job_of(CAMERA_AUTO, NULL, 0);
