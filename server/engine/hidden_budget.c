@@ -15,13 +15,12 @@ void hidden_budget_earn(struct hidden_budget *budget, uint64_t passed_ns)
 
 bool hidden_budget_suffices(const struct hidden_budget *budget)
 {
-    return budget->saved_ns >= (int64_t)budget->cost_ns;
+    return budget->cost_ns > 0 && budget->saved_ns >= (int64_t)budget->cost_ns;
 }
 
 void hidden_budget_spend(struct hidden_budget *budget, uint64_t cost_ns, bool spare)
 {
-    const bool was_known = budget->cost_ns > 0;
     budget->cost_ns = cost_ns;
-    if (was_known && !spare)
+    if (!spare)
         budget->saved_ns -= (int64_t)cost_ns;
 }

@@ -9,7 +9,7 @@
 
 #define HIDDEN_SHARE_PERCENT 15u
 
-/* All-zero: nothing is known, and the first ones are made. */
+/* All-zero: nothing is known, and the first ones, which may have programs to compile, are made in spare time. */
 struct hidden_budget {
     int64_t saved_ns; /* below 0: they took longer than was thought */
     uint64_t cost_ns; /* of those of one picture */
@@ -18,9 +18,7 @@ struct hidden_budget {
 /* Between the beginnings of two pictures. */
 void hidden_budget_earn(struct hidden_budget *budget, uint64_t passed_ns);
 bool hidden_budget_suffices(const struct hidden_budget *budget);
-/* All those of a picture were made. `spare`: in time that nothing else needed, as that of the first ones is taken
- * to be.
- */
+/* All those of a picture were made. `spare`: in time that nothing else needed. */
 void hidden_budget_spend(struct hidden_budget *budget, uint64_t cost_ns, bool spare);
 
 #endif

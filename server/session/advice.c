@@ -162,7 +162,12 @@ void pacing_guess_waves(struct pacing *pacing, const struct pacing_advice *made,
 {
     if (render_ns == 0 || pacing->render_frames > 0.0)
         return;
-    pacing_learn_waves(pacing, made, render_ns, wave_ns, 0);
+    /* The layers of pictures that views are made of take as long again. */
+    const unsigned times = pacing_makes_views(&pacing->terms) ? 2 : 1;
+    uint64_t guessed_ns[PACING_WAVES];
+    for (unsigned wave = 0; wave < PACING_WAVES; wave++)
+        guessed_ns[wave] = times * wave_ns[wave];
+    pacing_learn_waves(pacing, made, times * render_ns, guessed_ns, 0);
     pacing->guessed = true;
 }
 

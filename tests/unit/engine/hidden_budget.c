@@ -7,8 +7,9 @@
 TEST(what_is_hidden_is_made_when_its_cost_is_saved)
 {
     struct hidden_budget budget = {0};
-    assert_true(hidden_budget_suffices(&budget)); /* nobody knows what it takes */
-    hidden_budget_spend(&budget, 30 * MS, false);
+    hidden_budget_earn(&budget, 1000 * MS);
+    assert_false(hidden_budget_suffices(&budget)); /* nobody knows what it takes */
+    hidden_budget_spend(&budget, 30 * MS, true);
     unsigned made = 0;
     for (int i = 0; i < 100; i++) {
         hidden_budget_earn(&budget, 100 * MS);
@@ -22,7 +23,7 @@ TEST(what_is_hidden_is_made_when_its_cost_is_saved)
 
 TEST(what_costs_less_than_its_share_is_always_made)
 {
-    struct hidden_budget budget = {0};
+    struct hidden_budget budget = {.cost_ns = 15 * MS};
     for (int i = 0; i < 100; i++) {
         hidden_budget_earn(&budget, 100 * MS);
         assert_true(hidden_budget_suffices(&budget));
