@@ -238,7 +238,7 @@ static void do_event(struct viewer *viewer, const struct replay_event *event)
         viewer_input(viewer, &event->input);
     else if (event->kind == REPLAY_SCREENSHOT)
         viewer_keep_screenshot(viewer, event->path, &viewer->failure);
-    else if (event->kind == REPLAY_STATE)
+    else if (event->kind == REPLAY_STATE && viewer_write_screenshots(viewer, &viewer->failure))
         viewer_print_state(viewer, event->path);
 }
 

@@ -213,7 +213,8 @@ void viewer_choose_clip(struct viewer *viewer, int clip);
 const struct pixmap *viewer_picture(const struct viewer *viewer); /* that is shown */
 void viewer_hud(struct viewer *viewer, struct hud_state *state);
 bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
-/* One that is written later, so that a replay goes on in time. The path must live until then. */
+/* One that is written before the next state or wait, so that a replay goes on in time. The path must live until
+ * then. */
 bool viewer_keep_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
 /* Of those that are kept; frees them. */
 bool viewer_write_screenshots(struct viewer *viewer, struct fl_error *error);
