@@ -244,7 +244,8 @@ TEST(an_empty_scene_and_a_single_pixel_are_pictures_too)
         fixture->request.height = 18 - width;
         struct frame_result result = fixture_render(fixture);
         assert_int_equal(result.size_bytes, width * (18 - width) * 16);
-        assert_true(fixture_pixel(&result, width - 1, 17 - width)[2] > 0.05f); /* the default sky; its ground has 0.09 */
+        assert_true(fixture_pixel(&result, width - 1, 17 - width)[2] >
+                    0.05f); /* the default sky; its ground has 0.09 */
         frame_result_finish(&result);
     }
 }
