@@ -9,8 +9,6 @@
 #include <string.h>
 
 /* The protocol's range of a key; a spline through keys near its ends may leave it. */
-#define PI 3.14159265358979323846
-#define TURNS 24u /* poses of a model that turns: between two of them it reaches at most 1 % farther */
 #define FOV_MIN 0.001f
 #define FOV_MAX 3.1f
 /* The protocol's range of a frame's camera; composed transforms and splines may leave it. */
@@ -139,42 +137,13 @@ float animation_distance(const struct frame_camera *camera, const float point_wo
     return distance > 0.0 ? (float)fmin(distance, (double)PLACE_MAX) : 0.0f;
 }
 
-/* Of a model that turns about the vertical axis through its middle, as the supports of one that has all its poses
- * at once: those of the model in the directions that turn the other way. */
-static bool turning_supports(const struct engine_job *job, const struct scene *scene,
-                             const struct scene_pose *pose, struct animation_bounds *bounds)
-{
-    float centre[3];
-    middle(bounds, centre);
-    for (unsigned k = 0; k < FRAME_CAMERA_DIRECTIONS; k++)
-        bounds->supports[k] = -INFINITY;
-    for (unsigned turn = 0; turn < TURNS; turn++) {
-        const double angle = 2.0 * PI * turn / TURNS, along = cos(angle), across = sin(angle);
-        double turned[FRAME_CAMERA_DIRECTIONS][3], supports[FRAME_CAMERA_DIRECTIONS];
-        for (unsigned k = 0; k < FRAME_CAMERA_DIRECTIONS; k++) {
-            const double *direction = bounds->directions[k];
-            turned[k][0] = along * direction[0] - across * direction[2];
-            turned[k][1] = direction[1];
-            turned[k][2] = across * direction[0] + along * direction[2];
-        }
-        if (!scene_supports_below(scene, pose, job->framed_node, turned, supports, FRAME_CAMERA_DIRECTIONS))
-            return false;
-        for (unsigned k = 0; k < FRAME_CAMERA_DIRECTIONS; k++) {
-            double support = supports[k];
-            for (int axis = 0; axis < 3; axis++)
-                support += (bounds->directions[k][axis] - turned[k][axis]) * (double)centre[axis];
-            bounds->supports[k] = fmax(bounds->supports[k], support);
-        }
-    }
-    return true;
-}
-
 /* By the vertices: round models leave the corners of their bounds empty. False: nothing is visible. Only after
  * find_bounds(). */
 static bool find_reach(const struct engine_job *job, const struct scene *scene, float aspect,
                        struct animation_bounds *bounds)
 {
     double directions[FRAME_CAMERA_DIRECTIONS][3];
+    float centre[3];
     struct scene_pose pose;
     _Static_assert(FRAME_CAMERA_DIRECTIONS <= SCENE_SUPPORTS_MAX, "all at once");
     frame_camera_directions(directions, &job->framing, aspect);
@@ -183,10 +152,11 @@ static bool find_reach(const struct engine_job *job, const struct scene *scene, 
     if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, 0.0, NULL))
         return false;
     memcpy(bounds->directions, directions, sizeof(directions));
-    bounds->reach_known = job->path == CAMERA_ORBIT
-                              ? turning_supports(job, scene, &pose, bounds)
-                              : scene_supports_below(scene, &pose, job->framed_node, directions, bounds->supports,
-                                                     FRAME_CAMERA_DIRECTIONS);
+    middle(bounds, centre);
+    const double axis[2] = {(double)centre[0], (double)centre[2]};
+    bounds->reach_known =
+        scene_supports_below(scene, &pose, job->framed_node, job->path == CAMERA_ORBIT ? axis : NULL, directions,
+                             bounds->supports, FRAME_CAMERA_DIRECTIONS);
     scene_pose_finish(&pose);
     return bounds->reach_known;
 }

@@ -29,7 +29,7 @@ static bool look_at(const struct engine_job *job, const struct scene *scene, dou
     double support;
     if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, time_s, error))
         return false;
-    if (scene_supports_below(scene, &pose, 0, down, &support, 1))
+    if (scene_supports_below(scene, &pose, 0, NULL, down, &support, 1))
         *reach = fmax(*reach, support);
     scene_pose_finish(&pose);
     return true;

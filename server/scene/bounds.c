@@ -137,6 +137,9 @@ bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, floa
     return scene_bounds_below(scene, pose, 0, lower, upper);
 }
 
+#define PI 3.14159265358979323846
+#define RIM_PLACES 64u
+
 /* ---- supports ----------------------------------------------------------------------------------- */
 
 struct direction {
@@ -149,10 +152,14 @@ struct reach {
     const struct scene *scene;
     const struct scene_pose *pose;
     const double (*directions)[3];
+    const double *axis; /* NULL, or x and z of the vertical about which all turns */
     double *supports;
     size_t count;
     uint64_t left; /* of the budget for deformed meshes */
     bool found;
+    /* Of the instance at hand. */
+    const float *world_from_object;
+    struct direction own[SCENE_SUPPORTS_MAX];
 };
 
 static double dot(const double a[3], const float b[3])
@@ -160,8 +167,10 @@ static double dot(const double a[3], const float b[3])
     return a[0] * (double)b[0] + a[1] * (double)b[1] + a[2] * (double)b[2];
 }
 
-static void to_object(struct direction own[SCENE_SUPPORTS_MAX], const struct reach *reach, const float m[12])
+static void take_instance(struct reach *reach, const float m[12])
 {
+    struct direction *own = reach->own;
+    reach->world_from_object = m;
     for (size_t i = 0; i < reach->count; i++) {
         const double *world = reach->directions[i];
         for (int axis = 0; axis < 3; axis++)
@@ -177,10 +186,38 @@ static void note(struct reach *reach, size_t i, double support)
         reach->supports[i] = fmax(reach->supports[i], support);
 }
 
-/* One direction after the other: the loops are short enough for vectors of the processor. */
-static void reach_points(struct reach *reach, const struct direction *own, const float *positions,
-                         const uint32_t *indices, size_t count)
+static void to_world(const struct reach *reach, const float place[3], double world[3])
 {
+    const float *m = reach->world_from_object;
+    for (int row = 0; row < 3; row++)
+        world[row] = (double)m[4 * row] * (double)place[0] + (double)m[4 * row + 1] * (double)place[1] +
+                     (double)m[4 * row + 2] * (double)place[2] + (double)m[4 * row + 3];
+}
+
+/* Of a ball all the way round the axis. */
+static double turning_support(const struct reach *reach, size_t i, const double centre_world[3], double radius)
+{
+    const double *d = reach->directions[i], *axis = reach->axis, level = hypot(d[0], d[2]);
+    const double away = hypot(centre_world[0] - axis[0], centre_world[2] - axis[1]);
+    return d[0] * axis[0] + d[1] * centre_world[1] + d[2] * axis[1] + level * away + hypot(level, d[1]) * radius;
+}
+
+static void note_turning(struct reach *reach, const float place[3])
+{
+    double world[3];
+    to_world(reach, place, world);
+    for (size_t i = 0; i < reach->count; i++)
+        note(reach, i, turning_support(reach, i, world, 0.0));
+}
+
+/* One direction after the other: the loops are short enough for vectors of the processor. */
+static void reach_points(struct reach *reach, const float *positions, const uint32_t *indices, size_t count)
+{
+    const struct direction *own = reach->own;
+    for (size_t k = 0; reach->axis && k < count; k++)
+        note_turning(reach, positions + 3 * (indices ? (size_t)indices[k] : k));
+    if (reach->axis)
+        return;
     for (size_t i = 0; i < reach->count; i++) {
         const double *d = own[i].object;
         double most = -INFINITY;
@@ -193,8 +230,9 @@ static void reach_points(struct reach *reach, const struct direction *own, const
 }
 
 /* The vertices between the bounds, of which those beyond belong to other meshes. */
-static void reach_vertices(struct reach *reach, const struct direction *own, const struct scene_mesh *mesh)
+static void reach_vertices(struct reach *reach, const struct scene_mesh *mesh)
 {
+    const struct direction *own = reach->own;
     const float *p = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data;
     const float *lower = mesh->lower, *upper = mesh->upper;
     double most[SCENE_SUPPORTS_MAX];
@@ -204,6 +242,10 @@ static void reach_vertices(struct reach *reach, const struct direction *own, con
         if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
             p[2] > upper[2])
             continue;
+        if (reach->axis) {
+            note_turning(reach, p);
+            continue;
+        }
         for (size_t i = 0; i < reach->count; i++) {
             const double at = dot(own[i].object, p);
             most[i] = at > most[i] ? at : most[i];
@@ -214,37 +256,44 @@ static void reach_vertices(struct reach *reach, const struct direction *own, con
 }
 
 /* False: out of memory. */
-static bool reach_deformed(struct reach *reach, const struct direction *own, const struct scene_instance *instance)
+static bool reach_deformed(struct reach *reach, const struct scene_instance *instance)
 {
     const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->object);
     float *positions = malloc((size_t)mesh->vertex_count * 3 * sizeof(*positions));
     const bool deformed =
         positions && scene_deform(reach->scene, reach->pose, instance->node, positions, NULL, NULL);
     if (deformed)
-        reach_points(reach, own, positions, (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data,
+        reach_points(reach, positions, (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data,
                      (size_t)mesh->triangle_count * 3);
     free(positions);
     return deformed;
 }
 
-static void reach_mesh(struct reach *reach, const struct direction *own, const struct scene_instance *instance)
+static void reach_mesh(struct reach *reach, const struct scene_instance *instance)
 {
     const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->object);
     const size_t corners = (size_t)mesh->triangle_count * 3;
-    if (scene_node_deforms(instance->node, mesh) && afford(mesh, &reach->left) &&
-        reach_deformed(reach, own, instance))
+    if (scene_node_deforms(instance->node, mesh) && afford(mesh, &reach->left) && reach_deformed(reach, instance))
         return;
     if (mesh->vertex_count < corners)
-        reach_vertices(reach, own, mesh);
+        reach_vertices(reach, mesh);
     else
-        reach_points(reach, own, (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data,
+        reach_points(reach, (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data,
                      (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data, corners);
 }
 
-static void reach_spheres(struct reach *reach, const struct direction *own, const struct scene_spheres *spheres)
+static void reach_spheres(struct reach *reach, const struct scene_spheres *spheres)
 {
-    const float *sphere = (const float *)(const void *)spheres->centres_radii->data;
-    for (size_t i = 0; i < reach->count; i++) {
+    const float *sphere = (const float *)(const void *)spheres->centres_radii->data, *m = reach->world_from_object;
+    const struct direction *own = reach->own;
+    const double scale = sqrt((double)(m[0] * m[0] + m[1] * m[1] + m[2] * m[2])); /* spheres stay spheres */
+    for (uint32_t k = 0; reach->axis && k < spheres->sphere_count; k++) {
+        double world[3];
+        to_world(reach, sphere + 4 * k, world);
+        for (size_t i = 0; i < reach->count; i++)
+            note(reach, i, turning_support(reach, i, world, scale * (double)sphere[4 * k + 3]));
+    }
+    for (size_t i = 0; !reach->axis && i < reach->count; i++) {
         const double *d = own[i].object, length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         double most = -INFINITY;
         for (uint32_t k = 0; k < spheres->sphere_count; k++)
@@ -254,10 +303,19 @@ static void reach_spheres(struct reach *reach, const struct direction *own, cons
 }
 
 /* Whether the box of an instance goes beyond what was found; that of a deforming mesh may. */
-static bool goes_beyond(const struct reach *reach, const struct direction *own, const float lower[3],
-                        const float upper[3])
+static bool goes_beyond(const struct reach *reach, const float lower[3], const float upper[3])
 {
-    for (size_t i = 0; i < reach->count; i++) {
+    const struct direction *own = reach->own;
+    for (unsigned corner = 0; reach->axis && corner < 8; corner++) {
+        const float place[3] = {(corner & 1 ? upper : lower)[0], (corner & 2 ? upper : lower)[1],
+                                (corner & 4 ? upper : lower)[2]};
+        double world[3];
+        to_world(reach, place, world);
+        for (size_t i = 0; i < reach->count; i++)
+            if (!(turning_support(reach, i, world, 0.0) <= reach->supports[i]))
+                return true;
+    }
+    for (size_t i = 0; !reach->axis && i < reach->count; i++) {
         double support = own[i].offset;
         for (int axis = 0; axis < 3; axis++) {
             const double d = own[i].object[axis];
@@ -277,22 +335,46 @@ static void reach_kind(struct reach *reach, enum node_kind kind, uint32_t root)
         return;
     for (size_t i = 0; i < count; i++) {
         const struct scene_node *node = instances[i].node;
-        struct direction own[SCENE_SUPPORTS_MAX];
         if (instances[i].singular || !is_below(reach->scene, node, root))
             continue;
         const struct scene_mesh *mesh = kind == NODE_MESH ? scene_mesh(reach->scene, node->object) : NULL;
         const struct scene_spheres *spheres = mesh ? NULL : scene_spheres(reach->scene, node->object);
-        to_object(own, reach, instances[i].world_from_object);
+        take_instance(reach, instances[i].world_from_object);
         if (!(mesh && scene_node_deforms(node, mesh)) &&
-            !goes_beyond(reach, own, mesh ? mesh->lower : spheres->lower, mesh ? mesh->upper : spheres->upper))
+            !goes_beyond(reach, mesh ? mesh->lower : spheres->lower, mesh ? mesh->upper : spheres->upper))
             continue;
         if (mesh)
-            reach_mesh(reach, own, &instances[i]);
+            reach_mesh(reach, &instances[i]);
         else
-            reach_spheres(reach, own, spheres);
+            reach_spheres(reach, spheres);
         reach->found = true;
     }
     free(instances);
+}
+
+/* Its rim: between two places of it the rim reaches a thousandth of its radius farther. */
+static void turn_disc(struct reach *reach, const struct scene_disc *disc)
+{
+    const float *n = disc->normal_world;
+    const int least =
+        fabsf(n[0]) < fabsf(n[1]) ? (fabsf(n[0]) < fabsf(n[2]) ? 0 : 2) : (fabsf(n[1]) < fabsf(n[2]) ? 1 : 2);
+    const int b = (least + 1) % 3, c = (least + 2) % 3;
+    const double length = hypot((double)n[b], (double)n[c]);
+    double across[3] = {0}, other[3], place[3];
+    across[b] = (double)n[c] / length;
+    across[c] = -(double)n[b] / length;
+    for (int i = 0; i < 3; i++) {
+        const int next = (i + 1) % 3, after = (i + 2) % 3;
+        other[i] = (double)n[next] * across[after] - (double)n[after] * across[next];
+    }
+    for (unsigned k = 0; k < RIM_PLACES; k++) {
+        const double angle = 2.0 * PI * k / RIM_PLACES;
+        for (int i = 0; i < 3; i++)
+            place[i] = (double)disc->centre_world[i] +
+                       (double)disc->radius * (cos(angle) * across[i] + sin(angle) * other[i]);
+        for (size_t i = 0; i < reach->count; i++)
+            note(reach, i, turning_support(reach, i, place, 0.0));
+    }
 }
 
 static void reach_discs(struct reach *reach)
@@ -301,7 +383,9 @@ static void reach_discs(struct reach *reach)
     void *value;
     while (hashmap_next(&reach->scene->objects[OBJECT_DISC], &cursor, NULL, &value)) {
         const struct scene_disc *disc = value;
-        for (size_t i = 0; i < reach->count; i++) {
+        if (reach->axis)
+            turn_disc(reach, disc);
+        for (size_t i = 0; !reach->axis && i < reach->count; i++) {
             const double *d = reach->directions[i], along = dot(d, disc->normal_world);
             const double across = fmax(0.0, d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along);
             note(reach, i, dot(d, disc->centre_world) + (double)disc->radius * sqrt(across));
@@ -311,11 +395,12 @@ static void reach_discs(struct reach *reach)
 }
 
 bool scene_supports_below(const struct scene *scene, const struct scene_pose *pose, uint32_t root,
-                          const double (*directions)[3], double *supports, size_t count)
+                          const double *axis, const double (*directions)[3], double *supports, size_t count)
 {
     struct reach reach = {.scene = scene,
                           .pose = pose,
                           .directions = directions,
+                          .axis = axis,
                           .supports = supports,
                           .count = count,
                           .left = DEFORM_NUMBERS_MAX};

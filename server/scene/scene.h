@@ -294,9 +294,10 @@ bool scene_bounds_below(const struct scene *scene, const struct scene_pose *pose
                         float upper[3]);
 /* For each direction in world space the greatest dot product with a point of what scene_bounds_below() counts: of
  * the vertices that triangles use, of spheres, of discs. Of a mesh with fewer vertices than corners any of its
- * vertices may count that is within its bounds. False: nothing is visible. */
+ * vertices may count that is within its bounds. With `axis`, x and z of a vertical, of all the places that these
+ * come to as they turn about it. False: nothing is visible. */
 #define SCENE_SUPPORTS_MAX 5
 bool scene_supports_below(const struct scene *scene, const struct scene_pose *pose, uint32_t root,
-                          const double (*directions)[3], double *supports, size_t count);
+                          const double *axis, const double (*directions)[3], double *supports, size_t count);
 
 #endif

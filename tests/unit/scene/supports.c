@@ -40,7 +40,7 @@ static void add_cloud(struct draft_list *list, uint32_t id, uint32_t first, uint
 static void expect_supports(const struct scene *scene, uint32_t root, const double expected[SCENE_SUPPORTS_MAX])
 {
     double supports[SCENE_SUPPORTS_MAX];
-    assert_true(scene_supports_below(scene, NULL, root, directions, supports, SCENE_SUPPORTS_MAX));
+    assert_true(scene_supports_below(scene, NULL, root, NULL, directions, supports, SCENE_SUPPORTS_MAX));
     for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++)
         if (fabs(supports[i] - expected[i]) > 1e-5) /* of numbers up to 30, which plain points have as floats */
             fail_msg("direction %zu: %.9g, expected %.9g", i, supports[i], expected[i]);
@@ -58,6 +58,49 @@ static void reach_of_used(const struct scene *scene, uint32_t node, double expec
         for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++)
             expected[i] = fmax(expected[i], along(i, point));
     }
+}
+
+#define ANGLES 2000
+
+/* The greatest of a place as it turns about the axis; an angle between two of these reaches 2e-6 of its way
+ * farther. */
+static double turned_along(size_t i, const float place[3], const double axis[2])
+{
+    double most = -INFINITY;
+    for (int k = 0; k < ANGLES; k++) {
+        const double angle = 2 * 3.14159265358979 * k / ANGLES, x = (double)place[0] - axis[0],
+                     z = (double)place[2] - axis[1];
+        const float turned[3] = {(float)(axis[0] + cos(angle) * x - sin(angle) * z), place[1],
+                                 (float)(axis[1] + sin(angle) * x + cos(angle) * z)};
+        most = fmax(most, along(i, turned));
+    }
+    return most;
+}
+
+TEST(what_turns_about_an_axis_reaches_as_far_as_all_its_places)
+{
+    static const double axis[2] = {1.5, -2};
+    static const float places[] = {4, 1, 0, 4, 3, 0, 4, 1, -3, -2, 0.5f, 1, -2, 0.5f, 2, -2, 0, 1};
+    static const uint32_t indices[] = {0, 1, 2, 3, 4, 5};
+    struct scene *scene = scene_create("test", NULL);
+    struct draft_list list = {0};
+    double supports[SCENE_SUPPORTS_MAX];
+    assert_non_null(scene);
+    struct scene_mesh *mesh = &add_set(&list, OBJECT_MESH, 1)->set.mesh;
+    mesh->vertex_count = 6;
+    mesh->triangle_count = 2;
+    mesh->arrays[MESH_POSITIONS] = make_blob(places, sizeof(places));
+    mesh->arrays[MESH_INDICES] = make_blob(indices, sizeof(indices));
+    add_shown(&list, 1, NODE_MESH, 1);
+    expect_commit(scene, &list);
+    assert_true(scene_supports_below(scene, NULL, 0, axis, directions, supports, SCENE_SUPPORTS_MAX));
+    for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++) {
+        double expected = -INFINITY;
+        for (size_t k = 0; k < 6; k++)
+            expected = fmax(expected, turned_along(i, places + 3 * k, axis));
+        assert_true(fabs(supports[i] - expected) < 3e-5); /* of ways of up to 12 */
+    }
+    scene_destroy(scene);
 }
 
 TEST(supports_are_those_of_the_vertices_that_triangles_use)
@@ -90,7 +133,7 @@ TEST(spheres_and_discs_reach_as_far_as_their_surfaces)
     struct draft_list list = {0};
     double expected[SCENE_SUPPORTS_MAX], supports[SCENE_SUPPORTS_MAX];
     assert_non_null(scene);
-    assert_false(scene_supports_below(scene, NULL, 0, directions, supports, SCENE_SUPPORTS_MAX));
+    assert_false(scene_supports_below(scene, NULL, 0, NULL, directions, supports, SCENE_SUPPORTS_MAX));
     struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 1)->set.disc;
     disc->normal_world[1] = 1;
     disc->radius = 9;
