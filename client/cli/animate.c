@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of a model that turns each edge is seen to creep. */
+/* Edges of a model that turns are seen to creep with fewer. */
 #define TURNTABLE_SAMPLES 8u
 
 enum key {

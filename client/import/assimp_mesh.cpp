@@ -93,7 +93,7 @@ void read_vectors(const aiVector3D *from, unsigned count, float *to)
     }
 }
 
-// What a value is divided by: PLY files with floats have them from 0 to 1, or to 255.
+// The value of full light: PLY files with floats have 1, or 255.
 float full_colour(const reader &r, const aiMesh &from)
 {
     const aiColor4D *colours = from.mColors[0];

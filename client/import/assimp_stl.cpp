@@ -18,7 +18,7 @@ bool is_binary(const unsigned char *bytes, size_t size_bytes)
     return memchr(bytes, 0, std::min<size_t>(size_bytes, 1024)) != nullptr;
 }
 
-// As many facets as the file states and has, and nothing behind them.
+// Keeps the facets that the file states and has, and nothing behind them.
 std::string mend_binary(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
     uint32_t stated = 0;

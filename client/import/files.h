@@ -54,9 +54,9 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
                           char reason[FILES_REASON_BYTES]);
 
-/* As files_read(). Names are often those of the machine where the model was made: where there is no such file, one
- * beside the model with the name's last part, in any case and without quotes, is read and `found` has its name,
- * which is empty otherwise. The reason is that of the whole name. */
+/* files_read(), for names that are often those of the machine where the model was made: where there is no such
+ * file, one beside the model with the name's last part, in any case and without quotes, is read and `found` has
+ * its name, which is empty otherwise. The reason is that of the whole name. */
 unsigned char *files_read_moved(struct files *files, const char *name, size_t *size_bytes,
                                 char found[FILES_NAME_BYTES], char reason[FILES_REASON_BYTES]);
 

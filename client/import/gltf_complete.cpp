@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is changed in the JSON before tinygltf sees it. It refuses a file in which the indices of a primitive have
+// Changes the JSON before tinygltf sees it, which refuses a file in which the indices of a primitive have
 // no buffer view (KHR_draco_mesh_compression lets them), a buffer has no bytes (EXT_meshopt_compression) or a
 // channel no node (KHR_animation_pointer), and one with an accessor of no elements.
 #include "gltf.hpp"
@@ -96,53 +96,48 @@ bool is_empty(const json_t *accessors, const json_t *index)
     return json_is_integer(count) && json_integer_value(count) == 0;
 }
 
-// Exporters write them for objects without faces.
-void leave_out_empty_primitives(reader &r, json_t *root)
+// The parts of each holder that are empty, with a note.
+template <typename predicate>
+void leave_out(reader &r, json_t *root, const char *holders, const char *parts, const char *what,
+               predicate is_left_out)
 {
-    const json_t *accessors = json_object_get(root, "accessors");
     size_t i;
-    json_t *mesh;
+    json_t *holder;
 
-    json_array_foreach(json_object_get(root, "meshes"), i, mesh)
+    json_array_foreach(json_object_get(root, holders), i, holder)
     {
-        json_t *primitives = json_object_get(mesh, "primitives");
-        for (size_t k = json_array_size(primitives); k-- > 0;) {
-            const json_t *primitive = json_array_get(primitives, k);
-            const json_t *position = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
-            if (!is_empty(accessors, position) && !is_empty(accessors, json_object_get(primitive, "indices")))
+        json_t *list = json_object_get(holder, parts);
+        for (size_t k = json_array_size(list); k-- > 0;) {
+            if (!is_left_out(holder, json_array_get(list, k)))
                 continue;
-            import_note(r.scene, PROTOCOL_SEVERITY_INFO,
-                        (place("meshes", i) + "." + place("primitives", k)).c_str(),
-                        "a primitive without vertices is left out");
-            json_array_remove(primitives, k);
+            import_note(r.scene, PROTOCOL_SEVERITY_INFO, (place(holders, i) + "." + place(parts, k)).c_str(),
+                        "%s is left out", what);
+            json_array_remove(list, k);
         }
     }
 }
 
-void leave_out_empty_channels(reader &r, json_t *root)
+// Exporters write them for objects without faces, and for actions without keys.
+void leave_out_empty(reader &r, json_t *root)
 {
     const json_t *accessors = json_object_get(root, "accessors");
-    size_t i;
-    json_t *animation;
 
-    json_array_foreach(json_object_get(root, "animations"), i, animation)
-    {
-        json_t *channels = json_object_get(animation, "channels");
-        for (size_t k = json_array_size(channels); k-- > 0;) {
-            const json_t *number = json_object_get(json_array_get(channels, k), "sampler");
-            const json_t *sampler =
-                json_is_integer(number) && json_integer_value(number) >= 0
-                    ? json_array_get(json_object_get(animation, "samplers"), size_t(json_integer_value(number)))
-                    : nullptr;
-            if (!is_empty(accessors, json_object_get(sampler, "input")) &&
-                !is_empty(accessors, json_object_get(sampler, "output")))
-                continue;
-            import_note(r.scene, PROTOCOL_SEVERITY_INFO,
-                        (place("animations", i) + "." + place("channels", k)).c_str(),
-                        "a channel without keys is left out");
-            json_array_remove(channels, k);
-        }
-    }
+    leave_out(r, root, "meshes", "primitives", "a primitive without vertices",
+              [accessors](const json_t *, const json_t *primitive) {
+                  const json_t *attributes = json_object_get(primitive, "attributes");
+                  return is_empty(accessors, json_object_get(attributes, "POSITION")) ||
+                         is_empty(accessors, json_object_get(primitive, "indices"));
+              });
+    leave_out(r, root, "animations", "channels", "a channel without keys",
+              [accessors](const json_t *animation, const json_t *channel) {
+                  const json_t *number = json_object_get(channel, "sampler");
+                  const json_t *sampler = json_is_integer(number) && json_integer_value(number) >= 0
+                                              ? json_array_get(json_object_get(animation, "samplers"),
+                                                               size_t(json_integer_value(number)))
+                                              : nullptr;
+                  return is_empty(accessors, json_object_get(sampler, "input")) ||
+                         is_empty(accessors, json_object_get(sampler, "output"));
+              });
 }
 
 // Names that are no URIs: a percent sign without two digits stands for itself, and one with them may.
@@ -199,10 +194,8 @@ std::string complete_json(reader &r, const unsigned char *json, size_t size_byte
     if (!json_is_object(root.get()))
         return text; // the parser says what is wrong
     complete_meshes(root.get());
-    if (counts_none) {
-        leave_out_empty_primitives(r, root.get());
-        leave_out_empty_channels(r, root.get());
-    }
+    if (counts_none)
+        leave_out_empty(r, root.get());
     complete_uris(r, root.get());
     if (compressed)
         complete_buffers(root.get(), binary);

@@ -40,8 +40,7 @@ double length2(const std::array<double, 3> &v)
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-// What moves by `by` in the parent's space moves so in the node's. False: the node has no extent in some
-// direction.
+// A move by `by` in the parent's space as one in the node's. False: the node has no extent in some direction.
 bool into_node(const matrix &m, const std::array<double, 3> &by, std::array<double, 3> &out)
 {
     const auto minor = [&](size_t i, size_t j) { // of the cofactor

@@ -81,7 +81,7 @@ int image_of(reader &r, int texture, const std::string &where)
 
 namespace
 {
-// One that is not where its name says.
+// Reads an image that is not where its name says.
 void read_moved(reader &r, tinygltf::Image &source, texture_job &job)
 {
     char reason[FILES_REASON_BYTES] = "";

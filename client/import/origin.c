@@ -2,6 +2,7 @@
 #include "origin.h"
 
 #include "model.h"
+#include "protocol/common/box.h"
 
 #include <float.h>
 #include <math.h>
@@ -94,25 +95,6 @@ static const struct import_bounds *bounds_of(const struct tree *tree, const stru
     return NULL;
 }
 
-/* Arvo, Transforming Axis-Aligned Bounding Boxes (Graphics Gems, 1990). */
-static void transform_box(const float matrix[12], double lower[3], double upper[3])
-{
-    double low[3], high[3];
-
-    for (int row = 0; row < 3; row++) {
-        low[row] = high[row] = (double)matrix[4 * row + 3];
-        for (int column = 0; column < 3; column++) {
-            const double a = (double)matrix[4 * row + column] * lower[column];
-            const double b = (double)matrix[4 * row + column] * upper[column];
-
-            low[row] += fmin(a, b);
-            high[row] += fmax(a, b);
-        }
-    }
-    memcpy(lower, low, sizeof(low));
-    memcpy(upper, high, sizeof(high));
-}
-
 /* False: nothing is shown. */
 static bool world_box(const struct tree *tree, double lower[3], double upper[3])
 {
@@ -130,7 +112,7 @@ static bool world_box(const struct tree *tree, double lower[3], double upper[3])
             high[c] = (double)bounds->upper[c];
         }
         for (unsigned depth = 0; node && depth <= DEPTH_MAX; depth++) {
-            transform_box(node->parent_from_node, low, high);
+            box_transform(node->parent_from_node, low, high);
             node = node->parent < tree->node_count ? tree->nodes[node->parent] : NULL;
         }
         for (int c = 0; c < 3; c++) {

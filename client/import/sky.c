@@ -3,6 +3,7 @@
 
 #include "half.h"
 #include "placement.h"
+#include "shaders/shared/sky.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -150,12 +151,11 @@ static bool has_environment(const struct import_scene *scene)
     return false;
 }
 
-/* As shared/sky.h of the shaders has it. */
 static void sky_at(double up, float radiance[3])
 {
-    static const float zenith[3] = {0.15f, 0.20f, 0.30f}, horizon[3] = {0.34f, 0.36f, 0.38f},
-                       ground[3] = {0.10f, 0.095f, 0.09f};
-    const float share = (float)(up < 0 ? fmin(-up * 4, 1) : up), *end = up < 0 ? ground : zenith;
+    static const float zenith[3] = {SKY_ZENITH}, horizon[3] = {SKY_HORIZON}, ground[3] = {SKY_GROUND};
+    const float share = (float)(up < 0 ? fmin(-up * (double)SKY_GROUND_SLOPE, 1) : up),
+                *end = up < 0 ? ground : zenith;
     for (int c = 0; c < 3; c++)
         radiance[c] = horizon[c] + (end[c] - horizon[c]) * share;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/boxes.h"
 #include "lib/catalogue.h"
+#include "protocol/common/box.h"
 
 #include <float.h>
 #include <math.h>
@@ -67,30 +68,13 @@ static const struct fl_box_node *find_node(const struct fl_box_node *const *sort
     return found ? *found : NULL;
 }
 
-/* Arvo, Transforming Axis-Aligned Bounding Boxes (Graphics Gems, 1990). */
-static void transform(const float matrix[12], double lower[3], double upper[3])
-{
-    double low[3], high[3];
-    for (unsigned row = 0; row < 3; row++) {
-        low[row] = high[row] = (double)matrix[4 * row + 3];
-        for (unsigned column = 0; column < 3; column++) {
-            const double a = (double)matrix[4 * row + column] * lower[column];
-            const double b = (double)matrix[4 * row + column] * upper[column];
-            low[row] += fmin(a, b);
-            high[row] += fmax(a, b);
-        }
-    }
-    memcpy(lower, low, sizeof(low));
-    memcpy(upper, high, sizeof(high));
-}
-
 /* False: the node has no place, as its parents are missing or a cycle. Vertices with joints are placed by these
  * alone, at rest usually where they are in the mesh's own space. */
 static bool place(const struct fl_box_node *const *sorted, size_t count, const struct fl_box_node *node,
                   double lower[3], double upper[3])
 {
     for (unsigned depth = 0; depth <= DEPTH_MAX && !node->is_skinned; depth++) {
-        transform(node->parent_from_node, lower, upper);
+        box_transform(node->parent_from_node, lower, upper);
         if (node->parent == 0)
             return true;
         node = find_node(sorted, count, node->parent);

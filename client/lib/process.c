@@ -54,7 +54,7 @@ bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_
         error, "put it into this program's folder or into PATH, or name its folder in FARLIGHT_LIBEXEC");
 }
 
-/* What the child's descriptors shall be, and no other: whoever started us may have left some open. */
+/* The child's descriptors, and no other: our own parent may have left some open. */
 static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, const struct fl_process *process,
                  int socket_fd)
 {

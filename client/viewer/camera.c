@@ -92,7 +92,7 @@ void camera_turn(struct viewer_camera *camera, double right, double up)
 
 void camera_swing(const struct viewer_camera *from, const struct viewer_camera *to, double *right, double *up)
 {
-    double before[3], after[3], level_before[3], level_after[3], side[3];
+    double before[3], after[3], side[3];
     for (int i = 0; i < 3; i++) {
         before[i] = from->look_at[i] - from->eye[i];
         after[i] = to->look_at[i] - to->eye[i];
@@ -100,12 +100,8 @@ void camera_swing(const struct viewer_camera *from, const struct viewer_camera *
     unit(before);
     unit(after);
     const double rise_before = dot(before, to->up), rise_after = dot(after, to->up);
-    for (int i = 0; i < 3; i++) {
-        level_before[i] = before[i] - rise_before * to->up[i];
-        level_after[i] = after[i] - rise_after * to->up[i];
-    }
-    cross(level_after, level_before, side);
-    *right = atan2(dot(side, to->up), dot(level_before, level_after));
+    cross(after, before, side);
+    *right = atan2(dot(side, to->up), dot(before, after) - rise_before * rise_after);
     *up = asin(fmax(-1, fmin(1, rise_after))) - asin(fmax(-1, fmin(1, rise_before)));
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Decisions about views that are made here: whether, of which camera the daemon is asked for a picture, when, and
+/* Decisions about views that are made here: whether, of which camera the daemon is asked for a picture, and
  * in which quality views are made. Pure: times and places in, decisions out. Monotonic nanoseconds, metres. */
 #ifndef FARLIGHT_CLIENT_VIEWER_PLAN_H
 #define FARLIGHT_CLIENT_VIEWER_PLAN_H
@@ -46,6 +46,8 @@ struct plan_motion {
     size_t next, count;
 };
 
+void plan_motion_add(struct plan_motion *motion, const struct viewer_camera *camera, uint64_t at_ns);
+
 /* How the last two pictures of motion came. All zero at first. */
 struct plan_pace {
     /* From a camera to its picture, from picture to picture; 0: unknown. A single late one says nothing of the
@@ -59,7 +61,6 @@ void plan_pace_add(struct plan_pace *pace, uint64_t sent_ns, uint64_t came_ns);
 /* From sending a camera to the middle of the time in which views are made of its picture. */
 uint64_t plan_pace_ahead_ns(const struct plan_pace *pace);
 
-void plan_motion_add(struct plan_motion *motion, const struct viewer_camera *camera, uint64_t at_ns);
 /* Where the camera will be `ahead_ns` after `now_ns` (400 ms at most) if it goes on as in the last tenth of a
  * second: the eye or what is looked at, whichever has moved less, goes straight on, and the other one swings about
  * it. With the lens of the newest one. No camera was added: *camera stays. */

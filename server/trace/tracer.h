@@ -40,8 +40,6 @@ struct tracer_bench {
     uint32_t rayspace_pairs;            /* of a stack of it; 0: chosen */
     uint32_t quadtree_stack; /* 1: the traversal keeps the ancestors of a node (shaders/quadtree/traverse.glsl) */
     uint32_t quadtree_count_steps; /* hits hold counts of the traversal (shaders/quadtree/traverse.glsl) */
-    uint32_t
-        baseline_side; /* texels or cells along a side, of a structure of the benchmark's own; 0: its maximum */
 };
 
 /* Options of all tracers; zero is the default of each. A tracer gets them with the defaults of tracers.def in

@@ -52,7 +52,7 @@ MAY_INCLUDE = {
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
     "client/edit": ("protocol", "protocol/common", "client/lib"),  # a part of the library
     "client/helper": ("protocol",),
-    "client/import": ("protocol", "protocol/common", "client/helper"),
+    "client/import": ("protocol", "protocol/common", "client/helper", SHARED),  # the default sky
     "client/output": ("protocol", "client/helper"),
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate

@@ -8,7 +8,7 @@ TEST(what_is_hidden_is_made_when_its_cost_is_saved)
 {
     struct hidden_budget budget = {0};
     hidden_budget_earn(&budget, 1000 * MS);
-    assert_false(hidden_budget_suffices(&budget)); /* nobody knows what it takes */
+    assert_false(hidden_budget_suffices(&budget)); /* its cost is unknown */
     hidden_budget_spend(&budget, 30 * MS, true);
     unsigned made = 0;
     for (int i = 0; i < 100; i++) {

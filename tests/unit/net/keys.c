@@ -236,7 +236,7 @@ TEST(only_connections_within_loopback_to_a_daemon_without_keys_need_no_key)
         {"unix:/a", "unix:/b", false, false},
         {"tcp:127.0.0.1:1", "tcp:127.0.0.1:2", false, true},
         {"tcp:[::1]:1", "tcp:[::1]:2", false, true},
-        {"tcp:0.0.0.0:1", "tcp:127.0.0.1:2", true, true}, /* whoever else comes there has to have one as well */
+        {"tcp:0.0.0.0:1", "tcp:127.0.0.1:2", true, true}, /* other clients there need a key as well */
         {"tcp:10.0.0.1:1", "tcp:10.0.0.1:2", true, true},
         {"tcp:127.0.0.1:1", "tcp:10.0.0.7:2", true, true},
     };

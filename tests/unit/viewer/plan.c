@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* When views are made here, of which camera the daemon is asked for a picture and when, and in which quality. */
+/* When views are made here, of which camera the daemon is asked for a picture, and in which quality. */
 #include "viewer/plan.h"
 #include "tests/harness/test.h"
 
@@ -56,7 +56,7 @@ TEST(a_steady_flight_is_foreseen)
     plan_motion_predict(&motion, SECOND + 200 * MS, 100 * MS, &camera);
     assert_true(fabs(camera.eye[0] - 0.6) < CLOSE && fabs(camera.look_at[0] - 0.6) < CLOSE);
     assert_true(camera.eye[2] == 5 && camera.fov_y == 0.8);
-    /* Beyond 0.4 s nobody knows. */
+    /* Nothing is foreseen beyond 0.4 s. */
     plan_motion_predict(&motion, SECOND + 200 * MS, 5 * SECOND, &camera);
     assert_true(fabs(camera.eye[0] - 1.2) < CLOSE);
 }
