@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "protocol/messages.h"
 
+#include <ctype.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -49,6 +50,35 @@ static const struct value_desc *find_value(const char *enum_name, const char *te
     }
 #include "protocol/words.def"
 
+bool protocol_layers_parse(const char *text, unsigned *layers)
+{
+    const struct enum_desc *desc = find_enum("layer");
+    const size_t length = strlen(text);
+    bool found = false;
+    for (size_t i = 0; i < desc->value_count; i++) {
+        const char *known = desc->values[i].text;
+        if (strncmp(known, text, length) != 0 || strspn(known + length, "0123456789") != strlen(known + length)) {
+            continue;
+        }
+        *layers |= 1u << desc->values[i].number;
+        found = true;
+    }
+    return found;
+}
+
+/* The first of the words "x0", "x1", .. that a word is one of; itself, if it is one of none. */
+static size_t series_start(const struct enum_desc *desc, size_t i)
+{
+    const char *word = desc->values[i].text;
+    const size_t length = strlen(word);
+    const size_t number =
+        length > 1 && isdigit((unsigned char)word[length - 1]) ? (size_t)(word[length - 1] - '0') : i + 1;
+    const char *first = number <= i ? desc->values[i - number].text : "";
+    const bool is_series =
+        strlen(first) == length && memcmp(first, word, length - 1) == 0 && first[length - 1] == '0';
+    return is_series ? i - number : i;
+}
+
 const char *protocol_enum_list(const char *enum_name, char *out, size_t out_bytes)
 {
     const struct enum_desc *desc = find_enum(enum_name);
@@ -58,7 +88,12 @@ const char *protocol_enum_list(const char *enum_name, char *out, size_t out_byte
     }
     out[0] = '\0';
     for (size_t i = 0; desc && i < desc->value_count; i++) {
-        int written = snprintf(out + used, out_bytes - used, "%s%s", i == 0 ? "" : ", ", desc->values[i].text);
+        const bool begins = i + 1 < desc->value_count && series_start(desc, i + 1) == i;
+        if (series_start(desc, i) < i) {
+            continue;
+        }
+        int written = snprintf(out + used, out_bytes - used, "%s%.*s", i == 0 ? "" : ", ",
+                               (int)(strlen(desc->values[i].text) - (begins ? 1 : 0)), desc->values[i].text);
         if (written < 0 || (size_t)written >= out_bytes - used) {
             break; /* cut off, NUL-terminated */
         }

@@ -24,8 +24,11 @@ extern "C" {
     bool protocol_##name##_parse(const char *text, enum protocol_##name *out);
 #include "protocol/words.def"
 
-/* For help texts and error messages: "bvh, naive" for the enum called "tracer". Writes at most out_bytes with
- * the NUL, cut off if too long; empty for an unknown enum. Returns out. */
+/* Adds to a set of layers that of the text, or all that are the text and a digit. */
+bool protocol_layers_parse(const char *text, unsigned *layers);
+
+/* For help texts and error messages: "bvh, naive" for the enum called "tracer"; "x" for the words "x0", "x1".
+ * Writes at most out_bytes with the NUL, cut off if too long; empty for an unknown enum. Returns out. */
 const char *protocol_enum_list(const char *enum_name, char *out, size_t out_bytes);
 
 #ifdef __cplusplus

@@ -123,7 +123,8 @@ static const struct argp_option special[] = {
      "files, --crop and comparisons)",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
-     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
+     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown, "
+     "crypto-object and crypto-material (Cryptomatte, with names)",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",
@@ -332,12 +333,10 @@ static error_t set_layers(struct cli_job *job, const char *field, const char *va
     const char *at = value;
     for (;;) {
         char name[24];
-        enum protocol_layer layer = PROTOCOL_LAYER_BEAUTY;
         const size_t length = strcspn(at, ",");
         snprintf(name, sizeof(name), "%.*s", (int)(length < sizeof(name) ? length : sizeof(name)), at);
-        if (!protocol_layer_parse(name, &layer))
+        if (!protocol_layers_parse(name, &layers))
             return cli_unknown_value(job, field, "layer", name);
-        layers |= 1u << layer;
         if (at[length] == '\0')
             break;
         at += length + 1;

@@ -81,7 +81,8 @@ static bool settle(struct session *session, struct fl_error *error)
     session->job->options = session->typed;
     return (!session->job->watch || cli_watch_scene(&session->watch, scene, error)) &&
            cli_choose_camera(session->job, scene, error) &&
-           cli_settle(session->job, scene, session->is_series, error);
+           cli_settle(session->job, scene, session->is_series, error) &&
+           cli_sinks_names(&session->sinks, scene, error);
 }
 
 /* Without a number of attempts a duration is the limit. */

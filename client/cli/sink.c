@@ -182,6 +182,20 @@ bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error)
     return true;
 }
 
+bool cli_sinks_names(struct cli_sinks *sinks, struct fl_scene *scene, struct fl_error *error)
+{
+    unsigned named = 0;
+    (void)protocol_layers_parse("crypto-object", &named);
+    (void)protocol_layers_parse("crypto-material", &named);
+    for (size_t i = 0; i < sinks->count; i++) {
+        const struct cli_sink *sink = &sinks->items[i];
+        if (sink->exporter && sink->job->options.layers & named &&
+            !fl_exporter_names(sink->exporter, scene, error))
+            return false;
+    }
+    return true;
+}
+
 static bool have(struct cli_sink *sink, uint32_t frame)
 {
     const struct message_render *wanted = &sink->job->options;

@@ -35,6 +35,8 @@ struct cli_sinks {
 bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error);
 /* Starts the programs that write. */
 bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error);
+/* Of the scene that frames from now on show, where files have them. */
+bool cli_sinks_names(struct cli_sinks *sinks, struct fl_scene *scene, struct fl_error *error);
 /* Whether the frame's picture already exists, complete and of the wanted size, in every sink. */
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame);
 /* The path of the picture that was passed on last, of the first sink. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The client's side of the exporter program: frames go in, one answer per file comes back. */
 #include "lib/helper.h"
+#include "lib/names.h"
 #include "lib/text.h"
 
 #include <stdio.h>
@@ -89,6 +90,37 @@ static bool send_texts(struct fl_exporter *exporter, const struct fl_export_opti
             return false;
     }
     return true;
+}
+
+static bool send_names(struct fl_exporter *exporter, const struct fl_object *objects, size_t count,
+                       enum protocol_object_kind kind, struct fl_error *error)
+{
+    struct message message = {.type = MESSAGE_EXPORT_NAME, .export_name = {.kind = kind}};
+    char **names = NULL;
+    bool sent = fl_names_make(objects, count, kind, &names, error);
+    for (size_t i = 0; sent && i < count; i++) {
+        message.export_name.object = objects[i].id;
+        message.export_name.name = names[i];
+        sent = !names[i] || fl_helper_send(&exporter->helper, &message, error);
+    }
+    fl_names_free(names, count);
+    return sent;
+}
+
+bool fl_exporter_names(struct fl_exporter *exporter, struct fl_scene *scene, struct fl_error *error)
+{
+    static const enum protocol_object_kind kinds[] = {PROTOCOL_OBJECT_NODE, PROTOCOL_OBJECT_MATERIAL};
+    bool sent = fl_exporter_wait(exporter, error);
+    for (size_t i = 0; sent && i < sizeof(kinds) / sizeof(kinds[0]); i++) {
+        struct fl_object *objects = NULL;
+        size_t count = 0;
+        sent = fl_scene_objects(scene, kinds[i], &objects, &count, error) &&
+               send_names(exporter, objects, count, kinds[i], error);
+        free(objects);
+    }
+    const struct message unnamed = {.type = MESSAGE_EXPORT_NAME,
+                                    .export_name = {.kind = PROTOCOL_OBJECT_MATERIAL, .name = "default"}};
+    return sent && fl_helper_send(&exporter->helper, &unnamed, error) && fl_helper_flush(&exporter->helper, error);
 }
 
 bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *frame,

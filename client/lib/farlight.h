@@ -651,6 +651,10 @@ struct fl_export_options {
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);
+/* Names of nodes and materials for Cryptomatte in EXR files, until others come: those of the scene; those that
+ * share one have the names of what they hang below before it, "car/wheel", and where that is not enough or there is
+ * no name their identifiers, "wheel#12". Files without such layers do not need them. */
+FL_API bool fl_exporter_names(struct fl_exporter *exporter, struct fl_scene *scene, struct fl_error *error);
 /* Hands the frame over and returns; the file is complete, or has failed, by the next call of this or of
  * fl_exporter_wait, which report the failure of the one before. The frame may be destroyed at once. */
 FL_API bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *frame,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "exr_encode.hpp"
 #include "layers.hpp"
+#include "mattes.hpp"
 #include "metadata.hpp"
 #include "protocol/version.h"
 
@@ -152,6 +153,8 @@ Imf::Header make_header(const struct image &image, const std::string &date)
         else if (!each.text.empty())
             header.insert(name, Imf::StringAttribute(each.text));
     }
+    for (const metadata_entry &each : matte_metadata(image.mattes, image.begin->layers))
+        header.insert(each.name, Imf::StringAttribute(each.text));
     add_camera(header, *image.begin);
     if (image.frames_per_second > 0 && image.frames_per_second < 1e6f)
         add_rate(header, image.frames_per_second);

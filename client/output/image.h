@@ -31,6 +31,8 @@ struct image_window {
     uint32_t x, y, width, height;
 };
 
+struct mattes;
+
 struct image {
     enum image_format format;
     bool half;                               /* EXR: half floats */
@@ -39,6 +41,7 @@ struct image {
     bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */
     struct image_window window;              /* EXR; no width: pixels are the whole picture */
     const char *model;                       /* for the metadata; may be empty */
+    const struct mattes *mattes;             /* EXR: names for the layers of Cryptomatte; NULL: none */
     const float *origin;                     /* for the metadata: subtracted from all places; NULL or 0: nothing */
     const struct message_frame_begin *begin; /* encoding raw */
     const struct message_frame_end *end;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "layers.hpp"
+#include "mattes.hpp"
 
 #include <Imath/half.h>
 #include <OpenEXR/ImfFrameBuffer.h>
@@ -11,7 +12,7 @@
 namespace
 {
 
-enum class content { colour, exact, number };
+enum class content { colour, exact, number, object, material };
 
 struct layer_channel {
     enum protocol_layer layer;
@@ -38,7 +39,31 @@ const layer_channel known[] = {{PROTOCOL_LAYER_BEAUTY, 0, "R", content::colour},
                                {PROTOCOL_LAYER_AO, 0, "ao.Y", content::colour},
                                {PROTOCOL_LAYER_ID, 0, "id.node", content::number},
                                {PROTOCOL_LAYER_ID, 1, "id.material", content::number},
-                               {PROTOCOL_LAYER_UNKNOWN, 0, "unknown.Y", content::colour}};
+                               {PROTOCOL_LAYER_UNKNOWN, 0, "unknown.Y", content::colour},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT0, 0, "CryptoObject00.red", content::object},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT0, 1, "CryptoObject00.green", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT0, 2, "CryptoObject00.blue", content::object},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT0, 3, "CryptoObject00.alpha", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT1, 0, "CryptoObject01.red", content::object},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT1, 1, "CryptoObject01.green", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT1, 2, "CryptoObject01.blue", content::object},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT1, 3, "CryptoObject01.alpha", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT2, 0, "CryptoObject02.red", content::object},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT2, 1, "CryptoObject02.green", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT2, 2, "CryptoObject02.blue", content::object},
+                               {PROTOCOL_LAYER_CRYPTO_OBJECT2, 3, "CryptoObject02.alpha", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL0, 0, "CryptoMaterial00.red", content::material},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL0, 1, "CryptoMaterial00.green", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL0, 2, "CryptoMaterial00.blue", content::material},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL0, 3, "CryptoMaterial00.alpha", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL1, 0, "CryptoMaterial01.red", content::material},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL1, 1, "CryptoMaterial01.green", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL1, 2, "CryptoMaterial01.blue", content::material},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL1, 3, "CryptoMaterial01.alpha", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 0, "CryptoMaterial02.red", content::material},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 1, "CryptoMaterial02.green", content::exact},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 2, "CryptoMaterial02.blue", content::material},
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 3, "CryptoMaterial02.alpha", content::exact}};
 
 constexpr float half_max = 65504.0f;
 constexpr int band_rows = 64; // a multiple of the rows that are compressed together
@@ -89,13 +114,24 @@ float component(enum protocol_pixel_format format, const void *pixels, size_t in
     }
 }
 
+// Identifiers are hashes of names in the file, as floats of the same bits.
+float matte_of(const struct image &image, enum content content, float value)
+{
+    const bool is_object = content == content::object, is_material = content == content::material;
+    if (!is_object && !is_material)
+        return value;
+    return matte_identifier(image.mattes, is_object ? PROTOCOL_OBJECT_NODE : PROTOCOL_OBJECT_MATERIAL,
+                            number_of(value));
+}
+
 // One channel of the pixels from `first` on.
 void put_row(const struct image &image, size_t first, const layer_channel &channel, Imf::PixelType type, char *to)
 {
     for (size_t x = 0; x < image.begin->width; x++, to += size_of(type)) {
-        const float value =
+        const float stored =
             component(image.begin->format, image.pixels, 4 * (first + x) + static_cast<size_t>(channel.component));
-        const uint32_t number = number_of(value);
+        const float value = matte_of(image, channel.content, stored);
+        const uint32_t number = number_of(stored);
         const half rounded(std::clamp(value, -half_max, half_max)); // as the renderer does for half floats
         if (type == Imf::UINT)
             std::memcpy(to, &number, sizeof(number));

@@ -6,6 +6,7 @@
 #include "image.h"
 #include "helper/incoming.h"
 #include "library.h"
+#include "mattes.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,6 +38,7 @@ struct exporter {
     const struct serve_options *options;
     struct channel channel;
     struct request request;
+    struct mattes *mattes; /* owned; NULL: no name has come */
 };
 
 /* ---- one file ---- */
@@ -114,6 +116,7 @@ static void write_image(struct exporter *exporter, const struct message_frame_en
                                 .full_metadata = exporter->options->full_metadata,
                                 .window = exporter->options->window,
                                 .model = request->model,
+                                .mattes = exporter->mattes,
                                 .origin = request->origin,
                                 .begin = &request->incoming.begin,
                                 .end = end,
@@ -186,6 +189,8 @@ static bool handle(void *user, uint32_t number, const struct message *message)
     struct request *request = &exporter->request;
     if (message->type == MESSAGE_COMPARE_IMAGES)
         return !request->named && compare(exporter, number, &message->compare_images);
+    if (message->type == MESSAGE_EXPORT_NAME)
+        return !request->named && mattes_name(&exporter->mattes, &message->export_name);
     if (message->type != MESSAGE_EXPORT_IMAGE && number != request->number)
         return false;
     switch (message->type) {
@@ -216,5 +221,6 @@ bool serve(const struct serve_options *options)
     const bool good = channel_run(&exporter.channel);
     incoming_finish(&exporter.request.incoming);
     free(exporter.request.texts);
+    mattes_destroy(exporter.mattes);
     return good;
 }

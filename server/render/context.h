@@ -34,6 +34,7 @@ struct render_context {
     struct tracer *layer_tracer;     /* first hits are those of a layer of its structure; NULL: they are not */
     uint32_t layer;
     struct key_view *marked_key;     /* whose marks say which texels of it are rendered; NULL: all are */
+    struct gpu_buffer *covers;       /* shared/layers.h, to be noted as waves are shaded; NULL: not */
     struct gpu_buffer *tile_samples; /* of a picture whose tiles stop one by one; NULL: of others */
     struct comparison *comparison;   /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;

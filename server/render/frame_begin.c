@@ -286,7 +286,7 @@ static bool size_frame(struct frame_renderer *renderer, struct error *error)
     context->sums_in_picture = context->counts_on_host && renderer->target->samples == 1 &&
                                renderer->target->layers & 1u << LAYER_BEAUTY && !context->comparison &&
                                !renderer->key_tracer && !context->tile_samples && !denoise_is_wanted(context);
-    layers_begin(&renderer->work->layers, &context->request);
+    layers_begin(&renderer->work->layers, context, !frame_is_eyes_pass(renderer));
     return true;
 }
 

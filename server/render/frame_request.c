@@ -4,6 +4,7 @@
 #include "render/integrators/integrator.h"
 #include "render/picture.h"
 #include "shared/key_view.h"
+#include "shared/layers.h"
 
 #include <math.h>
 #include <string.h>
@@ -78,6 +79,11 @@ static bool check_integrator(const struct frame_request *request, struct error *
     return true;
 }
 
+uint32_t frame_layers_all(void)
+{
+    return LAYER_BITS_ALL;
+}
+
 uint32_t frame_request_layers(const struct frame_request *request)
 {
     return request->layers ? request->layers : 1u << LAYER_BEAUTY;
@@ -135,9 +141,9 @@ uint64_t frame_request_bytes(const struct frame_request *request)
 
 static bool check_layers(const struct frame_request *request, struct error *error)
 {
-    if (request->layers >= 1u << LAYER_COUNT)
+    if (request->layers & ~LAYER_BITS_ALL)
         return error_set(error, ERROR_UNSUPPORTED, "layers", "there is no layer number %d",
-                         31 - __builtin_clz(request->layers));
+                         __builtin_ctz(request->layers & ~LAYER_BITS_ALL));
     if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
     if (request->attachments >= 1u << ATTACHMENT_COUNT)

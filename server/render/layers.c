@@ -14,7 +14,10 @@ _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 <<
                    LAYER_BIT_NORMAL == 1 << LAYER_NORMAL && LAYER_BIT_DEPTH == 1 << LAYER_DEPTH &&
                    LAYER_BIT_POSITION == 1 << LAYER_POSITION && LAYER_BIT_AO == 1 << LAYER_AO &&
                    LAYER_BIT_ID == 1 << LAYER_ID && LAYER_BIT_UNKNOWN == 1 << LAYER_UNKNOWN &&
-                   LAYER_UNKNOWN + 1 == LAYER_COUNT && LAYER_BIT_STICKING == 1 << LAYER_STICKING,
+                   LAYER_BITS_CRYPTO_OBJECT == 7 << LAYER_CRYPTO_OBJECT0 &&
+                   LAYER_BITS_CRYPTO_MATERIAL == 7 << LAYER_CRYPTO_MATERIAL0 &&
+                   LAYER_BITS_ALL >> LAYER_COUNT == 0 && LAYER_BITS_ALL >> (LAYER_COUNT - 1) == 1 &&
+                   LAYER_BIT_STICKING == 1 << LAYER_STICKING,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)
@@ -22,9 +25,21 @@ bool layers_of_first_sample(enum layer layer)
     return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID;
 }
 
-void layers_begin(struct layers *layers, const struct frame_request *request)
+void layers_begin(struct layers *layers, struct render_context *context, bool is_shaded)
 {
+    const struct frame_request *request = &context->request;
     layers->wanted = frame_request_planes(request) & ~LAYER_BIT_BEAUTY;
+    layers->covers_by_shading = layers->wanted & LAYER_BITS_CRYPTO && is_shaded &&
+                                (context->features.blend || request->integrator == INTEGRATOR_RAYCAST);
+    context->covers = layers->covers_by_shading ? &layers->covers : NULL;
+}
+
+/* Planes of BIND_COVERS. */
+static uint32_t cover_waves(const struct layers *layers)
+{
+    if (!(layers->wanted & LAYER_BITS_CRYPTO))
+        return 0;
+    return layers->covers_by_shading ? COVERS_MAX : 1;
 }
 
 bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
@@ -35,13 +50,20 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
         layers_finish(layers, device);
         return true;
     }
-    size_t planes = (size_t)__builtin_popcount(layers->wanted);
+    size_t planes = (size_t)__builtin_popcount(layers->wanted & ~LAYER_BITS_CRYPTO);
+    size_t covers = (size_t)cover_waves(layers) * slice_samples;
     size_t rays = layers->wanted & LAYER_BIT_AO ? context->wave_capacity : 0;
     size_t times = context->scene->has_motion ? rays : 0;
     return gpu_buffer_reserve(device, &layers->sums, planes * slice_samples * sizeof(vec4), error) &&
+           gpu_buffer_reserve(device, &layers->covers, covers * sizeof(uvec4), error) &&
            gpu_buffer_reserve(device, &layers->ao_rays, rays * sizeof(struct ray), error) &&
            gpu_buffer_reserve(device, &layers->ao_times, times * sizeof(float), error) &&
            gpu_buffer_reserve(device, &layers->ao_visibility, rays * sizeof(uint), error);
+}
+
+bool layers_are_shaded(const struct layers *layers)
+{
+    return layers->covers_by_shading;
 }
 
 void layers_begin_slice(struct layers *layers, const struct render_context *context)
@@ -52,11 +74,17 @@ void layers_begin_slice(struct layers *layers, const struct render_context *cont
     layers->plane_samples = context->slice.slot_count << context->uniforms.sample_shift;
 }
 
+/* Of the sums. */
+static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
+{
+    return (uint32_t)__builtin_popcount(layers->wanted & ~LAYER_BITS_CRYPTO & (layer_bit - 1));
+}
+
 uint32_t layers_take_unknown(struct layers *layers)
 {
     layers->noting = layers->wanted & ~LAYER_BIT_UNKNOWN;
-    const uint32_t planes_before = (uint32_t)__builtin_popcount(layers->noting);
-    return layers->noting == layers->wanted ? UINT32_MAX : planes_before * layers->plane_samples;
+    return layers->noting == layers->wanted ? UINT32_MAX
+                                            : plane_of(layers, LAYER_BIT_UNKNOWN) * layers->plane_samples;
 }
 
 /* A program that reads hits, in use, with all that these have bound; each of `own`: a define of its own, or NULL.
@@ -77,11 +105,6 @@ static const struct gpu_program *use(struct render_context *context, const char 
     context_bind_hits(context);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     return program;
-}
-
-static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
-{
-    return (uint32_t)__builtin_popcount(layers->wanted & (layer_bit - 1));
 }
 
 static bool note_sticking(struct layers *layers, struct render_context *context, struct error *error)
@@ -114,11 +137,30 @@ static bool note_hits(struct layers *layers, struct render_context *context, str
     if (program) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
-        gpu_uniform_uint(program, "layers", layers->noting);
+        gpu_uniform_uint(program, "layers", layers->wanted);
+        gpu_uniform_uint(program, "noting", layers->noting);
         gpu_dispatch(context->device, program, context->ray_count);
     }
     context_span_end(context);
     return program && gpu_check(context->device, "layers", error);
+}
+
+static bool begin_covers(struct layers *layers, struct render_context *context, struct error *error)
+{
+    if (!(layers->noting & LAYER_BITS_CRYPTO))
+        return true;
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = context_use(context, "render/layers_covers.comp", error);
+    if (program) {
+        gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+        gpu_buffer_bind_storage(&layers->covers, BIND_COVERS);
+        gpu_uniform_uint(program, "ray_count", context->ray_count);
+        gpu_uniform_uint(program, "cover_waves", cover_waves(layers));
+        gpu_uniform_uint(program, "are_known", !layers->covers_by_shading);
+        gpu_dispatch(context->device, program, context->ray_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "what covers samples", error);
 }
 
 static bool make_ao_rays(struct layers *layers, struct render_context *context, uint32_t count,
@@ -199,7 +241,7 @@ static bool adds(const struct render_context *context, enum layer layer)
 static bool any_adds(const struct layers *layers, const struct render_context *context)
 {
     for (enum layer layer = LAYER_ALBEDO; layer <= LAYER_STICKING; layer++)
-        if (layers->noting & 1u << layer && adds(context, layer))
+        if (layers->noting & ~LAYER_BITS_CRYPTO & 1u << layer && adds(context, layer))
             return true;
     return false;
 }
@@ -211,6 +253,7 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
         layers->noted = true;
         *done = all == 0;
         return (!any_adds(layers, context) || note_hits(layers, context, error)) &&
+               begin_covers(layers, context, error) &&
                (!(layers->noting & LAYER_BIT_STICKING) || note_sticking(layers, context, error));
     }
     if (layers->asking == 0) {
@@ -230,29 +273,70 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
     return gather_ao(layers, context, count, error);
 }
 
+/* Of a kind, whose planes are those that `bits` has; the others hold nothing else. */
+static bool rank_covers(struct layers *layers, struct picture *picture, struct render_context *context,
+                        uint32_t bits, struct error *error)
+{
+    static const unsigned points[CRYPTO_PLANES] = {BIND_ACCUMULATION, BIND_PASS_1, BIND_PASS_2};
+    static const char *const counts[] = {"1", "2", "3"};
+    const uint32_t wanted = layers->wanted & bits;
+    const uint32_t first = (uint32_t)__builtin_popcount(picture->layers & ((wanted & -wanted) - 1));
+    const uint32_t count = (uint32_t)__builtin_popcount(wanted);
+    if (!wanted)
+        return true;
+    struct gpu_define defines[4] = {{"PLANES", counts[count - 1]}};
+    size_t n = 1;
+    if (bits == LAYER_BITS_CRYPTO_MATERIAL)
+        defines[n++] = (struct gpu_define){"MATERIALS", "1"};
+    if (context->tile_samples)
+        defines[n++] = (struct gpu_define){"HAS_TILE_SAMPLES", "1"};
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = context_use_with(context, "render/layers_rank.comp", defines, error);
+    if (program) {
+        uint32_t first_slot;
+        const uint32_t band = picture_slice_band_number(picture, &context->slice, &first_slot);
+        context_bind(context);
+        if (context->tile_samples)
+            gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+        for (uint32_t i = 0; i < count; i++)
+            gpu_buffer_bind_storage(picture_band(picture, first + i, band), points[i]);
+        gpu_buffer_bind_storage(&layers->covers, BIND_COVERS);
+        gpu_uniform_uint(program, "first_picture_slot", context->slice.first_slot);
+        gpu_uniform_uint(program, "first_slot", first_slot);
+        gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
+        gpu_uniform_uint(program, "sample_shift", context->uniforms.sample_shift);
+        gpu_uniform_uint(program, "cover_waves", cover_waves(layers));
+        gpu_dispatch(context->device, program, context->slice.slot_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "ranks of what covers pixels", error);
+}
+
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
                        struct error *error)
 {
     for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
         enum layer layer = picture_plane_layer(picture, plane);
-        if (layer == LAYER_BEAUTY || !adds(context, layer))
+        if (layer == LAYER_BEAUTY || LAYER_BITS_CRYPTO >> layer & 1 || !adds(context, layer))
             continue;
         uint32_t first_sum = plane_of(layers, 1u << layer) * layers->plane_samples;
         if (!picture_accumulate(picture, context, plane, &layers->sums, first_sum, error))
             return false;
     }
-    return true;
+    return rank_covers(layers, picture, context, LAYER_BITS_CRYPTO_OBJECT, error) &&
+           rank_covers(layers, picture, context, LAYER_BITS_CRYPTO_MATERIAL, error);
 }
 
 uint64_t layers_device_bytes(const struct layers *layers)
 {
-    return layers->sums.capacity_bytes + layers->ao_rays.capacity_bytes + layers->ao_times.capacity_bytes +
-           layers->ao_visibility.capacity_bytes;
+    return layers->sums.capacity_bytes + layers->covers.capacity_bytes + layers->ao_rays.capacity_bytes +
+           layers->ao_times.capacity_bytes + layers->ao_visibility.capacity_bytes;
 }
 
 void layers_finish(struct layers *layers, struct gpu_device *device)
 {
     gpu_buffer_finish(device, &layers->sums);
+    gpu_buffer_finish(device, &layers->covers);
     gpu_buffer_finish(device, &layers->ao_rays);
     gpu_buffer_finish(device, &layers->ao_times);
     gpu_buffer_finish(device, &layers->ao_visibility);

@@ -11,6 +11,8 @@
 struct layers {
     uint32_t wanted;        /* bits, without LAYER_BEAUTY; 0: nothing is done, and no memory is held */
     struct gpu_buffer sums; /* shared/layers.h */
+    struct gpu_buffer covers;
+    bool covers_by_shading; /* not by first hits: other surfaces show through some */
     struct gpu_buffer ao_rays, ao_times, ao_visibility;
     uint32_t noting;        /* of the current slice: those that hits are noted in */
     bool noted;             /* of the current slice: properties of its hits */
@@ -19,8 +21,10 @@ struct layers {
     uint32_t plane_samples; /* likewise: its samples, so many in each plane of the sums */
 };
 
-/* Of another pass: the layers that it wants. */
-void layers_begin(struct layers *layers, const struct frame_request *request);
+/* Of another pass: the layers that it wants. `is_shaded`: it shades what its rays hit. */
+void layers_begin(struct layers *layers, struct render_context *context, bool is_shaded);
+/* Whether they need the waves that the beauty does. */
+bool layers_are_shaded(const struct layers *layers);
 /* Reserves them, for slices of `samples` samples and waves of wave_capacity rays. */
 bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
                     struct error *error);

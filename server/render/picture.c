@@ -199,12 +199,13 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
     const struct gpu_program *program = picture_accumulate_program(context, error);
     if (!program)
         return false;
-    uint32_t band = context->slice.first_slot / band_slots(picture);
+    uint32_t first_slot;
+    const uint32_t band = picture_slice_band_number(picture, &context->slice, &first_slot);
     gpu_buffer_bind_storage(picture_band(picture, plane, band), BIND_ACCUMULATION);
     gpu_buffer_bind_storage(sums, BIND_SLICE_SUMS);
     gpu_buffer_bind_uniform(&context->wave_state, UNIFORM_WAVE);
     gpu_uniform_uint(program, "first_sum", first_sum);
-    gpu_uniform_uint(program, "first_slot", context->slice.first_slot - band * band_slots(picture));
+    gpu_uniform_uint(program, "first_slot", first_slot);
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
     gpu_uniform_uint(program, "sample_shift", context->uniforms.sample_shift);
     context_span_begin(context, STAGE_SHADE);
@@ -229,12 +230,17 @@ uint32_t picture_band_slots(const struct picture *picture, uint32_t band, uint32
     return picture_band_end(picture, *first) - *first;
 }
 
-struct gpu_buffer *picture_slice_band(const struct picture *picture, const struct slice *slice,
-                                      uint32_t *first_slot)
+uint32_t picture_slice_band_number(const struct picture *picture, const struct slice *slice, uint32_t *first_slot)
 {
     const uint32_t band = slice->first_slot / band_slots(picture);
     *first_slot = slice->first_slot - band * band_slots(picture);
-    return picture_band(picture, 0, band);
+    return band;
+}
+
+struct gpu_buffer *picture_slice_band(const struct picture *picture, const struct slice *slice,
+                                      uint32_t *first_slot)
+{
+    return picture_band(picture, 0, picture_slice_band_number(picture, slice, first_slot));
 }
 
 void picture_drop_pixels(struct picture *picture)

@@ -71,6 +71,8 @@ enum layer picture_plane_layer(const struct picture *picture, uint32_t plane);
 struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band);
 /* How many slots a band has, and the first of them. */
 uint32_t picture_band_slots(const struct picture *picture, uint32_t band, uint32_t *first);
+/* The band that the slice is in, and its first slot there. */
+uint32_t picture_slice_band_number(const struct picture *picture, const struct slice *slice, uint32_t *first_slot);
 /* The band of the first plane that the slice is in, and its first slot there. */
 struct gpu_buffer *picture_slice_band(const struct picture *picture, const struct slice *slice,
                                       uint32_t *first_slot);

@@ -5,6 +5,7 @@
 #include "render/layers.h"
 #include "render/picture.h"
 
+#include "shared/layers.h"
 #include "shared/path.h"
 
 #include <epoxy/gl.h>
@@ -32,13 +33,18 @@ static const char *shows_display_values(const struct render_context *context, en
     return context->display_values && is_colour ? "DISPLAY_VALUES" : NULL;
 }
 
+static const char *has_pairs(enum layer layer)
+{
+    return LAYER_BITS_CRYPTO >> layer & 1 ? "PAIRS" : NULL;
+}
+
 /* Of a program of display.glsl; with the curve where it makes display values. */
-#define DISPLAY_DEFINES 3
+#define DISPLAY_DEFINES 4
 static void display_defines(const struct render_context *context, enum layer layer, bool displays,
                             struct gpu_define defines[DISPLAY_DEFINES])
 {
     static const char *const numbers[] = {[TONE_NEUTRAL] = "0u", [TONE_ACES] = "1u", [TONE_NONE] = "2u"};
-    const char *names[] = {shows_display_values(context, layer), counts_tiles(context, layer)};
+    const char *names[] = {shows_display_values(context, layer), counts_tiles(context, layer), has_pairs(layer)};
     size_t n = 0;
     if (displays && !names[0])
         defines[n++] = (struct gpu_define){"TONE_MAP", numbers[context->request.tone_map]};

@@ -8,6 +8,7 @@
 
 #include "shared/bindings.h"
 #include "shared/hit.h"
+#include "shared/layers.h"
 #include "shared/path.h"
 #include "shared/ray.h"
 
@@ -141,6 +142,7 @@ static const struct gpu_program *gather_program(const struct wave_passes *passes
         integrator->left_scene,
         meets_lights ? "HAS_AREA_LIGHTS" : NULL,
         meets_lights && context_samples_emitters(context) ? "HAS_EMITTERS" : NULL,
+        context->covers ? "COVERS" : NULL,
     };
     struct gpu_define defines[sizeof(names) / sizeof(names[0]) + 1] = {0};
     size_t n = 0;
@@ -170,6 +172,12 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
     gpu_buffer_bind_storage(&passes->visibility, BIND_VISIBILITY);
+    if (context->covers) {
+        gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+        gpu_buffer_bind_storage(context->covers, BIND_COVERS);
+        gpu_uniform_uint(program, "wave_number", context->wave_number);
+        gpu_uniform_uint(program, "sample_count", context->slice.slot_count << context->uniforms.sample_shift);
+    }
     context_bind_sums(context);
     context_span_begin(context, STAGE_SHADE);
     compact_dispatch(context, program, WAVE_RAYS);

@@ -2,6 +2,7 @@
 // The mean of a pixel's samples, and its display value.
 // Defines:
 //   HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h)
+//   PAIRS            sums are an identifier and a share, twice (shared/layers.h)
 //   DISPLAY_VALUES   what is summed is display values of no curve
 //   TONE_MAP         the curve, a number of common/tonemap.glsl; else there is none
 #include "shared/path.h"
@@ -42,6 +43,9 @@ vec4 mean_of_sum(vec4 sum, uvec2 pixel)
     uint stopped_at = texelFetch(tile_samples, int(first_tile + slot_of_pixel(pixel) / TILE_SLOTS)).x;
     if (stopped_at != 0u)
         by = vec2(exposure, 1.0) * (1.0 / float(stopped_at));
+#endif
+#ifdef PAIRS
+    return vec4(sum.r, min(sum.g * by.y, 1.0), sum.b, min(sum.a * by.y, 1.0));
 #endif
     return vec4(sum.rgb * by.x, clamp(sum.a * by.y, 0.0, 1.0));
 }

@@ -4,7 +4,7 @@
 // sum is the same to the bit every time. Shadow rays come in batches: each batch is added to its path's radiance, and
 // the last to the samples, so their number does not matter. Paths that left the scene bring the environment home here.
 // Defines: GREY of what a shadow ray lets through, the mean of the channels counts; GROUND shadow rays change the pixel's
-// coverage, too (ground.comp). Those of left_scene.glsl.
+// coverage, too (ground.comp); COVERS what covers the pixel is noted (shared/layers.h). Those of left_scene.glsl.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -22,6 +22,23 @@ layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit
 layout(std430, binding = BIND_RADIANCE) buffer radiance_block { vec4 radiance[]; };
 layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
 layout(std430, binding = BIND_SLICE_SUMS) buffer sum_block { vec4 slice_sums[]; };
+
+#ifdef COVERS
+#include "shared/hit.h"
+#include "shared/layers.h"
+uniform uint wave_number;
+uniform uint sample_count; // of the slice
+layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
+layout(std430, binding = BIND_COVERS) writeonly buffer cover_block { uvec4 covers[]; };
+
+// Of a sample one path at most goes straight on. The shadow on a ground covers, but is no object.
+void note_cover(uint slot, uint k, float share)
+{
+    uvec4 h = texelFetch(hits, int(3u * k));
+    if (share > 0.0 && wave_number < COVERS_MAX && (h.y & HIT_GROUND) == 0u)
+        covers[wave_number * sample_count + slot] = uvec4(h.w, h.y, floatBitsToUint(share), 0u);
+}
+#endif
 
 // The maximum radiance of a pixel: half floats hold 65504, and brighter values are white at any exposure of a scene lit
 // for the eye. NaN must not spread either.
@@ -77,6 +94,10 @@ void main()
             arrived = radiance_of_hit(k, j);
         else if (last)
             arrived = radiance_beyond(k);
+#ifdef COVERS
+        if (last && j != HIT_PLACE_NONE)
+            note_cover(slot, k, arrived.a);
+#endif
         if (last)
             sum += finite(arrived);
         else

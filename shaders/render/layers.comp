@@ -10,13 +10,14 @@
 
 uniform uint ray_count;
 uniform uint layers; // of the frame, without the beauty
+uniform uint noting; // of them, what is put
 
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
 
 void put(uint layer_bit, uint k, vec4 value)
 {
-    uint plane = uint(bitCount(layers & layer_bit - 1u));
-    if ((layers & layer_bit) != 0u)
+    uint plane = uint(bitCount(layers & ~LAYER_BITS_CRYPTO & layer_bit - 1u));
+    if ((noting & layer_bit) != 0u)
         layer_sums[plane * ray_count + k] = value;
 }
 

@@ -12,12 +12,23 @@
 #define LAYER_BIT_POSITION 16u
 #define LAYER_BIT_AO 32u
 #define LAYER_BIT_ID 64u
-#define LAYER_BIT_UNKNOWN 128u /* the last: its plane comes behind all others */
+#define LAYER_BIT_UNKNOWN 128u
+#define LAYER_BITS_CRYPTO_OBJECT 0x0700u
+#define LAYER_BITS_CRYPTO_MATERIAL 0x3800u
+#define LAYER_BITS_CRYPTO (LAYER_BITS_CRYPTO_OBJECT | LAYER_BITS_CRYPTO_MATERIAL)
+#define LAYER_BITS_ALL 0x3fffu
 /* Of an attachment, which no layer beside the beauty goes with: no LAYER. */
-#define LAYER_BIT_STICKING 256u
+#define LAYER_BIT_STICKING 0x10000000u
 
-/* Storage buffer: a plane for each layer of the frame but the beauty, in their order; in it a vec4 for each sample
- * of the slice. */
+/* Storage buffer: a plane for each layer of the frame but the beauty and those of Cryptomatte, in their order; in it
+ * a vec4 for each sample of the slice. */
 #define BIND_LAYER_SUMS BIND_PASS_0
+
+/* Storage buffer: what covers each sample of the slice, for Cryptomatte: a plane for each wave of rays that go
+ * straight on, in it a uvec4 for each sample: instance as of a hit, material with its HIT bits, bits of the share,
+ * 0. Share 0: nothing. */
+#define BIND_COVERS BIND_PASS_4
+#define COVERS_MAX 8u   /* waves; behind so many blended surfaces little is left */
+#define CRYPTO_PLANES 3 /* of a kind, with two identifiers each */
 
 #endif

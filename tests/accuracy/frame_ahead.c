@@ -2,6 +2,7 @@
 /* Frames whose waves are queued without waiting for their counts, as on a GPU: how often the host waits, and what
  * it does where there is too little room for what was queued. The device is taken for hardware, whatever it is. */
 #include "protocol/tracers.h"
+#include "shared/layers.h"
 #include "render/frame_state.h"
 #include "render/layers.h"
 #include "tests/accuracy/render_fixture.h"
@@ -96,7 +97,7 @@ TEST_LONG(the_host_waits_once_whatever_the_integrator_tracer_and_layers)
             snprintf(what, sizeof(what), "integrator %u, tracer %u", forms[i].integrator, tracers[k]);
             assert_ahead_is_as_waiting(fixture, what);
         }
-    fixture->request.layers = (1u << LAYER_COUNT) - 1;
+    fixture->request.layers = LAYER_BITS_ALL;
     assert_ahead_is_as_waiting(fixture, "all layers");
 }
 

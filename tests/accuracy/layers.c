@@ -2,10 +2,11 @@
 /* Layers beside a picture's light, against what is known of simple scenes. */
 #include "tests/accuracy/sampled_scenes.h"
 
+#include "shared/layers.h"
 #include "trace/tracer.h"
 #include "tests/harness/test.h"
 
-#define ALL ((1u << LAYER_COUNT) - 1)
+#define ALL LAYER_BITS_ALL
 #define BIT(layer) (1u << (layer))
 /* Places some metres from the origin, in floats: a few roundings of 2^-24 of 10 m. */
 #define ROUNDING_METRES 5e-6
@@ -384,7 +385,9 @@ TEST_LONG(neither_the_picture_nor_the_layers_depend_on_each_other)
         struct frame_result beside = render(fixture, ALL & ~BIT(LAYER_BEAUTY));
         assert_memory_equal(together.pixels, alone.pixels, plane_bytes);
         assert_memory_equal(together.pixels + plane_bytes, beside.pixels, beside.size_bytes);
-        assert_int_equal(beside.secondary_rays, 0);
+        if (integrator !=
+            INTEGRATOR_RAYCAST) /* which sees through all surfaces: those behind are in Cryptomatte, too */
+            assert_int_equal(beside.secondary_rays, 0);
         frame_renderer_set_capacity(fixture->renderer, 256,
                                     257); /* overflows in glass, which makes two rays of one */
         struct frame_result cut = render(fixture, ALL);
@@ -464,8 +467,8 @@ static void expect_refused(struct fixture *fixture, const char *text)
 TEST(layers_that_there_are_not_or_no_pixel_holds_are_refused)
 {
     struct fixture *fixture = *state;
-    fixture->request.layers = BIT(LAYER_COUNT);
-    expect_refused(fixture, "number 8");
+    fixture->request.layers = BIT(28);
+    expect_refused(fixture, "number 28");
     fixture->request.layers = BIT(LAYER_DEPTH);
     fixture->request.format = PIXEL_FORMAT_RGBA16F;
     expect_refused(fixture, "rgba32f");

@@ -8,7 +8,7 @@ from farlight_test import Daemon, OneDaemon, bundled_scenes, exr_attributes, exr
 
 EYE, LOOK_AT = (0.3, 1.1, 3.1), (0.0, 0.9, 0.0)
 VIEW = ["--size", "48x40", "--eye", ",".join(map(str, EYE)), "--look-at", ",".join(map(str, LOOK_AT)), "--fov", "50"]
-ALL = "beauty,albedo,normal,depth,position,ao,id,unknown"
+ALL = "beauty,albedo,normal,depth,position,ao,id,unknown,crypto-object,crypto-material"
 UINT, HALF, FLOAT = 0, 1, 2
 CHANNELS = {
     "beauty": {"R": HALF, "G": HALF, "B": HALF, "A": HALF},
@@ -19,6 +19,8 @@ CHANNELS = {
     "ao": {"ao.Y": HALF},
     "id": {"id.node": UINT, "id.material": UINT},
     "unknown": {"unknown.Y": HALF},
+    "crypto-object": {f"CryptoObject{n:02}.{one}": FLOAT for n in range(3) for one in ("red", "green", "blue", "alpha")},
+    "crypto-material": {f"CryptoMaterial{n:02}.{one}": FLOAT for n in range(3) for one in ("red", "green", "blue", "alpha")},
 }
 
 
@@ -39,8 +41,10 @@ class Layers(OneDaemon):
                 for layer in layers.split(","):
                     wanted.update(CHANNELS[layer])
                 self.assertEqual(exr_channels(path), wanted)
+                words = [word for name in CHANNELS if name in layers.split(",")
+                         for word in ([f"{name}{n}" for n in range(3)] if name.startswith("crypto") else [name])]
                 self.assertEqual(exr_attributes(path).get("farlight/layers", b"").decode().strip("\0"),
-                                 ",".join(name for name in CHANNELS if name in layers.split(",")) if layers != "beauty" else "")
+                                 ",".join(words) if layers != "beauty" else "")
 
         channels = exr_channels(self.render("--layers", ALL, "--float")[0])
         self.assertEqual({name: kind for name, kind in channels.items() if kind != FLOAT}, CHANNELS["id"])
@@ -99,7 +103,7 @@ class Layers(OneDaemon):
         digests = set()
         for encoding in ("raw", "zstd", "predicted"):
             frame, = frames_of(self.render("--layers", ALL, "--encoding", encoding)[1])
-            self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 8))
+            self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 14))
             self.assertEqual(frame["wire_bytes"] < frame["pixels_bytes"], encoding != "raw")
             digests.add(frame["digest"])
         self.assertEqual(len(digests), 1)
@@ -123,7 +127,7 @@ class Layers(OneDaemon):
                 ("x.png", [], "write an .exr file, or leave out --layers"), ("x.hdr", [], "write an .exr file"),
                 ("x.jpg", [], "write an .exr file"), ("x.exr", ["--encoding", "jpeg"], "raw, zstd or predicted"),
                 ("x.exr", ["--size", "8192x8192"], "some of them at a time"),
-                ("x.exr", ["--layers", "beauty,z"], "known: beauty, albedo, normal, depth, position, ao, id, unknown"),
+                ("x.exr", ["--layers", "beauty,z"], "known: beauty, albedo, normal, depth, position, ao, id, unknown, crypto-object, crypto-material"),
                 ("x.exr", ["--layers", ""], "known: beauty")):
             with self.subTest(output=output, options=options):
                 result = self.expect(farlight("render", missing, "-o", self.folder / output, "--layers", ALL, *options), 2)

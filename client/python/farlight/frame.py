@@ -25,11 +25,17 @@ def pixels_bytes(begin: FrameBegin) -> int:
     return begin.width * begin.height * bytes_per_pixel * begin.layers.bit_count()
 
 
+def _layers_of(name: Union[str, Layer]) -> "list[Layer]":
+    """A name without its digit stands for all that have it: "crypto-object"."""
+    whole = [layer for layer in Layer if isinstance(name, str) and layer.word.rstrip("0123456789") == name.replace("_", "-").lower()]
+    return whole or [Layer(Layer.of(name))]
+
+
 def layer_set(layers: Union[str, Layer, "tuple[str | Layer, ...]", "list[str | Layer]"]) -> int:
     """The set of bits of "depth", or of ("beauty", "depth")."""
     try:
         names = (layers,) if isinstance(layers, (str, Layer)) else tuple(layers)
-        return sum({1 << int(Layer.of(name)) for name in names})
+        return sum({1 << int(layer) for name in names for layer in _layers_of(name)})
     except (TypeError, ValueError) as why:
         raise InvalidValue(str(why), field="render.layers") from None
 

@@ -91,6 +91,12 @@ class Layer(Word):
     AO = 5
     ID = 6
     UNKNOWN = 7
+    CRYPTO_OBJECT0 = 8
+    CRYPTO_OBJECT1 = 9  # likewise, the third and the fourth
+    CRYPTO_OBJECT2 = 10  # likewise, the fifth and the sixth
+    CRYPTO_MATERIAL0 = 11  # likewise, of materials
+    CRYPTO_MATERIAL1 = 12  # likewise
+    CRYPTO_MATERIAL2 = 13  # likewise
 
 
 class Attachment(Word):
@@ -2172,7 +2178,7 @@ class Render(Message):
         _f.real("ao_falloff", 0.0, 64.0),
         _f.whole("ao_rays", "I", 1, 256),
         _f.real("layer_opacity", 1e-6, 1.0),
-        _f.whole("layers", "I", 0, 255),
+        _f.whole("layers", "I", 0, 268435455),
         _f.choice("bvh_bounds", BvhBounds),
         _f.whole("bvh_rays", "I", 0, 8, listed=(0, 1, 2, 3, 4, 8)),
         _f.whole("ldc_resolution", "I", 16, 4096, zero=True),
@@ -2466,7 +2472,7 @@ class FrameBegin(Message):
         _f.real("aperture", 0.0, 1e6),
         _f.real("focus", 0.0, 1e12),
         _f.real("shutter_s", 0.0, 1e6),
-        _f.whole("layers", "I", 1, 255),
+        _f.whole("layers", "I", 1, 268435455),
         _f.whole("command", "Q", 0, 18446744073709551615),
         _f.whole("received_ns", "Q", 0, 18446744073709551615),
         _f.whole("applied_ns", "Q", 0, 18446744073709551615),
@@ -2812,6 +2818,27 @@ class ExportImage(Message):
 
 
 @dataclass
+class ExportName(Message):
+    """client to exporter, before an export_image: the name that Cryptomatte layers give an identifier, in all files
+    from then on
+
+    kind: node or material
+    object: identifier; material 0: the default
+    """
+    TYPE: ClassVar[int] = 0x8314
+    SENDER: ClassVar[str] = "local"
+    NAME: ClassVar[str] = "export_name"
+    FIELDS: ClassVar[tuple[Field, ...]] = (
+        _f.choice("kind", ObjectKind),
+        _f.whole("object", "I", 0, 4294967295),
+        _f.text("name", 4096),
+    )
+    kind: ObjectKind | str = ObjectKind(0)
+    object: int = 0
+    name: str = ""
+
+
+@dataclass
 class ExportText(Message):
     """client to exporter that was started for it, between export_image and a frame of format rgba8: a line of text to
     be drawn into the frame
@@ -3071,8 +3098,8 @@ _ALL: tuple[type[Message], ...] = (
     ObjectGet, BlobOffer, BlobNeed, BlobData, EditBegin, EditCommit, SetNode, SetMesh, SetSpheres, SetDisc, SetMaterial,
     SetTexture, SetLight, SetCamera, SetEnvironment, SetSkin, SetClip, SetChannel, Remove, Render, ViewCamera,
     FrameBegin, FrameParts, FrameData, FrameAck, FrameEnd, ImportNote, ImportClip, ImportBounds, ImportProgress,
-    ImportDone, ImportVariant, ImportFile, ExportImage, ExportText, CompareImages, ImagesCompared, VideoBegin,
-    VideoBegun, VideoEnd, VideoWritten,
+    ImportDone, ImportVariant, ImportFile, ExportImage, ExportName, ExportText, CompareImages, ImagesCompared,
+    VideoBegin, VideoBegun, VideoEnd, VideoWritten,
 )
 MESSAGES = {each.TYPE: each for each in _ALL}
 
