@@ -123,7 +123,8 @@ static const struct argp_option special[] = {
      "files, --crop and comparisons)",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
-     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
+     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown; "
+     "light: the parts that add up to the beauty",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",
@@ -325,6 +326,9 @@ error_t cli_set_environment_rotation(struct cli_job *job, const char *field, con
     return set_real(job, field, value, -360, 360, &job->environment_degrees);
 }
 
+/* The layers that add up to the beauty. */
+#define LIGHT_LAYERS ((1u << (PROTOCOL_LAYER_BACKGROUND + 1)) - (1u << PROTOCOL_LAYER_DIFFUSE_DIRECT))
+
 /* "beauty,depth". The picture alone is 0, as without the option. */
 static error_t set_layers(struct cli_job *job, const char *field, const char *value)
 {
@@ -335,9 +339,10 @@ static error_t set_layers(struct cli_job *job, const char *field, const char *va
         enum protocol_layer layer = PROTOCOL_LAYER_BEAUTY;
         const size_t length = strcspn(at, ",");
         snprintf(name, sizeof(name), "%.*s", (int)(length < sizeof(name) ? length : sizeof(name)), at);
-        if (!protocol_layer_parse(name, &layer))
+        const bool all_light = strcmp(name, "light") == 0;
+        if (!all_light && !protocol_layer_parse(name, &layer))
             return cli_unknown_value(job, field, "layer", name);
-        layers |= 1u << layer;
+        layers |= all_light ? LIGHT_LAYERS : 1u << layer;
         if (at[length] == '\0')
             break;
         at += length + 1;

@@ -246,7 +246,7 @@ static void check_integrators(struct checking *checking)
         render_twice(checking, &request, rows[i].name);
     }
     struct frame_request layers = timed_request(checking, TRACER_BVH);
-    layers.layers = (1u << LAYER_COUNT) - 1;
+    layers.layers = (1u << (LAYER_UNKNOWN + 1)) - 1;
     render_twice(checking, &layers, "all layers");
 }
 

@@ -23,6 +23,7 @@ struct slice {
 };
 
 struct key_view;
+struct layers;
 
 struct render_context {
     struct gpu_device *device;
@@ -35,6 +36,7 @@ struct render_context {
     uint32_t layer;
     struct key_view *marked_key;     /* whose marks say which texels of it are rendered; NULL: all are */
     struct gpu_buffer *tile_samples; /* of a picture whose tiles stop one by one; NULL: of others */
+    struct layers *layers;           /* of the same work */
     struct comparison *comparison;   /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;

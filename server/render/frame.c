@@ -376,7 +376,9 @@ static bool note_layers(struct frame_renderer *renderer, struct error *error)
         return false;
     if (!done)
         return true;
-    if (!(renderer->target->layers & 1u << LAYER_BEAUTY) || frame_is_eyes_pass(renderer))
+    const bool has_light =
+        renderer->target->layers & 1u << LAYER_BEAUTY || layers_have_light(&renderer->work->layers);
+    if (!has_light || frame_is_eyes_pass(renderer))
         return finish_slice(renderer, error);
     renderer->phase = PHASE_SHADE;
     return true;

@@ -14,12 +14,24 @@ _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 <<
                    LAYER_BIT_NORMAL == 1 << LAYER_NORMAL && LAYER_BIT_DEPTH == 1 << LAYER_DEPTH &&
                    LAYER_BIT_POSITION == 1 << LAYER_POSITION && LAYER_BIT_AO == 1 << LAYER_AO &&
                    LAYER_BIT_ID == 1 << LAYER_ID && LAYER_BIT_UNKNOWN == 1 << LAYER_UNKNOWN &&
-                   LAYER_UNKNOWN + 1 == LAYER_COUNT && LAYER_BIT_STICKING == 1 << LAYER_STICKING,
+                   LAYER_BIT_STICKING == 1u << LAYER_STICKING && LAYER_COUNT <= LAYER_STICKING,
+               "shaders know the layers by other numbers");
+_Static_assert(LAYER_BIT_DIFFUSE_DIRECT == 1u << LAYER_DIFFUSE_DIRECT &&
+                   LAYER_BIT_DIFFUSE_INDIRECT == 1u << LAYER_DIFFUSE_INDIRECT &&
+                   LAYER_BIT_SPECULAR_DIRECT == 1u << LAYER_SPECULAR_DIRECT &&
+                   LAYER_BIT_SPECULAR_INDIRECT == 1u << LAYER_SPECULAR_INDIRECT &&
+                   LAYER_BIT_TRANSMISSION == 1u << LAYER_TRANSMISSION &&
+                   LAYER_BIT_EMISSION == 1u << LAYER_EMISSION && LAYER_BIT_BACKGROUND == 1u << LAYER_BACKGROUND,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)
 {
     return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID;
+}
+
+bool layers_are_of_light(enum layer layer)
+{
+    return 1u << layer & LAYER_BITS_LIGHT;
 }
 
 void layers_begin(struct layers *layers, const struct frame_request *request)
@@ -35,7 +47,7 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
         layers_finish(layers, device);
         return true;
     }
-    size_t planes = (size_t)__builtin_popcount(layers->wanted);
+    size_t planes = (size_t)__builtin_popcount(layers->wanted) + layers_have_light(layers);
     size_t rays = layers->wanted & LAYER_BIT_AO ? context->wave_capacity : 0;
     size_t times = context->scene->has_motion ? rays : 0;
     return gpu_buffer_reserve(device, &layers->sums, planes * slice_samples * sizeof(vec4), error) &&
@@ -52,11 +64,30 @@ void layers_begin_slice(struct layers *layers, const struct render_context *cont
     layers->plane_samples = context->slice.slot_count << context->uniforms.sample_shift;
 }
 
+static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
+{
+    return (uint32_t)__builtin_popcount(layers->wanted & (layer_bit - 1));
+}
+
+bool layers_have_light(const struct layers *layers)
+{
+    return layers->wanted & LAYER_BITS_LIGHT;
+}
+
+void layers_bind_light(struct layers *layers, const struct gpu_program *program)
+{
+    if (!layers_have_light(layers))
+        return;
+    gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
+    gpu_uniform_uint(program, "light_layers", layers->wanted);
+    gpu_uniform_uint(program, "plane_samples", layers->plane_samples);
+}
+
 uint32_t layers_take_unknown(struct layers *layers)
 {
     layers->noting = layers->wanted & ~LAYER_BIT_UNKNOWN;
-    const uint32_t planes_before = (uint32_t)__builtin_popcount(layers->noting);
-    return layers->noting == layers->wanted ? UINT32_MAX : planes_before * layers->plane_samples;
+    const uint32_t plane = plane_of(layers, LAYER_BIT_UNKNOWN);
+    return layers->noting == layers->wanted ? UINT32_MAX : plane * layers->plane_samples;
 }
 
 /* A program that reads hits, in use, with all that these have bound; each of `own`: a define of its own, or NULL.
@@ -79,11 +110,6 @@ static const struct gpu_program *use(struct render_context *context, const char 
     return program;
 }
 
-static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
-{
-    return (uint32_t)__builtin_popcount(layers->wanted & (layer_bit - 1));
-}
-
 static bool note_sticking(struct layers *layers, struct render_context *context, struct error *error)
 {
     const bool sticks = integrator_by_number(context->request.integrator)->follows_eye;
@@ -104,6 +130,13 @@ static bool note_sticking(struct layers *layers, struct render_context *context,
     return program && gpu_check(context->device, "what sticks", error);
 }
 
+/* The plane of what first surfaces do comes behind those of light, of which it is one. */
+static uint32_t light_planes_end(const struct layers *layers)
+{
+    const uint32_t planes = (uint32_t)__builtin_popcount(layers->wanted);
+    return layers_have_light(layers) ? planes + 1 : 0;
+}
+
 /* All but how open a place is, which begins with 0. */
 static bool note_hits(struct layers *layers, struct render_context *context, struct error *error)
 {
@@ -115,6 +148,8 @@ static bool note_hits(struct layers *layers, struct render_context *context, str
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
         gpu_uniform_uint(program, "layers", layers->noting);
+        gpu_uniform_uint(program, "first_light_plane", plane_of(layers, LAYER_BIT_DIFFUSE_DIRECT));
+        gpu_uniform_uint(program, "end_light_plane", light_planes_end(layers));
         gpu_dispatch(context->device, program, context->ray_count);
     }
     context_span_end(context);

@@ -5,6 +5,7 @@
  * frame are looked at. */
 #include "protocol/tracers.h"
 #include "render/layers.h"
+#include "shared/layers.h"
 #include "tests/accuracy/render_fixture.h"
 #include "tests/harness/test.h"
 
@@ -141,7 +142,7 @@ TEST_LONG(so_do_those_of_other_tracers_integrators_and_layers)
     static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_LDC, TRACER_ABUFFER},
                           integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_PATH, INTEGRATOR_AO};
     fixture_mixture(fixture);
-    fixture->request.layers = (1u << LAYER_COUNT) - 1;
+    fixture->request.layers = LAYER_BITS_SEEN;
     for (unsigned i = 0; i < 3; i++)
         for (unsigned k = 0; k < 4; k++)
             expect_few_calls(fixture, tracers[k], integrators[i], 2, (i + k) % 2 ? PRIMARY_TRACE : PRIMARY_RASTER);

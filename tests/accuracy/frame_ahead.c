@@ -4,6 +4,7 @@
 #include "protocol/tracers.h"
 #include "render/frame_state.h"
 #include "render/layers.h"
+#include "shared/layers.h"
 #include "tests/accuracy/render_fixture.h"
 #include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
@@ -96,8 +97,11 @@ TEST_LONG(the_host_waits_once_whatever_the_integrator_tracer_and_layers)
             snprintf(what, sizeof(what), "integrator %u, tracer %u", forms[i].integrator, tracers[k]);
             assert_ahead_is_as_waiting(fixture, what);
         }
-    fixture->request.layers = (1u << LAYER_COUNT) - 1;
+    fixture->request.layers = LAYER_BITS_SEEN;
     assert_ahead_is_as_waiting(fixture, "all layers");
+    fixture->request.layers = LAYER_BITS_SEEN | LAYER_BITS_LIGHT;
+    fixture->request.integrator = INTEGRATOR_PATH;
+    assert_ahead_is_as_waiting(fixture, "layers of light");
 }
 
 /* Only the device knows how many rays there are. Slices have other sizes where they are queued: a hierarchy of its

@@ -2,10 +2,11 @@
 /* Layers beside a picture's light, against what is known of simple scenes. */
 #include "tests/accuracy/sampled_scenes.h"
 
+#include "shared/layers.h"
 #include "trace/tracer.h"
 #include "tests/harness/test.h"
 
-#define ALL ((1u << LAYER_COUNT) - 1)
+#define ALL LAYER_BITS_SEEN
 #define BIT(layer) (1u << (layer))
 /* Places some metres from the origin, in floats: a few roundings of 2^-24 of 10 m. */
 #define ROUNDING_METRES 5e-6
@@ -465,7 +466,7 @@ TEST(layers_that_there_are_not_or_no_pixel_holds_are_refused)
 {
     struct fixture *fixture = *state;
     fixture->request.layers = BIT(LAYER_COUNT);
-    expect_refused(fixture, "number 8");
+    expect_refused(fixture, "there is no layer number");
     fixture->request.layers = BIT(LAYER_DEPTH);
     fixture->request.format = PIXEL_FORMAT_RGBA16F;
     expect_refused(fixture, "rgba32f");

@@ -55,6 +55,20 @@ class Layers(OneDaemon):
         options = ["--layers", ALL, "--samples", "4", "--float"]
         self.assertEqual(self.read(*options, "--progressive=4"), self.read(*options, "--progressive=1"))
 
+    def test_parts_of_the_light_add_up_to_the_picture(self):
+        """Sums of some tens of floats in two orders: a few roundings of 2^-24, of values up to 4."""
+        got = self.read("--layers", "beauty,light", "--float", "--samples", "2", "--exposure", "1")
+        names = sorted({name.split(".")[0] for name in got} - set("RGBA"))
+        self.assertEqual(names, ["background", "diffuse_direct", "diffuse_indirect", "emission", "specular_direct",
+                                 "specular_indirect", "transmission"])
+        for channel in "RGB":
+            parts = [sum(values) for values in zip(*(got[f"{name}.{channel}"] for name in names))]
+            self.assertGreater(max(parts), 0.5)
+            for part, whole in zip(parts, got[channel]):
+                self.assertAlmostEqual(part, whole, delta=2e-6 * max(whole, 1))
+        result = self.render("--layers", "light", "--integrator", "whitted", status=1)[1]
+        self.assertIn("choose distributed or path", result.stderr)
+
     def test_places_depths_and_normals_fit_each_other_and_the_camera(self):
         """One sample, which lies in the middle of its pixel."""
         got = self.read("--layers", "beauty,normal,depth,position,id", "--float", "--primary", "trace", "--samples", "1")

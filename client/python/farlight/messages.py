@@ -91,6 +91,13 @@ class Layer(Word):
     AO = 5
     ID = 6
     UNKNOWN = 7
+    DIFFUSE_DIRECT = 16
+    DIFFUSE_INDIRECT = 17  # the same, of light that other surfaces have sent there
+    SPECULAR_DIRECT = 18
+    SPECULAR_INDIRECT = 19  # the same, of light that other surfaces have sent there
+    TRANSMISSION = 20  # light that comes through the first surface where that is glass
+    EMISSION = 21  # light that the first surface sends out itself; also the colour of unlit ones
+    BACKGROUND = 22
 
 
 class Attachment(Word):
@@ -2172,7 +2179,7 @@ class Render(Message):
         _f.real("ao_falloff", 0.0, 64.0),
         _f.whole("ao_rays", "I", 1, 256),
         _f.real("layer_opacity", 1e-6, 1.0),
-        _f.whole("layers", "I", 0, 255),
+        _f.whole("layers", "I", 0, 268435455),
         _f.choice("bvh_bounds", BvhBounds),
         _f.whole("bvh_rays", "I", 0, 8, listed=(0, 1, 2, 3, 4, 8)),
         _f.whole("ldc_resolution", "I", 16, 4096, zero=True),
@@ -2466,7 +2473,7 @@ class FrameBegin(Message):
         _f.real("aperture", 0.0, 1e6),
         _f.real("focus", 0.0, 1e12),
         _f.real("shutter_s", 0.0, 1e6),
-        _f.whole("layers", "I", 1, 255),
+        _f.whole("layers", "I", 1, 268435455),
         _f.whole("command", "Q", 0, 18446744073709551615),
         _f.whole("received_ns", "Q", 0, 18446744073709551615),
         _f.whole("applied_ns", "Q", 0, 18446744073709551615),

@@ -285,7 +285,9 @@ TEST_WITH(layers_become_channels_by_name, begin_export, end_export)
         {LAYER_SET(BEAUTY) | LAYER_SET(DEPTH), true, "A:1 B:1 G:1 R:1 Z:2"},
         {LAYER_SET(NORMAL) | LAYER_SET(AO), false, "ao.Y:2 normal.X:2 normal.Y:2 normal.Z:2"},
         {LAYER_SET(ID), true, "id.material:0 id.node:0"},
-        {(1u << PROTOCOL_LAYER_COUNT) - 1, true,
+        {LAYER_SET(DIFFUSE_DIRECT) | LAYER_SET(BACKGROUND), false,
+         "background.B:2 background.G:2 background.R:2 diffuse_direct.B:2 diffuse_direct.G:2 diffuse_direct.R:2"},
+        {(1u << (PROTOCOL_LAYER_UNKNOWN + 1)) - 1, true,
          "A:1 B:1 G:1 R:1 Z:2 albedo.B:1 albedo.G:1 albedo.R:1 ao.Y:1 id.material:0 id.node:0 normal.X:1 "
          "normal.Y:1 "
          "normal.Z:1 position.X:2 position.Y:2 position.Z:2 unknown.Y:1"},
