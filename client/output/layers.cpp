@@ -3,6 +3,8 @@
 
 #include <Imath/half.h>
 #include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
 
 #include <algorithm>
 #include <cstring>
@@ -76,11 +78,17 @@ size_t size_of(Imf::PixelType type)
     return type == Imf::HALF ? sizeof(half) : sizeof(float);
 }
 
-std::vector<layer_channel> channels_of(unsigned layers)
+bool is_colour(const layer_channel &channel)
+{
+    return std::strchr("RGBA", channel.name[std::strlen(channel.name) - 1]) != nullptr;
+}
+
+std::vector<layer_channel> channels_of(unsigned layers, enum exr_part part)
 {
     std::vector<layer_channel> channels;
     for (const layer_channel &each : known)
-        if ((layers & 1u << each.layer) != 0)
+        if ((layers & 1u << each.layer) != 0 &&
+            (part == exr_part::whole || is_colour(each) == (part == exr_part::colours)))
             channels.push_back(each);
     return channels;
 }
@@ -152,13 +160,15 @@ std::string layer_names(unsigned layers)
     return names;
 }
 
-void add_channels(Imf::ChannelList &channels, unsigned layers, bool half_floats)
+Imf::ChannelList channels_of_part(const struct image &image, enum exr_part part)
 {
-    for (const layer_channel &channel : channels_of(layers))
-        channels.insert(channel.name, Imf::Channel(type_of(channel.content, half_floats)));
+    Imf::ChannelList channels;
+    for (const layer_channel &channel : channels_of(image.begin->layers, part))
+        channels.insert(channel.name, Imf::Channel(type_of(channel.content, image.half)));
+    return channels;
 }
 
-void write_rows(Imf::OutputFile &output, const struct image &image)
+template <typename output> void write_rows(output &file, const struct image &image, enum exr_part part)
 {
     const struct message_frame_begin &begin = *image.begin;
     const size_t width = begin.width;
@@ -167,7 +177,7 @@ void write_rows(Imf::OutputFile &output, const struct image &image)
         const uint32_t rows = std::min<uint32_t>(band_rows, begin.height - top);
         Imf::FrameBuffer buffer;
         std::vector<std::vector<char>> planes;
-        for (const layer_channel &channel : channels_of(begin.layers)) {
+        for (const layer_channel &channel : channels_of(begin.layers, part)) {
             const Imf::PixelType type = type_of(channel.content, image.half);
             const size_t row_bytes = width * size_of(type);
             const size_t first_row = place_of(channel.layer, begin.layers) * begin.height + top;
@@ -180,7 +190,10 @@ void write_rows(Imf::OutputFile &output, const struct image &image)
                                            static_cast<int64_t>(width), rows, size_of(type), row_bytes));
             planes.push_back(std::move(plane)); // what the slice points to
         }
-        output.setFrameBuffer(buffer);
-        output.writePixels(static_cast<int>(rows));
+        file.setFrameBuffer(buffer);
+        file.writePixels(static_cast<int>(rows));
     }
 }
+
+template void write_rows(Imf::OutputFile &, const struct image &, enum exr_part);
+template void write_rows(Imf::OutputPart &, const struct image &, enum exr_part);
