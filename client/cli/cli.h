@@ -289,7 +289,7 @@ struct cli_job {
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool has_framing;                           /* something of the automatic camera is given */
     const char *framed;                         /* node that it shows, name or number; NULL: all */
-    bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
+    bool float_pixels, half_pixels, dwaa, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
         is_orbit;
     bool has_samples, auto_samples; /* --samples auto */
     bool without_studio;            /* --studio off */

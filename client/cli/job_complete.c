@@ -120,6 +120,9 @@ static bool complete_pixels(struct cli_job *job)
         (job->half_pixels && !has[CLI_IMAGE_EXR]))
         return cli_usage(job, job->float_pixels ? "--float" : "--half", "%s files do not have such pixels",
                          cli_image_name(job->outputs[0].image)) == 0;
+    if (job->dwaa && !has[CLI_IMAGE_EXR])
+        return cli_usage(job, "--exr-compression", "%s files do not have it",
+                         cli_image_name(job->outputs[0].image)) == 0;
     if (has[CLI_IMAGE_HDR] || job->float_pixels)
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     else if (has[CLI_IMAGE_EXR])

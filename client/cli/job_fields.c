@@ -206,7 +206,7 @@ const struct cli_field *cli_field_find(const char *option)
 
 error_t cli_unknown_value(struct cli_job *job, const char *name, const char *enum_name, const char *value)
 {
-    char known[200], words[40];
+    char known[500], words[40];
     size_t length = 0;
     for (const char *at = enum_name; *at != '\0' && length + 1 < sizeof(words); at++)
         words[length++] = *at == '_' ? ' ' : *at;

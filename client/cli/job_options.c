@@ -44,6 +44,7 @@ enum key {
     KEY_FORMAT,
     KEY_HALF,
     KEY_FLOAT,
+    KEY_EXR_COMPRESSION,
     KEY_TIMINGS,
     KEY_TRACE_FILE,
     KEY_PROGRESS,
@@ -76,6 +77,9 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", CLI_GROUP_OUTPUT},
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", CLI_GROUP_OUTPUT},
+    {"exr-compression", KEY_EXR_COMPRESSION, "zip|dwaa", 0,
+     "EXR without loss (default), or smaller: colours lose what is hardly seen, other layers nothing",
+     CLI_GROUP_OUTPUT},
     {"metadata", KEY_METADATA, "stable|full", 0,
      "What files say of themselves: what is the same for the same request (default), or times and paths, too",
      CLI_GROUP_OUTPUT},
@@ -124,7 +128,7 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown, "
-     "crypto-object and crypto-material (Cryptomatte, with names)",
+     "crypto-object and crypto-material (Cryptomatte, with names); light: the parts that add up to the beauty",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",
@@ -326,6 +330,9 @@ error_t cli_set_environment_rotation(struct cli_job *job, const char *field, con
     return set_real(job, field, value, -360, 360, &job->environment_degrees);
 }
 
+/* The layers that add up to the beauty. */
+#define LIGHT_LAYERS ((1u << (PROTOCOL_LAYER_BACKGROUND + 1)) - (1u << PROTOCOL_LAYER_DIFFUSE_DIRECT))
+
 /* "beauty,depth". The picture alone is 0, as without the option. */
 static error_t set_layers(struct cli_job *job, const char *field, const char *value)
 {
@@ -335,8 +342,10 @@ static error_t set_layers(struct cli_job *job, const char *field, const char *va
         char name[24];
         const size_t length = strcspn(at, ",");
         snprintf(name, sizeof(name), "%.*s", (int)(length < sizeof(name) ? length : sizeof(name)), at);
-        if (!protocol_layers_parse(name, &layers))
+        const bool all_light = strcmp(name, "light") == 0;
+        if (!all_light && !protocol_layers_parse(name, &layers))
             return cli_unknown_value(job, field, "layer", name);
+        layers |= all_light ? LIGHT_LAYERS : 0;
         if (at[length] == '\0')
             break;
         at += length + 1;
@@ -422,6 +431,11 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_FLOAT:
         job->float_pixels = true;
         return 0;
+    case KEY_EXR_COMPRESSION:
+        job->dwaa = strcmp(value, "dwaa") == 0;
+        return job->dwaa || strcmp(value, "zip") == 0
+                   ? 0
+                   : cli_usage(job, field, "'%s' is not known (known: zip, dwaa)", value);
     case KEY_CLIP:
         if (job->clip_count == CLI_CLIPS_MAX)
             return cli_usage(job, field, "more than %d clips cannot be played at once", CLI_CLIPS_MAX);
@@ -559,15 +573,21 @@ error_t cli_job_set(struct cli_job *job, const char *name, const char *value)
     return ARGP_ERR_UNKNOWN;
 }
 
-/* Without those that are left out. */
+static bool is_among(const struct argp_option *option, const char *const *names)
+{
+    for (size_t i = 0; option->name && names[i]; i++)
+        if (strcmp(option->name, names[i]) == 0)
+            return true;
+    return false;
+}
+
+/* Without those that are left out, and those of image files that people keep. */
 static void keep(struct argp_option *kept, const char *const *left_out)
 {
+    static const char *const of_files[] = {"half", "float", "exr-compression", NULL};
     size_t count = 0;
     for (const struct argp_option *option = all_options(); option->name || option->doc; option++) {
-        bool is_kept = true;
-        for (size_t k = 0; left_out[k]; k++)
-            is_kept = is_kept && (!option->name || strcmp(option->name, left_out[k]) != 0);
-        if (is_kept)
+        if (!is_among(option, left_out) && !is_among(option, of_files))
             kept[count++] = *option;
     }
 }
@@ -581,10 +601,10 @@ const struct argp *cli_job_argp(void)
 
 const struct argp *cli_picture_argp(void)
 {
-    static const char *const left_out[] = {
-        "parents",     "output",     "format", "half",      "float",   "tone-map", "tracer", "primary",
-        "timings",     "trace-file", "layers", "retry-for", "retries", "metadata", "stereo", "stereo-layout",
-        "light-field", "baseline",   "views",  "lens",      "noise",   NULL};
+    static const char *const left_out[] = {"parents",  "output",   "format",     "tone-map",      "tracer",
+                                           "primary",  "timings",  "trace-file", "layers",        "retry-for",
+                                           "retries",  "metadata", "stereo",     "stereo-layout", "light-field",
+                                           "baseline", "views",    "lens",       "noise",         NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -593,9 +613,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_views_argp(void)
 {
-    static const char *const left_out[] = {"parents",  "output",        "format", "half",      "float",
-                                           "timings",  "trace-file",    "layers", "retry-for", "retries",
-                                           "metadata", "stereo-layout", "noise",  "crop",      NULL};
+    static const char *const left_out[] = {"parents", "output",    "format",  "timings",  "trace-file",
+                                           "layers",  "retry-for", "retries", "metadata", "stereo-layout",
+                                           "noise",   "crop",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -605,9 +625,9 @@ const struct argp *cli_views_argp(void)
 const struct argp *cli_thumbnail_argp(void)
 {
     static const char *const left_out[] = {
-        "output",    "half",          "float",      "timings", "trace-file", "layers",      "retry-for", "retries",
-        "metadata",  "stereo-layout", "noise",      "stereo",  "baseline",   "light-field", "views",     "lens",
-        "clip-once", "clip-start",    "clip-speed", "clip",    "at",         "variant",     "frame",     NULL};
+        "output",     "timings", "trace-file", "layers",      "retry-for", "retries", "metadata",  "stereo-layout",
+        "noise",      "stereo",  "baseline",   "light-field", "views",     "lens",    "clip-once", "clip-start",
+        "clip-speed", "clip",    "at",         "variant",     "frame",     NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -616,10 +636,10 @@ const struct argp *cli_thumbnail_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {"parents",     "output",     "format",   "half",       "float",
-                                           "samples",     "integrator", "timings",  "trace-file", "layers",
-                                           "clip-once",   "clip-start", "encoding", "retries",    "metadata",
-                                           "light-field", "baseline",   "views",    "crop",       NULL};
+    static const char *const left_out[] = {"parents",  "output",     "format",   "samples",     "integrator",
+                                           "timings",  "trace-file", "layers",   "clip-once",   "clip-start",
+                                           "encoding", "retries",    "metadata", "light-field", "baseline",
+                                           "views",    "crop",       NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -628,12 +648,11 @@ const struct argp *cli_view_argp(void)
 
 const struct argp *cli_web_argp(void)
 {
-    static const char *const left_out[] = {"parents",   "output",     "format",      "half",       "float",
-                                           "samples",   "integrator", "timings",     "trace-file", "layers",
-                                           "clip-once", "retry-for",  "clip-start",  "clip-speed", "clip",
-                                           "encoding",  "retries",    "light-field", "metadata",   "stereo-layout",
-                                           "baseline",  "views",      "crop",        "stereo",     "lens",
-                                           "size",      NULL};
+    static const char *const left_out[] = {"parents",     "output",     "format",        "samples",   "integrator",
+                                           "timings",     "trace-file", "layers",        "clip-once", "retry-for",
+                                           "clip-start",  "clip-speed", "clip",          "encoding",  "retries",
+                                           "light-field", "metadata",   "stereo-layout", "baseline",  "views",
+                                           "crop",        "stereo",     "lens",          "size",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

@@ -27,6 +27,7 @@ static const struct setting {
     {"format", "format", WORD, "\"exr\""},
     {"half", "half", FLAG, "true"},
     {"float", "float", FLAG, "true"},
+    {"exr_compression", "exr-compression", WORD, "\"dwaa\""},
     {"stereo", "stereo", REAL, "0.065"},
     {"stereo_layout", "stereo-layout", WORD, "\"side\""},
     {"light_field", "light-field", SIZE, "[5, 5]"},

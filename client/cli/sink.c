@@ -166,6 +166,7 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
         .folder = sink->folder,
         .model = model_name(job),
         .full_metadata = job->full_metadata,
+        .dwaa = job->dwaa,
         .frames_per_second = sink->is_series ? job->options.frames_per_second : 0,
         .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd(),
         .format = cli_image_name(sink->output.image),

@@ -29,7 +29,7 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     snprintf(window, sizeof(window), "%u,%u,%u,%u", options->window.x, options->window.y, options->window.width,
              options->window.height);
     snprintf(rate, sizeof(rate), "%.9g", (double)options->frames_per_second);
-    const char *arguments[12] = {/* ends with NULL */ "--folder", options->folder};
+    const char *arguments[13] = {/* ends with NULL */ "--folder", options->folder};
     size_t count = 2;
     if (options->frames_per_second > 0) {
         arguments[count++] = "--fps";
@@ -41,6 +41,8 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     }
     if (options->full_metadata)
         arguments[count++] = "--full-metadata";
+    if (options->dwaa)
+        arguments[count++] = "--dwaa";
     if (options->draws_text)
         arguments[count++] = "--text";
     if (options->format) {

@@ -627,6 +627,7 @@ struct fl_exporter_options {
     const char *format; /* of all files, as below: some start faster; NULL: any */
     bool full_metadata; /* date, times of stages and revision too: then no two files are the same */
     bool draws_text;    /* pictures come with text */
+    bool dwaa; /* EXR: colours are compressed with loss (DWAA), all else by zip as a part of its own; else zip */
     struct {
         uint32_t x, y, width, height;
     } window; /* frames are the part from (x, y) on of pictures of width x height, as EXR files say; all 0: all of

@@ -8,7 +8,10 @@
 #include <OpenEXR/ImfFloatAttribute.h>
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
+#include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
+#include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRationalAttribute.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
@@ -132,7 +135,7 @@ void add_rate(Imf::Header &header, float frames_per_second)
     header.insert("framesPerSecond", Imf::RationalAttribute(rate));
 }
 
-Imf::Header make_header(const struct image &image, const std::string &date)
+Imf::Header make_header(const struct image &image, const std::string &date, enum exr_part part)
 {
     const image_window whole = window_of(image);
     const Imath::V2i corner(static_cast<int>(whole.x), static_cast<int>(whole.y));
@@ -140,8 +143,9 @@ Imf::Header make_header(const struct image &image, const std::string &date)
     Imf::Header header(
         Imath::Box2i({0, 0}, {static_cast<int>(whole.width) - 1, static_cast<int>(whole.height) - 1}),
         Imath::Box2i(corner, corner + size - Imath::V2i(1, 1)));
-    header.compression() = Imf::ZIP_COMPRESSION;
-    add_channels(header.channels(), image.begin->layers, image.half);
+    const bool loses = image.dwaa && part != exr_part::data;
+    header.compression() = loses ? Imf::DWAA_COMPRESSION : Imf::ZIP_COMPRESSION;
+    header.channels() = channels_of_part(image, part);
     Imf::addChromaticities(header, Imf::Chromaticities()); // of Rec. 709 with the white D65
     header.insert("Software", Imf::StringAttribute("farlight " FARLIGHT_VERSION));
     if (!date.empty())
@@ -161,14 +165,47 @@ Imf::Header make_header(const struct image &image, const std::string &date)
     return header;
 }
 
+// Colours alone are compressed with loss; what is beside them is a part of its own.
+std::vector<enum exr_part> parts_of(const struct image &image)
+{
+    const Imf::ChannelList colours = channels_of_part(image, exr_part::colours),
+                           data = channels_of_part(image, exr_part::data);
+    if (!image.dwaa)
+        return {exr_part::whole};
+    if (data.begin() == data.end())
+        return {exr_part::colours};
+    if (colours.begin() == colours.end())
+        return {exr_part::data};
+    return {exr_part::colours, exr_part::data};
+}
+
+void write_parts(memory_stream &stream, const struct image &image, const std::string &date,
+                 const std::vector<enum exr_part> &parts)
+{
+    std::vector<Imf::Header> headers;
+    for (const enum exr_part part : parts) {
+        headers.push_back(make_header(image, date, part));
+        headers.back().setName(part == exr_part::colours ? "rgba" : "data");
+        headers.back().setType(Imf::SCANLINEIMAGE);
+    }
+    Imf::MultiPartOutputFile output(stream, headers.data(), static_cast<int>(headers.size()));
+    for (size_t i = 0; i < parts.size(); i++) {
+        Imf::OutputPart file(output, static_cast<int>(i));
+        write_rows(file, image, parts[i]);
+    }
+}
+
 } // namespace
 
 std::vector<uint8_t> exr_encode(const struct image &image, const std::string &date)
 {
     memory_stream stream;
-    {
-        Imf::OutputFile output(stream, make_header(image, date)); // complete when it is destroyed
-        write_rows(output, image);
+    const std::vector<enum exr_part> parts = parts_of(image);
+    if (parts.size() == 1) {
+        Imf::OutputFile output(stream, make_header(image, date, parts[0])); // complete when it is destroyed
+        write_rows(output, image, parts[0]);
+    } else {
+        write_parts(stream, image, date, parts);
     }
     return std::move(stream.file);
 }

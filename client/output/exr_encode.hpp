@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A frame to the bytes of an EXR file, in memory: scanlines, zip.
+// A frame to the bytes of an EXR file, in memory: scanlines, zip or DWAA.
 #ifndef FARLIGHT_CLIENT_OUTPUT_EXR_ENCODE_HPP
 #define FARLIGHT_CLIENT_OUTPUT_EXR_ENCODE_HPP
 

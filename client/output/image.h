@@ -36,6 +36,7 @@ struct mattes;
 struct image {
     enum image_format format;
     bool half;                               /* EXR: half floats */
+    bool dwaa;                               /* EXR: colours are compressed with loss */
     unsigned quality;                        /* JPEG, WebP */
     float frames_per_second;                 /* 0: unknown */
     bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */

@@ -4,6 +4,8 @@
 
 #include <Imath/half.h>
 #include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
 
 #include <algorithm>
 #include <cstring>
@@ -63,7 +65,28 @@ const layer_channel known[] = {{PROTOCOL_LAYER_BEAUTY, 0, "R", content::colour},
                                {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 0, "CryptoMaterial02.red", content::material},
                                {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 1, "CryptoMaterial02.green", content::exact},
                                {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 2, "CryptoMaterial02.blue", content::material},
-                               {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 3, "CryptoMaterial02.alpha", content::exact}};
+                               {PROTOCOL_LAYER_CRYPTO_MATERIAL2, 3, "CryptoMaterial02.alpha", content::exact},
+                               {PROTOCOL_LAYER_DIFFUSE_DIRECT, 0, "diffuse_direct.R", content::colour},
+                               {PROTOCOL_LAYER_DIFFUSE_DIRECT, 1, "diffuse_direct.G", content::colour},
+                               {PROTOCOL_LAYER_DIFFUSE_DIRECT, 2, "diffuse_direct.B", content::colour},
+                               {PROTOCOL_LAYER_DIFFUSE_INDIRECT, 0, "diffuse_indirect.R", content::colour},
+                               {PROTOCOL_LAYER_DIFFUSE_INDIRECT, 1, "diffuse_indirect.G", content::colour},
+                               {PROTOCOL_LAYER_DIFFUSE_INDIRECT, 2, "diffuse_indirect.B", content::colour},
+                               {PROTOCOL_LAYER_SPECULAR_DIRECT, 0, "specular_direct.R", content::colour},
+                               {PROTOCOL_LAYER_SPECULAR_DIRECT, 1, "specular_direct.G", content::colour},
+                               {PROTOCOL_LAYER_SPECULAR_DIRECT, 2, "specular_direct.B", content::colour},
+                               {PROTOCOL_LAYER_SPECULAR_INDIRECT, 0, "specular_indirect.R", content::colour},
+                               {PROTOCOL_LAYER_SPECULAR_INDIRECT, 1, "specular_indirect.G", content::colour},
+                               {PROTOCOL_LAYER_SPECULAR_INDIRECT, 2, "specular_indirect.B", content::colour},
+                               {PROTOCOL_LAYER_TRANSMISSION, 0, "transmission.R", content::colour},
+                               {PROTOCOL_LAYER_TRANSMISSION, 1, "transmission.G", content::colour},
+                               {PROTOCOL_LAYER_TRANSMISSION, 2, "transmission.B", content::colour},
+                               {PROTOCOL_LAYER_EMISSION, 0, "emission.R", content::colour},
+                               {PROTOCOL_LAYER_EMISSION, 1, "emission.G", content::colour},
+                               {PROTOCOL_LAYER_EMISSION, 2, "emission.B", content::colour},
+                               {PROTOCOL_LAYER_BACKGROUND, 0, "background.R", content::colour},
+                               {PROTOCOL_LAYER_BACKGROUND, 1, "background.G", content::colour},
+                               {PROTOCOL_LAYER_BACKGROUND, 2, "background.B", content::colour}};
 
 constexpr float half_max = 65504.0f;
 constexpr int band_rows = 64; // a multiple of the rows that are compressed together
@@ -80,11 +103,17 @@ size_t size_of(Imf::PixelType type)
     return type == Imf::HALF ? sizeof(half) : sizeof(float);
 }
 
-std::vector<layer_channel> channels_of(unsigned layers)
+bool is_colour(const layer_channel &channel)
+{
+    return std::strchr("RGBA", channel.name[std::strlen(channel.name) - 1]) != nullptr;
+}
+
+std::vector<layer_channel> channels_of(unsigned layers, enum exr_part part)
 {
     std::vector<layer_channel> channels;
     for (const layer_channel &each : known)
-        if ((layers & 1u << each.layer) != 0)
+        if ((layers & 1u << each.layer) != 0 &&
+            (part == exr_part::whole || is_colour(each) == (part == exr_part::colours)))
             channels.push_back(each);
     return channels;
 }
@@ -167,13 +196,15 @@ std::string layer_names(unsigned layers)
     return names;
 }
 
-void add_channels(Imf::ChannelList &channels, unsigned layers, bool half_floats)
+Imf::ChannelList channels_of_part(const struct image &image, enum exr_part part)
 {
-    for (const layer_channel &channel : channels_of(layers))
-        channels.insert(channel.name, Imf::Channel(type_of(channel.content, half_floats)));
+    Imf::ChannelList channels;
+    for (const layer_channel &channel : channels_of(image.begin->layers, part))
+        channels.insert(channel.name, Imf::Channel(type_of(channel.content, image.half)));
+    return channels;
 }
 
-void write_rows(Imf::OutputFile &output, const struct image &image)
+template <typename output> void write_rows(output &file, const struct image &image, enum exr_part part)
 {
     const struct message_frame_begin &begin = *image.begin;
     const size_t width = begin.width;
@@ -182,7 +213,7 @@ void write_rows(Imf::OutputFile &output, const struct image &image)
         const uint32_t rows = std::min<uint32_t>(band_rows, begin.height - top);
         Imf::FrameBuffer buffer;
         std::vector<std::vector<char>> planes;
-        for (const layer_channel &channel : channels_of(begin.layers)) {
+        for (const layer_channel &channel : channels_of(begin.layers, part)) {
             const Imf::PixelType type = type_of(channel.content, image.half);
             const size_t row_bytes = width * size_of(type);
             const size_t first_row = place_of(channel.layer, begin.layers) * begin.height + top;
@@ -195,7 +226,10 @@ void write_rows(Imf::OutputFile &output, const struct image &image)
                                            static_cast<int64_t>(width), rows, size_of(type), row_bytes));
             planes.push_back(std::move(plane)); // what the slice points to
         }
-        output.setFrameBuffer(buffer);
-        output.writePixels(static_cast<int>(rows));
+        file.setFrameBuffer(buffer);
+        file.writePixels(static_cast<int>(rows));
     }
 }
+
+template void write_rows(Imf::OutputFile &, const struct image &, enum exr_part);
+template void write_rows(Imf::OutputPart &, const struct image &, enum exr_part);

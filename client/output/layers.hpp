@@ -5,7 +5,6 @@
 #include "image.h"
 
 #include <OpenEXR/ImfChannelList.h>
-#include <OpenEXR/ImfOutputFile.h>
 
 #include <string>
 
@@ -16,8 +15,11 @@ struct image_window window_of(const struct image &image);
 // "beauty,depth"
 std::string layer_names(unsigned layers);
 
-// The channels of the file and their types. With `half_floats` those are half floats that such numbers suffice
-// for: colours, directions and shares. Distances, places and numbers of objects never are.
-void add_channels(Imf::ChannelList &channels, unsigned layers, bool half_floats);
-// Writes all rows to an output that has those channels.
-void write_rows(Imf::OutputFile &output, const struct image &image);
+// DWAA loses something of what it takes for colours, and goes by the ends of names: Y of a position would be one.
+enum class exr_part { whole, colours, data };
+
+// The channels of the file, or of a part of it, and their types. With `half_floats` those are half floats that
+// such numbers suffice for: colours, directions and shares. Distances, places and numbers of objects never are.
+Imf::ChannelList channels_of_part(const struct image &image, enum exr_part part);
+// Writes all rows to an output that has those channels: an OutputFile or an OutputPart.
+template <typename output> void write_rows(output &file, const struct image &image, enum exr_part part);

@@ -22,7 +22,17 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
-enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ, KEY_FULL_METADATA, KEY_TEXT, KEY_WINDOW };
+enum {
+    KEY_FD = 0x100,
+    KEY_FOLDER,
+    KEY_FPS,
+    KEY_FORMAT,
+    KEY_READ,
+    KEY_FULL_METADATA,
+    KEY_TEXT,
+    KEY_WINDOW,
+    KEY_DWAA
+};
 
 #define READ_MAX 2u
 
@@ -69,6 +79,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_FULL_METADATA:
         options->serve.full_metadata = true;
+        return 0;
+    case KEY_DWAA:
+        options->serve.dwaa = true;
         return 0;
     case KEY_TEXT:
         options->draws_text = true;
@@ -153,6 +166,7 @@ int main(int argc, char **argv)
         {"text", KEY_TEXT, NULL, 0, "Text may be drawn into pictures", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
         {"window", KEY_WINDOW, "X,Y,W,H", 0, "Pictures are the part from X, Y on of W x H pixels", 0},
+        {"dwaa", KEY_DWAA, NULL, 0, "Compress colours of EXR files with loss", 0},
         {"full-metadata", KEY_FULL_METADATA, NULL, 0,
          "Store what differs from run to run, too: date, times of stages, revision", 0},
         {0}};

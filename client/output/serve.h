@@ -12,7 +12,7 @@
 struct serve_options {
     int fd;                  /* connected stream socket */
     float frames_per_second; /* for the metadata of images; 0: none */
-    bool full_metadata;
+    bool full_metadata, dwaa;
     struct image_window window;       /* of EXR files */
     const struct compare_file *files; /* that may be compared: a message opens nothing */
     size_t file_count;

@@ -23,6 +23,7 @@ struct slice {
 };
 
 struct key_view;
+struct layers;
 
 struct render_context {
     struct gpu_device *device;
@@ -36,6 +37,7 @@ struct render_context {
     struct key_view *marked_key;     /* whose marks say which texels of it are rendered; NULL: all are */
     struct gpu_buffer *covers;       /* shared/layers.h, to be noted as waves are shaded; NULL: not */
     struct gpu_buffer *tile_samples; /* of a picture whose tiles stop one by one; NULL: of others */
+    struct layers *layers;           /* of the same work */
     struct comparison *comparison;   /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;

@@ -11,6 +11,7 @@
 #include "render/ground.h"
 #include "render/pixel_filter.h"
 #include "shared/bindings.h"
+#include "shared/layers.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -43,6 +44,16 @@ static bool check_request(const struct frame_renderer *renderer, const struct fr
 {
     return frame_request_check(request, error) && frame_find_tracer(renderer, request->tracer, "tracer", error) &&
            (!request->compare || frame_find_tracer(renderer, request->compare_with, "compare_with", error));
+}
+
+/* A display's values are no light that adds up. */
+static bool check_light(const struct scene *scene, const struct frame_request *request, struct error *error)
+{
+    if (!(request->layers & LAYER_BITS_LIGHT) || !scene->environment.display_values)
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "layers",
+              "the light of this scene is a display's values, which do not add up");
+    return error_remedy(error, "leave out layers of light");
 }
 
 /* Whether the kept picture shows the same as this frame, once the scene has been updated. */
@@ -560,7 +571,7 @@ static struct trace_view view_of(const struct frame_request *request)
 static bool begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                   const struct frame_request *request, struct error *error)
 {
-    if (!check_request(renderer, request, error))
+    if (!check_request(renderer, request, error) || !check_light(scene, request, error))
         return false;
     renderer->work = frame_work_take(renderer->shared, integrator_by_number(request->integrator), error);
     if (!renderer->work)

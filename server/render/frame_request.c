@@ -79,11 +79,6 @@ static bool check_integrator(const struct frame_request *request, struct error *
     return true;
 }
 
-uint32_t frame_layers_all(void)
-{
-    return LAYER_BITS_ALL;
-}
-
 uint32_t frame_request_layers(const struct frame_request *request)
 {
     return request->layers ? request->layers : 1u << LAYER_BEAUTY;
@@ -139,6 +134,22 @@ uint64_t frame_request_bytes(const struct frame_request *request)
     return bytes;
 }
 
+static bool check_light_layers(const struct frame_request *request, struct error *error)
+{
+    if (!integrator_by_number(request->integrator)->scatters) { /* else a sample has several paths, or no light */
+        error_set(error, ERROR_UNSUPPORTED, "layers",
+                  "the integrator %s does not tell the parts of its light apart",
+                  integrator_by_number(request->integrator)->name);
+        return error_remedy(error, "choose distributed or path, or leave out layers of light");
+    }
+    if (request->view_source == VIEW_SOURCE_LAYERS) {
+        error_set(error, ERROR_UNSUPPORTED, "layers",
+                  "pictures that are made of depth layers have no parts of light");
+        return error_remedy(error, "render views as they are, or leave out layers of light");
+    }
+    return true;
+}
+
 static bool check_layers(const struct frame_request *request, struct error *error)
 {
     if (request->layers & ~LAYER_BITS_ALL)
@@ -146,6 +157,8 @@ static bool check_layers(const struct frame_request *request, struct error *erro
                          __builtin_ctz(request->layers & ~LAYER_BITS_ALL));
     if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
+    if (request->layers & LAYER_BITS_LIGHT && !check_light_layers(request, error))
+        return false;
     if (request->attachments >= 1u << ATTACHMENT_COUNT)
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "there is no such set of attachments: %#x",
                          request->attachments);

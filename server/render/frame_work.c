@@ -33,6 +33,7 @@ static struct frame_work *work_create(struct frame_scene *shared, struct error *
         return NULL;
     }
     work->context.device = shared->device;
+    work->context.layers = &work->layers;
     work->context.scene = &shared->copy;
     work->context.environment = &shared->environment;
     work->context.environment_choice = &shared->environment_choice;

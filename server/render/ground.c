@@ -3,6 +3,7 @@
 
 #include "render/compact.h"
 #include "render/integrators/integrator.h"
+#include "render/layers.h"
 
 #include "shared/bindings.h"
 
@@ -12,7 +13,7 @@
 /* Of each hit, where each is chosen by its light: a ray brings its part or none, so one would make much noise. */
 #define SHADOW_RAYS 4u
 /* Those of emitters, of surfaces, and the rest. */
-#define DEFINES_MAX (4 + CONTEXT_SURFACE_DEFINES + 6)
+#define DEFINES_MAX (4 + CONTEXT_SURFACE_DEFINES + 7)
 
 bool ground_is_shown(const struct render_context *context, const struct integrator *integrator)
 {
@@ -74,6 +75,8 @@ static const struct gpu_program *shade_program(struct render_context *context, c
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (uses_table(context, integrator) && context->environment_choice->rows > 0)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
+    if (layers_have_light(context->layers))
+        defines[n++] = (struct gpu_define){"LIGHT_LAYERS", "1"};
     return context_use_with(context, "render/ground.comp", defines, error);
 }
 
@@ -94,6 +97,7 @@ bool ground_shade(struct render_context *context, const struct integrator *integ
     gpu_uniform_float(program, "reach", context_ao_distance(context));
     gpu_uniform_float(program, "falloff", context->request.ao_falloff);
     environment_choice_bind(context->environment_choice, context->device, program);
+    layers_bind_light(context->layers, program);
     compact_dispatch(context, program, WAVE_HITS);
     return true;
 }

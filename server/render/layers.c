@@ -17,12 +17,24 @@ _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 <<
                    LAYER_BITS_CRYPTO_OBJECT == 7 << LAYER_CRYPTO_OBJECT0 &&
                    LAYER_BITS_CRYPTO_MATERIAL == 7 << LAYER_CRYPTO_MATERIAL0 &&
                    LAYER_BITS_ALL >> LAYER_COUNT == 0 && LAYER_BITS_ALL >> (LAYER_COUNT - 1) == 1 &&
-                   LAYER_BIT_STICKING == 1 << LAYER_STICKING,
+                   LAYER_BIT_STICKING == 1u << LAYER_STICKING && LAYER_COUNT <= LAYER_STICKING,
+               "shaders know the layers by other numbers");
+_Static_assert(LAYER_BIT_DIFFUSE_DIRECT == 1u << LAYER_DIFFUSE_DIRECT &&
+                   LAYER_BIT_DIFFUSE_INDIRECT == 1u << LAYER_DIFFUSE_INDIRECT &&
+                   LAYER_BIT_SPECULAR_DIRECT == 1u << LAYER_SPECULAR_DIRECT &&
+                   LAYER_BIT_SPECULAR_INDIRECT == 1u << LAYER_SPECULAR_INDIRECT &&
+                   LAYER_BIT_TRANSMISSION == 1u << LAYER_TRANSMISSION &&
+                   LAYER_BIT_EMISSION == 1u << LAYER_EMISSION && LAYER_BIT_BACKGROUND == 1u << LAYER_BACKGROUND,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)
 {
     return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID;
+}
+
+bool layers_are_of_light(enum layer layer)
+{
+    return 1u << layer & LAYER_BITS_LIGHT;
 }
 
 void layers_begin(struct layers *layers, struct render_context *context, bool is_shaded)
@@ -50,7 +62,7 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
         layers_finish(layers, device);
         return true;
     }
-    size_t planes = (size_t)__builtin_popcount(layers->wanted & ~LAYER_BITS_CRYPTO);
+    size_t planes = (size_t)__builtin_popcount(layers->wanted & ~LAYER_BITS_CRYPTO) + layers_have_light(layers);
     size_t covers = (size_t)cover_waves(layers) * slice_samples;
     size_t rays = layers->wanted & LAYER_BIT_AO ? context->wave_capacity : 0;
     size_t times = context->scene->has_motion ? rays : 0;
@@ -63,7 +75,7 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
 
 bool layers_are_shaded(const struct layers *layers)
 {
-    return layers->covers_by_shading;
+    return layers->covers_by_shading || layers_have_light(layers);
 }
 
 void layers_begin_slice(struct layers *layers, const struct render_context *context)
@@ -78,6 +90,20 @@ void layers_begin_slice(struct layers *layers, const struct render_context *cont
 static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
 {
     return (uint32_t)__builtin_popcount(layers->wanted & ~LAYER_BITS_CRYPTO & (layer_bit - 1));
+}
+
+bool layers_have_light(const struct layers *layers)
+{
+    return layers->wanted & LAYER_BITS_LIGHT;
+}
+
+void layers_bind_light(struct layers *layers, const struct gpu_program *program)
+{
+    if (!layers_have_light(layers))
+        return;
+    gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
+    gpu_uniform_uint(program, "light_layers", layers->wanted & ~LAYER_BITS_CRYPTO);
+    gpu_uniform_uint(program, "plane_samples", layers->plane_samples);
 }
 
 uint32_t layers_take_unknown(struct layers *layers)
@@ -127,6 +153,13 @@ static bool note_sticking(struct layers *layers, struct render_context *context,
     return program && gpu_check(context->device, "what sticks", error);
 }
 
+/* The plane of what first surfaces do comes behind those of light, of which it is one. */
+static uint32_t light_planes_end(const struct layers *layers)
+{
+    const uint32_t planes = (uint32_t)__builtin_popcount(layers->wanted & ~LAYER_BITS_CRYPTO);
+    return layers_have_light(layers) ? planes + 1 : 0;
+}
+
 /* All but how open a place is, which begins with 0. */
 static bool note_hits(struct layers *layers, struct render_context *context, struct error *error)
 {
@@ -139,6 +172,8 @@ static bool note_hits(struct layers *layers, struct render_context *context, str
         gpu_uniform_uint(program, "ray_count", context->ray_count);
         gpu_uniform_uint(program, "layers", layers->wanted);
         gpu_uniform_uint(program, "noting", layers->noting);
+        gpu_uniform_uint(program, "first_light_plane", plane_of(layers, LAYER_BIT_DIFFUSE_DIRECT));
+        gpu_uniform_uint(program, "end_light_plane", light_planes_end(layers));
         gpu_dispatch(context->device, program, context->ray_count);
     }
     context_span_end(context);

@@ -42,6 +42,11 @@ bool layers_mark_unknown(struct layers *layers, struct render_context *context, 
 /* Adds the current slice to the picture. Call it once the slice cannot be repeated. */
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
                        struct error *error);
+/* Layers of light (shaders/render/light_layers.glsl): whether there are some, and the sums to a program that notes
+ * them, with the define LIGHT_LAYERS. */
+bool layers_have_light(const struct layers *layers);
+void layers_bind_light(struct layers *layers, const struct gpu_program *program);
+bool layers_are_of_light(enum layer layer);
 /* Whether the layer holds the first sample of each pixel in place of the mean of all. */
 bool layers_of_first_sample(enum layer layer);
 uint64_t layers_device_bytes(const struct layers *layers);

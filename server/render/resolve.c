@@ -11,11 +11,17 @@
 #include <epoxy/gl.h>
 #include <math.h>
 
+/* Exposed as the beauty is: itself, and its parts. */
+static bool is_exposed(enum layer layer)
+{
+    return layer == LAYER_BEAUTY || layers_are_of_light(layer);
+}
+
 /* Of the sum of a layer's samples what its pixels show. */
 static float scale_of(const struct picture *picture, const struct frame_request *request, enum layer layer)
 {
     float mean = 1.0f / (float)picture->samples;
-    if (layer == LAYER_BEAUTY)
+    if (is_exposed(layer))
         return exp2f(request->exposure_stops) * mean;
     return layers_of_first_sample(layer) ? 1.0f : mean;
 }
@@ -80,11 +86,12 @@ static const struct gpu_program *use_ycbcr(struct render_context *context, uint3
     return program;
 }
 
-/* Layers beside the picture have none. */
+/* Layers beside the picture have none, but for the one of what lies behind. */
 static void set_background(const struct gpu_program *program, const struct frame_request *request,
                            enum layer layer)
 {
-    const bool has_colour = layer == LAYER_BEAUTY && request->background == BACKGROUND_COLOUR;
+    const bool has_colour =
+        (layer == LAYER_BEAUTY || layer == LAYER_BACKGROUND) && request->background == BACKGROUND_COLOUR;
     const float *colour = request->background_colour;
     const float background[4] = {colour[0], colour[1], colour[2], 1.0f}, none[4] = {0};
     gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
@@ -97,7 +104,7 @@ static void set_tiles(const struct gpu_program *program, const struct picture *p
     (void)picture_band_slots(picture, band, &first_slot);
     gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
     gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
-    gpu_uniform_float(program, "exposure", layer == LAYER_BEAUTY ? exp2f(context->request.exposure_stops) : 1.0f);
+    gpu_uniform_float(program, "exposure", is_exposed(layer) ? exp2f(context->request.exposure_stops) : 1.0f);
 }
 
 static bool is_ycbcr(const struct render_context *context, enum layer layer)

@@ -4,6 +4,7 @@
 #include "render/compact.h"
 #include "render/frame_request.h"
 #include "render/ground.h"
+#include "render/layers.h"
 #include "render/wave_trace.h"
 
 #include "shared/bindings.h"
@@ -14,7 +15,7 @@
 
 #include <epoxy/gl.h>
 
-#define DEFINES_MAX (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + 3) /* and what ends them */
+#define DEFINES_MAX (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + 4) /* and what ends them */
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
@@ -22,6 +23,7 @@ bool wave_passes_reserve(struct wave_passes *passes, struct render_context *cont
     struct gpu_device *device = context->device;
     size_t waves = context->wave_capacity, children = waves * integrator->children_a_hit;
     size_t shadows = ground_shadow_rays(context, passes->integrator) > 0 ? waves * integrator->shadow_waves : 0;
+    size_t samples = layers_have_light(context->layers) ? 2 * shadows : shadows;
     size_t shadow_times = context->scene->has_motion ? shadows : 0;
     if ((integrator->prepare && !integrator->prepare(context, error)) ||
         !ground_prepare(context, integrator, error))
@@ -32,7 +34,7 @@ bool wave_passes_reserve(struct wave_passes *passes, struct render_context *cont
            gpu_buffer_reserve(device, &passes->shadow_rays, shadows * sizeof(struct ray), error) &&
            gpu_buffer_reserve(device, &passes->shadow_times, shadow_times * sizeof(float), error) &&
            gpu_buffer_reserve(device, &passes->visibility, shadows * sizeof(uint), error) &&
-           gpu_buffer_reserve(device, &passes->light_samples, shadows * sizeof(vec4), error);
+           gpu_buffer_reserve(device, &passes->light_samples, samples * sizeof(vec4), error);
 }
 
 void wave_passes_finish(struct wave_passes *passes, struct gpu_device *device)
@@ -81,6 +83,8 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
+    if (layers_have_light(context->layers))
+        defines[n++] = (struct gpu_define){"LIGHT_LAYERS", "1"};
     const struct gpu_program *program = context_use_with(context, integrator->shader, defines, error);
     if (!program)
         return NULL;
@@ -92,6 +96,7 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
     gpu_uniform_uint(program, "shadow_rays_a_hit", integrator->shadow_rays_a_hit(context));
     gpu_uniform_float(program, "radiance_limit", frame_request_radiance_limit(&context->request));
     bind_shading(passes, context);
+    layers_bind_light(context->layers, program);
     return program;
 }
 
@@ -143,6 +148,7 @@ static const struct gpu_program *gather_program(const struct wave_passes *passes
         meets_lights ? "HAS_AREA_LIGHTS" : NULL,
         meets_lights && context_samples_emitters(context) ? "HAS_EMITTERS" : NULL,
         context->covers ? "COVERS" : NULL,
+        layers_have_light(context->layers) ? "LIGHT_LAYERS" : NULL,
     };
     struct gpu_define defines[sizeof(names) / sizeof(names[0]) + 1] = {0};
     size_t n = 0;
@@ -179,6 +185,7 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
         gpu_uniform_uint(program, "sample_count", context->slice.slot_count << context->uniforms.sample_shift);
     }
     context_bind_sums(context);
+    layers_bind_light(context->layers, program);
     context_span_begin(context, STAGE_SHADE);
     compact_dispatch(context, program, WAVE_RAYS);
     context_span_end(context);

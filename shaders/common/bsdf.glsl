@@ -16,7 +16,7 @@
 // Radiance on the other side is divided by the square of the index, so that a window neither dims nor brightens the
 // view through it.
 //
-// Defines: those of common/material.glsl; WARD.
+// Defines: those of common/material.glsl; WARD; LIGHT_LAYERS it is told what is scattered.
 
 #include "common/grain.glsl"
 #include "common/scattering.glsl"
@@ -143,16 +143,28 @@ vec3 bsdf_passed(bsdf b, surface s, vec3 light, vec3 light_world, out float prob
            over_scattered(s, b.parts, -light_world);
 }
 
+#ifdef LIGHT_LAYERS
+vec3 evaluated_scattered; // of what bsdf_evaluate() has returned last
+#endif
+
 // bsdf_evaluate() of the surface below a coat, as if there were only its lobes to choose from.
 vec3 evaluate_below(bsdf b, surface s, vec3 light_world, out float probability)
 {
     vec3 light = bsdf_local(b, light_world);
-    if (light.z <= 0.0 || dot(s.geometric, light_world) <= 0.0 || b.leaves)
-        return bsdf_passed(b, s, light, light_world, probability);
+    if (light.z <= 0.0 || dot(s.geometric, light_world) <= 0.0 || b.leaves) {
+        vec3 passed = bsdf_passed(b, s, light, light_world, probability);
+#ifdef LIGHT_LAYERS
+        evaluated_scattered = passed;
+#endif
+        return passed;
+    }
     vec3 facet = normalize(b.view + light), mirror, window;
-    vec3 sent = spread_out(s, b.parts, light.z, facet_alpha_mean(b.alpha).x, bsdf_lost(b, light)) *
-                over_scattered(s, b.parts, light_world);
+    float lost = bsdf_lost(b, light), over = over_scattered(s, b.parts, light_world);
+    vec3 sent = spread_out(s, b.parts, light.z, facet_alpha_mean(b.alpha).x, lost) * over;
     sent = (sent + sheen_sent(s, b.parts, bsdf_world(b, b.view), b.view.z, light_world)) * light.z;
+#ifdef LIGHT_LAYERS
+    evaluated_scattered = sent - spread_again(b.parts, lost) * (over * light.z);
+#endif
     probability = b.scattered_chance * (1.0 - passed_share(b.parts)) * light.z * INVERSE_PI;
     if (!b.rough)
         return sent;

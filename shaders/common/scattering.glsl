@@ -233,10 +233,15 @@ vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss
     return parts.scattered * spread_entered(s, parts, NoL, alpha, loss);
 }
 
-// What enters or is mirrored again. Kulla, Conty 2017.
+// What is mirrored again. Kulla, Conty 2017.
+vec3 spread_again(split parts, float loss)
+{
+    return parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
+}
+
 vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
 {
-    return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
+    return spread_scattered(s, parts, NoL, alpha, loss) + spread_again(parts, loss);
 }
 
 // The share of the light that a coat's mirror ray carries.

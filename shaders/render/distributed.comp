@@ -114,6 +114,9 @@ void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
     float other = c.environment * environment_probability(e.s.normal, chosen.direction);
     p.environment_share = found > 0.0 ? heuristic(found, other) : 1.0;
 #endif
+#ifdef LIGHT_LAYERS
+    note_first(e.p, vec3(chosen.back ? 1.0 : 0.0), !chosen.back);
+#endif
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / min(survival, 1.0), false,
               sample_solid_angle(chosen.solid_angle));
 }
@@ -192,6 +195,9 @@ bool ask_for_emitter(eye_hit e, shadow_choice c)
         sent = mirrored_light(e, sampled.direction, found);
     else if (side * NoL > 0.0) // the chance is of that side
         sent = brdf_scattered(e.s, e.parts, e.view, e.NoV, sampled.direction) * abs(NoL);
+#ifdef LIGHT_LAYERS
+    ray_part = part_asked(e.p, vec3(mirrored ? 1.0 : 0.0));
+#endif
     vec3 arriving = vec3(0.0);
     if (sampled.probability > 0.0)
         arriving = e.weight * sent * sampled.radiance * (emitter_share_asked(sampled, chance, found) /
@@ -208,6 +214,9 @@ bool ask_for_environment(eye_hit e, shadow_choice c)
     vec3 direction = environment_choose(e.s.normal, c.u, probability);
     probability *= c.environment;
     vec3 arriving = vec3(0.0), sent = mirrored_light(e, direction, found);
+#ifdef LIGHT_LAYERS
+    ray_part = part_asked(e.p, vec3(1.0));
+#endif
     if (probability > 0.0 && found > 0.0)
         arriving = e.weight * sent * environment_radiance(direction) * (heuristic(probability, found) / probability);
     return add_shadow_ray_from(e.j, e.p, e.origin, direction, RAY_STOPS_T_MIN, FAR, limited(e.p, 0u, arriving));
@@ -267,6 +276,10 @@ bool ask_for_light(eye_hit e, shadow_choice c)
 #endif
     float shine = light_shine(c.light_number, e.s.roughness);
     vec3 sent = reflected(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction, shine);
+#ifdef LIGHT_LAYERS
+    vec3 scattered = brdf_scattered(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
+    ray_part = part_asked(e.p, share_mirrored(sent, scattered * abs(dot(e.s.normal, sampled.direction))));
+#endif
     vec3 arriving = e.weight * (sent * sampled.irradiance / probability);
     return add_shadow_ray(e.j, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
@@ -295,7 +308,7 @@ void main()
 #endif
     e.NoV = clamp(dot(e.s.normal, e.view), 1e-4, 1.0); // a shading normal may lean away
     float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);
-    vec3 sent = vec3(0.0);
+    vec3 sent = vec3(0.0), ambient = vec3(0.0);
     bool straight = choice >= e.s.alpha, asked = false;
 #ifdef HAS_EMITTERS
     e.s.emission *= emitter_share_met(e.p.light_number >> PATH_LIGHT_BITS, e.p.light_number & PATH_LIGHT_MASK, h, r, e.p.time,
@@ -327,9 +340,10 @@ void main()
             c = choose_shadow_ray(e, sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
         lobe chosen = lobe_choose(e.s, e.parts, e.NoV, direction, choice,
                                   sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
-        vec3 ambient = (chosen.scattered + sheen_of(e.parts)) * environment_irradiance(e.s.normal);
+        ambient = (chosen.scattered + sheen_of(e.parts)) * environment_irradiance(e.s.normal);
         ambient += passed_of(e.parts) * environment_irradiance(-e.s.normal);
-        sent = e.s.emission + e.s.occlusion * ambient;
+        ambient *= e.s.occlusion;
+        sent = e.s.emission + ambient;
         add_lobe(e, chosen, c, choice);
         if (asks)
             asked = ask_for_light(e, c);
@@ -337,6 +351,13 @@ void main()
             no_shadow_ray(j);
     }
     bool seen = !straight && (e.p.flags & PATH_STRAIGHT) != 0u;
-    radiance[k] = vec4(limited(e.p, 1u, e.weight * sent), seen ? e.p.weight_r : 0.0);
+    vec3 brought = limited(e.p, 1u, e.weight * sent);
+    radiance[k] = vec4(brought, seen ? e.p.weight_r : 0.0);
+#ifdef LIGHT_LAYERS
+    // Over more bounces both are indirect.
+    ambient *= (e.p.flags & PATH_BOUNCES_MASK) > 1u ? vec3(0.0) : e.weight;
+    note_sent(e.p, h, part_asked(e.p, vec3(0.0)), ambient);
+    note_sent(e.p, h, part_met(e.p, LIGHT_EMITTED), brought - ambient);
+#endif
     note_children(j, true, asked ? 1u : 0u);
 }

@@ -4,11 +4,14 @@
 // sum is the same to the bit every time. Shadow rays come in batches: each batch is added to its path's radiance, and
 // the last to the samples, so their number does not matter. Paths that left the scene bring the environment home here.
 // Defines: GREY of what a shadow ray lets through, the mean of the channels counts; GROUND shadow rays change the pixel's
-// coverage, too (ground.comp); COVERS what covers the pixel is noted (shared/layers.h). Those of left_scene.glsl.
+// coverage, too (ground.comp); COVERS what covers the pixel is noted (shared/layers.h). Those of left_scene.glsl and
+// light_layers.glsl.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
 #include "common/visibility.glsl"
+#include "render/finite.glsl"
+#include "render/light_layers.glsl"
 #include "render/left_scene.glsl"
 #include "render/wave.glsl"
 
@@ -40,18 +43,9 @@ void note_cover(uint slot, uint k, float share)
 }
 #endif
 
-// The maximum radiance of a pixel: half floats hold 65504, and brighter values are white at any exposure of a scene lit
-// for the eye. NaN must not spread either.
-const float RADIANCE_MAX = 1e9;
-
 uint slot_of(uint k)
 {
     return texelFetch(paths, int(k) * PATH_TEXELS).w;
-}
-
-vec4 finite(vec4 v)
-{
-    return mix(clamp(v, vec4(0.0), vec4(RADIANCE_MAX)), vec4(0.0), isnan(v));
 }
 
 // Of hit j, with the light that the batch let through.
@@ -66,7 +60,12 @@ vec4 radiance_of_hit(uint k, uint j)
 #ifdef GREY
             share = vec3(dot(share, vec3(1.0 / 3.0)));
 #endif
+#ifdef LIGHT_LAYERS
+            vec4 light = texelFetch(light_samples, int(2u * place)), mirrored = texelFetch(light_samples, int(2u * place + 1u));
+            add_parts(slot_of(k), light.rgb * share, mirrored.rgb * share, mirrored.w);
+#else
             vec4 light = texelFetch(light_samples, int(place));
+#endif
             sum.rgb += light.rgb * share;
 #ifdef GROUND
             sum.a += light.a * dot(share, vec3(1.0 / 3.0));
@@ -74,6 +73,25 @@ vec4 radiance_of_hit(uint k, uint j)
         }
     }
     return sum;
+}
+
+vec4 beyond(uint k)
+{
+    vec4 arrived = radiance_beyond(k);
+#ifdef LIGHT_LAYERS
+    path p = path_at(k);
+    note_part(p, part_met(p, LIGHT_BEHIND), arrived.rgb);
+#endif
+    return arrived;
+}
+
+// The sample's coverage.
+void note_coverage(uint slot, float coverage)
+{
+#ifdef LIGHT_LAYERS
+    if ((light_layers & LAYER_BIT_BACKGROUND) != 0u)
+        light_sums[place_in_layer(LAYER_BIT_BACKGROUND, slot)].a = coverage;
+#endif
 }
 
 void main()
@@ -93,7 +111,7 @@ void main()
         if (j != HIT_PLACE_NONE)
             arrived = radiance_of_hit(k, j);
         else if (last)
-            arrived = radiance_beyond(k);
+            arrived = beyond(k);
 #ifdef COVERS
         if (last && j != HIT_PLACE_NONE)
             note_cover(slot, k, arrived.a);
@@ -105,6 +123,8 @@ void main()
         k++;
         more = last && k < wave.rays.count && slot_of(k) == slot;
     }
-    if (last)
+    if (last) {
         slice_sums[slot] = sum;
+        note_coverage(slot, sum.a);
+    }
 }

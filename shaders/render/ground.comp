@@ -59,7 +59,7 @@ float lambert(vec3 normal, vec3 direction, vec3 irradiance)
 void add_ground_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec4 uncovers)
 {
     shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET)));
-    light_samples[place] = uncovers;
+    put_light_sample(place, uncovers);
 #ifdef HAS_TIMES
     shadow_times[place] = p.time;
 #endif
@@ -200,7 +200,12 @@ void main()
     }
     alive = first_ray + batch_rays;
 #endif
-    if (first_ray == 0u)
-        radiance[k] = mix(covered, uncovered, unshadowed);
+    if (first_ray == 0u) {
+        vec4 shown = mix(covered, uncovered, unshadowed);
+        radiance[k] = shown;
+#ifdef LIGHT_LAYERS
+        note_part(p, light_part(vec3(0.0), LIGHT_BEHIND), shown.rgb); // as its rays are
+#endif
+    }
     child_counts[j] = alive << SHADOW_RAYS_SHIFT;
 }

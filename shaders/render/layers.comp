@@ -11,6 +11,7 @@
 uniform uint ray_count;
 uniform uint layers; // of the frame, without the beauty
 uniform uint noting; // of them, what is put
+uniform uint first_light_plane, end_light_plane; // of layers of light: the integrator adds
 
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
 
@@ -32,6 +33,8 @@ void main()
     uint k = item_index();
     if (k >= ray_count)
         return;
+    for (uint plane = first_light_plane; plane < end_light_plane; plane++)
+        layer_sums[plane * ray_count + k] = vec4(0.0);
     hit h = hit_at(k);
     // Those of later waves: layers_unknown.comp. Of pictures made from a key view: gather_views.comp.
     put(LAYER_BIT_UNKNOWN, k, vec4(vec3((h.material & HIT_UNKNOWN) != 0u ? 1.0 : 0.0), 1.0));

@@ -74,6 +74,16 @@ void choose_light(inout eye_hit e, uvec2 seed, uint index)
 #endif
 }
 
+// For the shadow ray that is made next.
+vec3 evaluate(eye_hit e, vec3 direction, out float found)
+{
+    vec3 sent = bsdf_evaluate(e.b, e.s, direction, found);
+#ifdef LIGHT_LAYERS
+    ray_part = part_asked(e.p, share_mirrored(sent, evaluated_scattered));
+#endif
+    return sent;
+}
+
 #ifdef HAS_EMITTERS
 bool ask_for_emitter(eye_hit e, uint place, vec2 u)
 {
@@ -81,7 +91,7 @@ bool ask_for_emitter(eye_hit e, uint place, vec2 u)
     vec3 normal = unpack_ray_normal(pack_ray_normal(side * e.s.normal));
     vec3 from = origin_towards(e.s, e.origin, e.distance_, side * e.s.geometric);
     emitter_sample sampled = emitter_sample_at(from, normal, u, e.p.time);
-    vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, sampled.direction, found);
+    vec3 arriving = vec3(0.0), sent = evaluate(e, sampled.direction, found);
     if (sampled.probability > 0.0 && side * dot(sampled.direction, e.s.normal) > 0.0) // the chance is of that side
         arriving = e.weight * sent * sampled.radiance / (sampled.probability * chance);
     arriving = limited(e.p, 0u, arriving * emitter_share_asked(sampled, chance, found));
@@ -107,7 +117,7 @@ bool ask_for_light(eye_hit e, uint place)
     }
     vec3 from = e.origin;
     light_sample sampled = light_seen(e.s, e.distance_, e.light_number, u, from);
-    vec3 arriving = e.weight * bsdf_evaluate(e.b, e.s, sampled.direction, found) * (sampled.irradiance / chance);
+    vec3 arriving = e.weight * evaluate(e, sampled.direction, found) * (sampled.irradiance / chance);
 #ifdef HAS_AREA_LIGHTS
     float probability = chance * light_probability(light_at(e.light_number), sampled);
     if (!e.last && probability > 0.0)
@@ -136,7 +146,7 @@ bool ask_for_environment(eye_hit e, uint place, uvec2 seed, uint index)
 #endif
     vec3 direction = environment_choose(side * e.s.normal, u, probability);
     probability *= of_side;
-    vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, direction, found);
+    vec3 arriving = vec3(0.0), sent = evaluate(e, direction, found);
     if (probability > 0.0 && max_component(sent) > 0.0)
         arriving = e.weight * sent * environment_radiance(direction) / probability;
     if (!e.last)
@@ -190,6 +200,9 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
 {
     uint place = e.j, alive = 0u;
     vec3 origin = off_surface(e.s, e.distance_, -e.s.geometric), carried = e.weight * through;
+#ifdef LIGHT_LAYERS
+    ray_part = part_met(e.p, LIGHT_EMITTED);
+#endif
     if (asks_lights != 0u) {
         vec3 arriving = vec3(0.0);
         float rest = e.p.light_distance - e.distance_;
@@ -270,6 +283,12 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     p.flags = p.flags & (1u << PATH_NORMAL_SHIFT) - 1u | ray_normal << PATH_NORMAL_SHIFT;
     p.light_number |= ratio_code(emitters_chance, found) << PATH_LIGHT_BITS;
 #endif
+#ifdef LIGHT_LAYERS
+    // Of a direction with a density all lobes bring their shares, whichever was chosen.
+    bool evaluated = chosen.probability > 0.0, mirrored = chosen.lobe == BSDF_MIRRORED || chosen.lobe == BSDF_COAT;
+    vec3 share = evaluated ? share_mirrored(chosen.weight * chosen.probability, evaluated_scattered) : vec3(mirrored ? 1.0 : 0.0);
+    note_first(e.p, share, chosen.lobe == BSDF_REFRACTED);
+#endif
     float angle = chosen.lobe == BSDF_COAT ? 0.0 : rough_solid_angle(e.s, chosen.direction);
     angle = chosen.probability > 0.0 ? 1.0 / chosen.probability : angle;
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false, sample_solid_angle(angle));
@@ -349,6 +368,10 @@ void main()
         go_on(e, seed, index, asks, min(choice / e.s.alpha, 0.99999994));
     }
     bool seen = !straight && (e.p.flags & PATH_STRAIGHT) != 0u;
-    radiance[k] = vec4(limited(e.p, 1u, e.weight * sent), seen ? e.p.weight_r : 0.0);
+    vec3 brought = limited(e.p, 1u, e.weight * sent);
+    radiance[k] = vec4(brought, seen ? e.p.weight_r : 0.0);
+#ifdef LIGHT_LAYERS
+    note_sent(e.p, h, part_met(e.p, LIGHT_EMITTED), brought);
+#endif
     note_children(j, true, alive);
 }

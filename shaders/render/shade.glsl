@@ -2,7 +2,7 @@
 // Shared by the integrators' shading passes: a hit of the wave in; its children and shadow rays out, with the light
 // that these bring if nothing is in the way. Hits are in the order of the list, j is the place in it.
 //
-// Defines: HAS_TIMES something moves: rays have a time.
+// Defines: HAS_TIMES something moves: rays have a time; those of render/light_layers.glsl.
 
 #include "shared/path.h"
 #include "shared/ray.h"
@@ -12,6 +12,7 @@
 #include "common/material.glsl"
 #include "common/sequence.glsl"
 #include "common/slots.glsl"
+#include "render/light_layers.glsl"
 #include "render/path_texels.glsl"
 
 layout(local_size_x = 64) in;
@@ -175,12 +176,31 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     child_count++;
 }
 
+#ifdef LIGHT_LAYERS
+// What an integrator writes to radiance[]; ground.comp replaces it where the hit is the ground's.
+void note_sent(path p, hit h, light_part part, vec3 light)
+{
+    if ((h.material & HIT_GROUND) == 0u)
+        note_part(p, part, light);
+}
+#endif
+
+void put_light_sample(uint place, vec4 light)
+{
+#ifdef LIGHT_LAYERS
+    light_samples[2u * place] = light;
+    light_samples[2u * place + 1u] = vec4(light.rgb * ray_part.mirrored, ray_part.kind);
+#else
+    light_samples[place] = light;
+#endif
+}
+
 void no_shadow_ray(uint place)
 {
     if (shadow_rays_a_hit == 0u) // nor a place for one
         return;
     shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
-    light_samples[place] = vec4(0.0); // a dead ray meets nothing, and so lets everything through
+    put_light_sample(place, vec4(0.0)); // a dead ray meets nothing, and so lets everything through
 #ifdef HAS_TIMES
     shadow_times[place] = 0.0;
 #endif
@@ -195,7 +215,7 @@ bool add_shadow_ray_from(uint place, path p, vec3 origin, vec3 direction, float 
     // Short of the light, as a model may have a surface at its position. One of both, as each store is code.
     vec4 start = vec4(origin, t_min), way = vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET));
     shadow_rays[place] = ray(alive ? start : vec4(0.0), alive ? way : vec4(0.0, 0.0, 1.0, -1.0));
-    light_samples[place] = alive ? vec4(arriving, 0.0) : vec4(0.0);
+    put_light_sample(place, alive ? vec4(arriving, 0.0) : vec4(0.0));
 #ifdef HAS_TIMES
     shadow_times[place] = alive ? p.time : 0.0;
 #endif

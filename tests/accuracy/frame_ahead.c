@@ -97,8 +97,11 @@ TEST_LONG(the_host_waits_once_whatever_the_integrator_tracer_and_layers)
             snprintf(what, sizeof(what), "integrator %u, tracer %u", forms[i].integrator, tracers[k]);
             assert_ahead_is_as_waiting(fixture, what);
         }
-    fixture->request.layers = LAYER_BITS_ALL;
+    fixture->request.layers = LAYER_BITS_SEEN | LAYER_BITS_CRYPTO;
     assert_ahead_is_as_waiting(fixture, "all layers");
+    fixture->request.layers = LAYER_BITS_SEEN | LAYER_BITS_LIGHT;
+    fixture->request.integrator = INTEGRATOR_PATH;
+    assert_ahead_is_as_waiting(fixture, "layers of light");
 }
 
 /* Only the device knows how many rays there are. Slices have other sizes where they are queued: a hierarchy of its

@@ -163,9 +163,26 @@ def read_png(path):
     return width, height, rows, channels
 
 
+def exr_parts(path):
+    """The headers of an EXR file, of one part or several: name -> bytes each; "" -> where its table of chunks begins."""
+    data, headers = pathlib.Path(path).read_bytes(), []
+    at, several = 8, data[5] & 0x10
+    while not headers or several and data[at]:
+        headers.append(_exr_header(data, at))
+        at = headers[-1][""]
+    at += 1 if several else 0
+    for header in headers:
+        header[""] = at
+        at += 8 * struct.unpack("<I", header["chunkCount"])[0] if several else 0
+    return headers
+
+
 def exr_attributes(path):
-    """name -> bytes of the header of an EXR file; "" -> where it ends."""
-    data, at, found = pathlib.Path(path).read_bytes(), 8, {}
+    return exr_parts(path)[0]
+
+
+def _exr_header(data, at):
+    found = {}
     while data[at]:
         name_end = data.index(b"\0", at)
         kind_end = data.index(b"\0", name_end + 1)
@@ -176,9 +193,9 @@ def exr_attributes(path):
     return found
 
 
-def exr_channels(path):
+def exr_channels(path, part=0):
     """name -> 0 whole numbers, 1 half floats, 2 floats; in the order of the file."""
-    listing, found = exr_attributes(path)["channels"], {}
+    listing, found = exr_parts(path)[part]["channels"], {}
     while listing[0]:
         name, rest = listing.split(b"\0", 1)
         found[name.decode()] = struct.unpack_from("<i", rest)[0]
@@ -186,16 +203,16 @@ def exr_channels(path):
     return found
 
 
-def read_exr(path):
-    """(width, height, name -> values row by row) of an EXR file of scan lines, zip-compressed or not."""
-    data, head, channels = pathlib.Path(path).read_bytes(), exr_attributes(path), exr_channels(path)
+def read_exr(path, part=0):
+    """(width, height, name -> values row by row) of a part of an EXR file of scan lines, zip-compressed or not."""
+    data, head, channels = pathlib.Path(path).read_bytes(), exr_parts(path)[part], exr_channels(path, part)
     left, top, right, bottom = struct.unpack("<4i", head["dataWindow"])
     width, height, compression = right - left + 1, bottom - top + 1, head["compression"][0]
     lines = {0: 1, 2: 1, 3: 16}[compression]
     formats = {name: f"<{width}{'Ief'[kind]}" for name, kind in channels.items()}
     values = {name: [] for name in channels}
     for chunk in range(-(-height // lines)):
-        at = struct.unpack_from("<Q", data, head[""] + 8 * chunk)[0]
+        at = struct.unpack_from("<Q", data, head[""] + 8 * chunk)[0] + (4 if data[5] & 0x10 else 0)  # the part's number
         first, size = struct.unpack_from("<ii", data, at)
         rows = min(lines, bottom + 1 - first)
         plain_bytes = rows * sum(map(struct.calcsize, formats.values()))

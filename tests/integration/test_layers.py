@@ -4,12 +4,13 @@ refused."""
 import math
 
 import farlight_test
-from farlight_test import Daemon, OneDaemon, bundled_scenes, exr_attributes, exr_channels, farlight, frames_of, read_exr
+from farlight_test import Daemon, OneDaemon, bundled_scenes, exr_attributes, exr_channels, exr_parts, farlight, frames_of, read_exr
 
 EYE, LOOK_AT = (0.3, 1.1, 3.1), (0.0, 0.9, 0.0)
 VIEW = ["--size", "48x40", "--eye", ",".join(map(str, EYE)), "--look-at", ",".join(map(str, LOOK_AT)), "--fov", "50"]
 ALL = "beauty,albedo,normal,depth,position,ao,id,unknown,crypto-object,crypto-material"
 UINT, HALF, FLOAT = 0, 1, 2
+ZIP, DWAA = 3, 8  # OpenEXR's numbers of compressions
 CHANNELS = {
     "beauty": {"R": HALF, "G": HALF, "B": HALF, "A": HALF},
     "albedo": {"albedo.R": HALF, "albedo.G": HALF, "albedo.B": HALF},
@@ -58,6 +59,37 @@ class Layers(OneDaemon):
         self.assertEqual({name for name in layered if layered[name] != noisy[name]}, {"R", "G", "B"})
         options = ["--layers", ALL, "--samples", "4", "--float"]
         self.assertEqual(self.read(*options, "--progressive=4"), self.read(*options, "--progressive=1"))
+
+    def test_parts_of_the_light_add_up_to_the_picture(self):
+        """Sums of some tens of floats in two orders: a few roundings of 2^-24, of values up to 4."""
+        got = self.read("--layers", "beauty,light", "--float", "--samples", "2", "--exposure", "1")
+        names = sorted({name.split(".")[0] for name in got} - set("RGBA"))
+        self.assertEqual(names, ["background", "diffuse_direct", "diffuse_indirect", "emission", "specular_direct",
+                                 "specular_indirect", "transmission"])
+        for channel in "RGB":
+            parts = [sum(values) for values in zip(*(got[f"{name}.{channel}"] for name in names))]
+            self.assertGreater(max(parts), 0.5)
+            for part, whole in zip(parts, got[channel]):
+                self.assertAlmostEqual(part, whole, delta=2e-6 * max(whole, 1))
+        result = self.render("--layers", "light", "--integrator", "whitted", status=1)[1]
+        self.assertIn("choose distributed or path", result.stderr)
+
+    def test_dwaa_loses_nothing_but_of_colours(self):
+        """Y of a position or a normal too, which the library takes for a luminance by its name."""
+        options = ["--layers", "albedo,ao,beauty,depth,id,normal,position", "--samples", "1"]
+        plain, small = self.render(*options, name="zip.exr")[0], self.render(*options, "--exr-compression", "dwaa", name="dwaa.exr")[0]
+        wanted = read_exr(plain)[2]
+        self.assertEqual([head["compression"][0] for head in exr_parts(small)], [DWAA, ZIP])
+        self.assertEqual(set(exr_channels(small)), {*"RGBA", "albedo.R", "albedo.G", "albedo.B"})
+        got = read_exr(small, part=1)[2]
+        self.assertEqual(set(got) | set(exr_channels(small)), set(wanted))
+        for name, values in got.items():
+            self.assertEqual(values, wanted[name], name)
+        # What DWAA is made for: errors that are hardly seen.
+        self.expect(farlight("compare", plain, small, "--fail-above", "psnr=35"), 0)
+        self.assertEqual([head["compression"][0] for head in exr_parts(self.render("--exr-compression", "dwaa")[0])], [DWAA])
+        result = farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", "--exr-compression", "dwaa")
+        self.assertIn("png files do not have it", self.expect(result, 2).stderr)
 
     def test_places_depths_and_normals_fit_each_other_and_the_camera(self):
         """One sample, which lies in the middle of its pixel."""

@@ -65,9 +65,12 @@ WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER"
 # Of a sample a pixel, without a lens and other layers of the picture.
 WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
 WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
-# And in programs of a folder: what moves is met by tracers, and shaded where it was met. Emitters alone are looked for.
-WITHOUT_IN = {"render": ("HAS_MOTION",)}
+# And in programs of a folder, but for some: what moves is met by tracers, and shaded where it was met; emitters alone are
+# looked for. Light is noted where it is shaded and gathered.
+WITHOUT_IN = {"render": ("HAS_MOTION", "LIGHT_LAYERS")}
 MAY_MOVE = ("render/path.comp", "render/distributed.comp", "render/ground.comp", "render/wireframe.comp")
+NOTES_LIGHT = ("render/path.comp", "render/distributed.comp", "render/ground.comp", "render/gather.comp")
+IN_ALL_THE_SAME = {"HAS_MOTION": MAY_MOVE, "LIGHT_LAYERS": NOTES_LIGHT}
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
@@ -186,7 +189,7 @@ def variants(program):
     all_chosen = {name for combination in combinations for name in combination}
     for chosen in combinations:
         never = [name for one in chosen for name in WITHOUT.get(one, ())] + [
-            *(() if program in MAY_MOVE else WITHOUT_IN.get(program.split("/")[0], ()))]
+            name for name in WITHOUT_IN.get(program.split("/")[0], ()) if program not in IN_ALL_THE_SAME[name]]
         optional = [name for name in optional_defines(stages, chosen, all_chosen) if name not in never]
         for on in [[], optional] + [[name] for name in optional if len(optional) > 1]:
             if on or on is not optional:

@@ -97,6 +97,13 @@ class Layer(Word):
     CRYPTO_MATERIAL0 = 11  # likewise, of materials
     CRYPTO_MATERIAL1 = 12  # likewise
     CRYPTO_MATERIAL2 = 13  # likewise
+    DIFFUSE_DIRECT = 16
+    DIFFUSE_INDIRECT = 17  # the same, of light that other surfaces have sent there
+    SPECULAR_DIRECT = 18
+    SPECULAR_INDIRECT = 19  # the same, of light that other surfaces have sent there
+    TRANSMISSION = 20  # light that comes through the first surface where that is glass
+    EMISSION = 21  # light that the first surface sends out itself; also the colour of unlit ones
+    BACKGROUND = 22
 
 
 class Attachment(Word):

@@ -287,6 +287,8 @@ TEST_WITH(layers_become_channels_by_name, begin_export, end_export)
         {LAYER_SET(ID), true, "id.material:0 id.node:0"},
         {LAYER_SET(CRYPTO_OBJECT1), true,
          "CryptoObject01.alpha:2 CryptoObject01.blue:2 CryptoObject01.green:2 CryptoObject01.red:2"},
+        {LAYER_SET(DIFFUSE_DIRECT) | LAYER_SET(BACKGROUND), false,
+         "background.B:2 background.G:2 background.R:2 diffuse_direct.B:2 diffuse_direct.G:2 diffuse_direct.R:2"},
         {LAYER_SET(CRYPTO_OBJECT0) - 1, true,
          "A:1 B:1 G:1 R:1 Z:2 albedo.B:1 albedo.G:1 albedo.R:1 ao.Y:1 id.material:0 id.node:0 normal.X:1 "
          "normal.Y:1 "

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// Layers of light: each contribution to a sample's radiance is noted in one of them, or in two by what the first surface
+// scatters and mirrors, so that their sum is the beauty. They follow the first surface that bends or scatters a path, and
+// whether light has come there directly. A sample has at most one path.
+//
+//   shading passes  note what they write to radiance[], by part_met() and part_asked(), and so does gather.comp of light beyond the scene
+//   shadow rays     have their part in `ray_part`, which the light sample's second vec4 brings to gather.comp
+//   first surfaces  tell what they do with the path, by note_first()
+//
+// Defines: LIGHT_LAYERS there are some; else nothing here costs anything.
+
+#include "shared/layers.h"
+#include "shared/path.h"
+#include "render/finite.glsl"
+
+struct light_part {
+    vec3 mirrored; // share of it that the first surface mirrors
+    float kind;    // LIGHT_*
+};
+
+#ifdef LIGHT_LAYERS
+uniform uint light_layers; // all layers of the frame, without the beauty
+uniform uint plane_samples;
+
+layout(std430, binding = BIND_LAYER_SUMS) buffer light_sum_block { vec4 light_sums[]; };
+
+light_part ray_part = light_part(vec3(0.0), LIGHT_BEHIND); // of the shadow ray that is made next
+
+uint place_in_layer(uint layer_bit, uint slot)
+{
+    return uint(bitCount(light_layers & layer_bit - 1u)) * plane_samples + slot;
+}
+
+uint place_of_first(uint slot)
+{
+    return uint(bitCount(light_layers)) * plane_samples + slot;
+}
+
+void add_to_layer(uint layer_bit, uint slot, vec3 light)
+{
+    if ((light_layers & layer_bit) != 0u)
+        light_sums[place_in_layer(layer_bit, slot)].rgb += light;
+}
+
+// `mirrored`: of the light.
+void add_parts(uint slot, vec3 light, vec3 mirrored, float kind)
+{
+    light = finite(vec4(light, 0.0)).rgb;
+    mirrored = min(finite(vec4(mirrored, 0.0)).rgb, light);
+    if (kind <= LIGHT_INDIRECT) {
+        bool direct = kind == LIGHT_DIRECT;
+        add_to_layer(direct ? LAYER_BIT_DIFFUSE_DIRECT : LAYER_BIT_DIFFUSE_INDIRECT, slot, light - mirrored);
+        add_to_layer(direct ? LAYER_BIT_SPECULAR_DIRECT : LAYER_BIT_SPECULAR_INDIRECT, slot, mirrored);
+    } else {
+        uint which = kind == LIGHT_EMITTED ? LAYER_BIT_EMISSION : LAYER_BIT_BACKGROUND;
+        add_to_layer(kind == LIGHT_TRANSMITTED ? LAYER_BIT_TRANSMISSION : which, slot, light);
+    }
+}
+
+light_part part_behind(path p, float kind)
+{
+    vec4 first = light_sums[place_of_first(p.sample_slot)];
+    return light_part(first.rgb, first.w > 0.0 ? LIGHT_TRANSMITTED : kind);
+}
+
+// Of light that the path's ray meets. `seen`: its kind where the eye does.
+light_part part_met(path p, float seen)
+{
+    uint bounces = p.flags & PATH_BOUNCES_MASK;
+    return bounces == 0u ? light_part(vec3(0.0), seen) : part_behind(p, bounces == 1u ? LIGHT_DIRECT : LIGHT_INDIRECT);
+}
+
+// Of light that comes to where the path's ray ends. `mirrored`: the share of it that is mirrored there.
+light_part part_asked(path p, vec3 mirrored)
+{
+    return (p.flags & PATH_BOUNCES_MASK) == 0u ? light_part(mirrored, LIGHT_DIRECT) : part_behind(p, LIGHT_INDIRECT);
+}
+
+void note_part(path p, light_part part, vec3 light)
+{
+    add_parts(p.sample_slot, light, light * part.mirrored, part.kind);
+}
+
+void note_first(path p, vec3 mirrored, bool transmitted)
+{
+    if ((p.flags & PATH_BOUNCES_MASK) == 0u)
+        light_sums[place_of_first(p.sample_slot)] = vec4(mirrored, transmitted ? 1.0 : 0.0);
+}
+
+// Of what is sent, the share that is not scattered.
+vec3 share_mirrored(vec3 sent, vec3 scattered)
+{
+    return clamp(1.0 - scattered / max(sent, vec3(1e-30)), 0.0, 1.0);
+}
+#endif

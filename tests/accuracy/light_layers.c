@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: MIT */
+/* Layers of light: they add up to the beauty, and each holds the light that comes its way. */
+#include "tests/accuracy/render_fixture.h"
+
+#include "shared/layers.h"
+#include "tests/harness/test.h"
+
+#define ALL (1u << LAYER_BEAUTY | LAYER_BITS_LIGHT)
+/* Of a sum of some tens of floats, in another order and cut into parts: a few roundings of 2^-24. */
+#define ROUNDING 1e-6
+
+ALL_TESTS(fixture_setup, fixture_teardown)
+EACH_TEST(fixture_clear, NULL)
+
+static const float *pixel_of(const struct frame_result *result, enum layer layer, uint32_t x, uint32_t y)
+{
+    const uint32_t plane = (uint32_t)__builtin_popcount(result->layers & ((1u << layer) - 1));
+    return fixture_pixel(result, x, plane * result->height + y);
+}
+
+static struct frame_result render(struct fixture *fixture, unsigned integrator)
+{
+    fixture->request.integrator = integrator;
+    fixture->request.layers = ALL;
+    struct frame_result result = fixture_render(fixture);
+    assert_int_equal(result.layers, ALL);
+    return result;
+}
+
+static void expect_sum(const struct frame_result *result)
+{
+    for (uint32_t y = 0; y < result->height; y++)
+        for (uint32_t x = 0; x < result->width; x++)
+            for (int c = 0; c < 3; c++) {
+                const double beauty = (double)pixel_of(result, LAYER_BEAUTY, x, y)[c];
+                double sum = 0;
+                for (uint32_t left = LAYER_BITS_LIGHT; left; left &= left - 1)
+                    sum += (double)pixel_of(result, (enum layer)__builtin_ctz(left), x, y)[c];
+                assert_near(sum, beauty, ROUNDING * fmax(beauty, 1.0));
+            }
+}
+
+/* A lit square above it all, which paths find both ways. */
+static void build_mixture(struct fixture *fixture)
+{
+    const float above[12] = {1, 0, 0, 0, 0, 0, -1, 2, 0, 1, 0, 0};
+    struct scene_material *glow = fixture_material(fixture);
+    glow->emission[0] = glow->emission[1] = glow->emission[2] = 3.0f;
+    fixture_square(fixture, 0.5f, glow->base.id, above);
+    fixture_mixture(fixture);
+    fixture->request.width = 24;
+    fixture->request.height = 18;
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.depth = 4;
+    fixture->request.samples = 4;
+}
+
+TEST(layers_of_light_add_up_to_the_beauty)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    for (unsigned integrator = INTEGRATOR_DISTRIBUTED; integrator <= INTEGRATOR_PATH;
+         integrator += INTEGRATOR_PATH - INTEGRATOR_DISTRIBUTED) {
+        fixture->request.layers = 0;
+        fixture->request.integrator = integrator;
+        struct frame_result alone = fixture_render(fixture), result = render(fixture, integrator);
+        assert_memory_equal(result.pixels, alone.pixels, alone.size_bytes); /* noting changes nothing */
+        expect_sum(&result);
+        frame_result_finish(&alone);
+        frame_result_finish(&result);
+    }
+}
+
+/* Exposed, over a colour and shadows on a ground, where tiles stop, and through stored samples. */
+TEST_LONG(layers_of_light_add_up_however_the_beauty_is_made)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    fixture->request.exposure_stops = 1.5f;
+    fixture->request.background = BACKGROUND_COLOUR;
+    fixture->request.background_colour[0] = 0.25f;
+    fixture->request.ground =
+        (struct frame_ground){.centre_world = {0, -0.7f, 0}, .normal_world = {0, 1, 0}, .radius = 9};
+    fixture->request.tracer_options.ldc.resolution = 64;
+    for (unsigned integrator = INTEGRATOR_DISTRIBUTED; integrator <= INTEGRATOR_PATH;
+         integrator += INTEGRATOR_PATH - INTEGRATOR_DISTRIBUTED)
+        for (int way = 0; way < 4; way++) {
+            fixture->request.background = way ? BACKGROUND_ENVIRONMENT : BACKGROUND_COLOUR;
+            fixture->request.noise = way == 1 ? 0.2f : 0.0f;
+            fixture->request.samples = way == 1 ? 64 : 3;
+            fixture->request.tracer = way == 2 ? TRACER_LDC : TRACER_BVH;
+            fixture->request.clamp = way == 3 ? 0.1f : 0.0f;
+            struct frame_result result = render(fixture, integrator);
+            expect_sum(&result);
+            frame_result_finish(&result);
+        }
+}
+
+/* ---- seven things side by side, of 2 m each, below a grey sky ---- */
+
+enum thing { MATTE, MIRROR, GLOW, GLASS, MIRROR_OF_MATTE, VEIL, NOTHING, THINGS };
+
+static void build_things(struct fixture *fixture)
+{
+    const float c = sqrtf(0.5f), wall[12] = {0, 0, -1, 9, 0, 1, 0, 0, 1, 0, 0, 0};
+    for (int i = 0; i < NOTHING; i++) {
+        const bool turned = i == MIRROR_OF_MATTE;
+        const float x = 2.0f * (float)i - 6.0f, at[12] = {turned ? c : 1,  0, turned ? c : 0, x, 0, 1, 0, 0,
+                                                          turned ? -c : 0, 0, turned ? c : 1, 0};
+        struct scene_material *material = fixture_material(fixture);
+        if (i == MIRROR || turned) {
+            material->metallic = 1.0f;
+            material->roughness = 0.0f;
+        } else if (i == GLOW) {
+            material->emission[0] = material->emission[1] = material->emission[2] = 2.0f;
+            material->base_colour[0] = material->base_colour[1] = material->base_colour[2] = 0.0f;
+        } else if (i == GLASS) {
+            material->transmission = 1.0f;
+            material->roughness = 0.0f;
+            material->ior = 1.5f;
+        } else if (i == VEIL) {
+            material->alpha_mode = ALPHA_BLEND;
+            memcpy(material->base_colour, (float[4]){0, 0, 0, 0.5f}, sizeof(material->base_colour));
+        }
+        fixture_square(fixture, 0.9f, material->base.id, at);
+    }
+    fixture_square(fixture, 3.0f, fixture_material(fixture)->base.id, wall); /* out of view, seen in a mirror */
+    fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
+    fixture_look(fixture, 0, 0, 5, 0);
+    fixture->request.camera.ortho_height = 2;
+    fixture->request.width = 8 * THINGS;
+    fixture->request.height = 8;
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.samples = 16;
+}
+
+/* The middle of one. */
+static double light_of(const struct frame_result *result, enum layer layer, enum thing thing)
+{
+    return (double)pixel_of(result, layer, 8 * (uint32_t)thing + 4, 4)[1];
+}
+
+static void expect_light(const struct frame_result *result, enum layer layer, enum thing thing, double share)
+{
+    const double beauty = light_of(result, LAYER_BEAUTY, thing), light = light_of(result, layer, thing);
+    if (!(beauty > 0.2) || !(light >= (share - ROUNDING) * beauty))
+        fail_msg("thing %d: %g of %g in layer %d, not %g of it", (int)thing, light, beauty, (int)layer, share);
+}
+
+TEST(light_is_in_the_layer_of_its_first_surface)
+{
+    struct fixture *fixture = *state;
+    build_things(fixture);
+    for (unsigned integrator = INTEGRATOR_DISTRIBUTED; integrator <= INTEGRATOR_PATH;
+         integrator += INTEGRATOR_PATH - INTEGRATOR_DISTRIBUTED) {
+        struct frame_result result = render(fixture, integrator);
+        expect_light(&result, LAYER_DIFFUSE_DIRECT, MATTE, 0.9); /* the turned mirror stands beside it */
+        expect_light(&result, LAYER_SPECULAR_DIRECT, MIRROR, 1);
+        expect_light(&result, LAYER_EMISSION, GLOW, 1);
+        expect_light(&result, LAYER_TRANSMISSION, GLASS,
+                     0.8); /* 4 % is mirrored, within the noise of 16 samples */
+        expect_light(&result, LAYER_SPECULAR_INDIRECT, MIRROR_OF_MATTE, 1);
+        expect_light(&result, LAYER_BACKGROUND, VEIL, 1); /* a black one */
+        expect_light(&result, LAYER_BACKGROUND, NOTHING, 1);
+        assert_near(light_of(&result, LAYER_BACKGROUND, VEIL), 0.25, 0.05); /* a half, by 16 samples */
+        assert_near(pixel_of(&result, LAYER_BACKGROUND, 4, 4)[3], 1, 0);    /* coverage of the picture */
+        expect_sum(&result);
+        frame_result_finish(&result);
+    }
+}
+
+/* ---- what has no such layers ---- */
+
+static void expect_refused(struct fixture *fixture, const char *text)
+{
+    struct error error = {0};
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+    assert_string_equal(error.field, "layers");
+    assert_non_null(strstr(error.text, text));
+    assert_true(error.remedy[0] != '\0');
+}
+
+TEST(light_that_does_not_add_up_has_no_layers)
+{
+    struct fixture *fixture = *state;
+    fixture_square(fixture, 1, 0, NULL);
+    struct scene_edit *edit = fixture_edit(fixture, OBJECT_NODE);
+    edit->kind = EDIT_SET_ENVIRONMENT;
+    edit->set.environment.display_values = true;
+    fixture_commit(fixture);
+    fixture->request.layers = ALL;
+    fixture->request.integrator = INTEGRATOR_WHITTED;
+    expect_refused(fixture, "the integrator whitted");
+    fixture->request.integrator = INTEGRATOR_PATH;
+    expect_refused(fixture, "a display's values");
+    fixture->request.view_source = VIEW_SOURCE_LAYERS;
+    expect_refused(fixture, "depth layers");
+}
