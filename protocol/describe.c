@@ -38,10 +38,10 @@ enum enum_index {
 #define REAL(field, min, max, doc) + 4
 #define REALS(field, count, min, max, doc) + 4 * (count)
 #define BYTES(field, count, doc) + (count)
-#define SETTING_WHOLE(tracer, field, min, max, default_value, unit, mark, doc) + 4
-#define SETTING_ONE_OF(tracer, field, numbers, max, default_value, unit, mark, doc) + 4
-#define SETTING_REAL(tracer, field, min, max, default_value, unit, mark, doc) + 4
-#define SETTING_CHOICE(tracer, field, choices, mark, doc) + 4
+#define SETTING_WHOLE(tracer, field, min, max, default_value, unit, doc) + 4
+#define SETTING_ONE_OF(tracer, field, numbers, max, default_value, unit, doc) + 4
+#define SETTING_REAL(tracer, field, min, max, default_value, unit, doc) + 4
+#define SETTING_CHOICE(tracer, field, choices, doc) + 4
 #include "protocol/messages.def"
 
 #define RECORD(name, doc) enum { wire_counted_record_##name = 0
@@ -118,23 +118,21 @@ enum enum_index {
     {.name = #field, .doc = field_doc, .kind = FIELD_BULK, .offset = offsetof(owner, field),                      \
      .count_offset = offsetof(owner, field##_bytes), .max = max_bytes},
 /* Of the fields of a message they stand in the member `settings`. */
-#define MARK_COMMON false
-#define MARK_EXPERIMENT true
-#define SETTING(owned, field, mark, field_doc)                                                                    \
-    .name = #owned "_" #field, .doc = field_doc, .tracer = #owned, .is_experiment = MARK_##mark,                  \
+#define SETTING(owned, field, field_doc)                                                                    \
+    .name = #owned "_" #field, .doc = field_doc, .tracer = #owned,                  \
     .width_bytes = 4, .count = 1, .offset = offsetof(owner, settings.owned.field)
-#define SETTING_WHOLE(owned, field, min_value, max_value, default_value, field_unit, mark, field_doc)             \
-    {SETTING(owned, field, mark, field_doc), .kind = FIELD_INT, .min = min_value, .max = max_value,               \
+#define SETTING_WHOLE(owned, field, min_value, max_value, default_value, field_unit, field_doc)             \
+    {SETTING(owned, field, field_doc), .kind = FIELD_INT, .min = min_value, .max = max_value,               \
      .zero_is_default = true, .default_int = default_value, .unit = field_unit},
-#define SETTING_ONE_OF(owned, field, listed, max_value, default_value, field_unit, mark, field_doc)               \
-    {SETTING(owned, field, mark, field_doc), .kind = FIELD_INT, .numbers = listed, .max = max_value,              \
+#define SETTING_ONE_OF(owned, field, listed, max_value, default_value, field_unit, field_doc)               \
+    {SETTING(owned, field, field_doc), .kind = FIELD_INT, .numbers = listed, .max = max_value,              \
      .zero_is_default = true, .default_int = default_value, .unit = field_unit},
-#define SETTING_REAL(owned, field, min_value, max_value, default_value, field_unit, mark, field_doc)              \
-    {SETTING(owned, field, mark, field_doc), .kind = FIELD_REAL, .real_min = (float)(min_value),                  \
+#define SETTING_REAL(owned, field, min_value, max_value, default_value, field_unit, field_doc)              \
+    {SETTING(owned, field, field_doc), .kind = FIELD_REAL, .real_min = (float)(min_value),                  \
      .real_max = (float)(max_value), .zero_is_default = (min_value) > 0, .default_real = (float)(default_value),  \
      .unit = field_unit},
-#define SETTING_CHOICE(owned, field, choices, mark, field_doc)                                                    \
-    {SETTING(owned, field, mark, field_doc), .kind = FIELD_ENUM, .enumeration = &protocol_enums[enum_index_##choices]},
+#define SETTING_CHOICE(owned, field, choices, field_doc)                                                    \
+    {SETTING(owned, field, field_doc), .kind = FIELD_ENUM, .enumeration = &protocol_enums[enum_index_##choices]},
 #include "protocol/messages.def"
 
 /* ---- tables of all ---- */

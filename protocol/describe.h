@@ -50,7 +50,6 @@ struct field_desc {
     float real_min, real_max, default_real;
     const char *unit;   /* of the value, "metres"; "" or NULL: none */
     const char *tracer; /* the tracer of the setting; NULL: none */
-    bool is_experiment; /* of such a setting: see tracers.def */
     const struct enum_desc *enumeration;
     const struct struct_desc *(*record)(void);
 };

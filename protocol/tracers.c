@@ -15,13 +15,11 @@ const struct tracer_desc tracer_descs[] = {
 };
 const size_t tracer_desc_count = sizeof(tracer_descs) / sizeof(tracer_descs[0]);
 
-/* What two settings of a tracer must keep together. */
+/* Whole numbers of which one is not above the other. */
 static const struct rule {
     const char *field, *other;
-    const char *value; /* of the choice `field`, with which `other` is 0; NULL: `field` is not above `other` */
 } rules[] = {
-#define NOT_ABOVE(tracer, field, other) {#tracer "_" #field, #tracer "_" #other, NULL},
-#define NOT_WITH(tracer, field, PREFIX, VALUE_NAME, other) {#tracer "_" #field, #tracer "_" #other, #VALUE_NAME},
+#define NOT_ABOVE(tracer, field, other) {#tracer "_" #field, #tracer "_" #other},
 #include "protocol/tracers.def"
 };
 
@@ -46,7 +44,7 @@ static void *place_of(const struct tracer_settings *settings, const struct field
     return (char *)(uintptr_t)settings + (field->offset - offsetof(struct message_render, settings));
 }
 
-/* The name as it is typed: --ldc-block behind the prefix "--". */
+/* The name as it is typed: --ldc-form behind the prefix "--". */
 static const char *named(const char *prefix, const char *name, char *out, size_t out_bytes)
 {
     snprintf(out, out_bytes, "%s%s", prefix, name);
@@ -83,27 +81,15 @@ static bool check_rule(const struct tracer_settings *settings, const struct rule
 {
     const struct field_desc *field = struct_field(carrier(), rule->field),
                             *other = struct_field(carrier(), rule->other);
-    const void *place = place_of(settings, field), *other_place = place_of(settings, other);
-    const uint64_t value = field_load_int(field, place);
+    const uint64_t value = field_load_int(field, place_of(settings, field)),
+                   limit = field_load_int(other, place_of(settings, other));
     char other_name[64];
     named(prefix, field->name, fault->field, sizeof(fault->field));
     named(strcmp(prefix, "--") == 0 ? prefix : "", other->name, other_name, sizeof(other_name));
-    if (!rule->value) {
-        const uint64_t limit = field_load_int(other, other_place);
-        snprintf(fault->text, sizeof(fault->text), "%" PRIu64 " is more than the %" PRIu64 " %s of %s", value,
-                 limit, other->unit, other_name);
-        snprintf(fault->remedy, sizeof(fault->remedy), "choose a lower number, or a higher %s", other_name);
-        return limit == 0 || value <= limit; /* 0: the tracer chooses */
-    }
-    const char *text = enum_desc_text(field->enumeration, (uint32_t)value);
-    bool holds = true;
-    for (size_t i = 0; i < field->enumeration->value_count; i++) {
-        const struct value_desc *choice = &field->enumeration->values[i];
-        holds = holds && (choice->number != value || strcmp(choice->name, rule->value) != 0);
-    }
-    snprintf(fault->text, sizeof(fault->text), "%s cannot be combined with %s", text, other_name);
-    snprintf(fault->remedy, sizeof(fault->remedy), "leave out one of them");
-    return holds || is_zero(other, other_place);
+    snprintf(fault->text, sizeof(fault->text), "%" PRIu64 " is more than the %" PRIu64 " %s of %s", value, limit,
+             other->unit, other_name);
+    snprintf(fault->remedy, sizeof(fault->remedy), "choose a lower number, or a higher %s", other_name);
+    return limit == 0 || value <= limit; /* 0: the tracer chooses */
 }
 
 bool tracer_settings_check(const struct tracer_settings *settings, const char *prefix, struct setting_fault *fault)

@@ -13,10 +13,10 @@
 /* clang-format off */
 #define SETTINGS(tracer) struct tracer##_settings {
 #define SETTINGS_END(tracer) };
-#define SETTING_WHOLE(tracer, field, min, max, default_value, unit, mark, doc) uint32_t field;
-#define SETTING_ONE_OF(tracer, field, numbers, max, default_value, unit, mark, doc) uint32_t field;
-#define SETTING_REAL(tracer, field, min, max, default_value, unit, mark, doc) float field;
-#define SETTING_CHOICE(tracer, field, choices, mark, doc) uint32_t field;
+#define SETTING_WHOLE(tracer, field, min, max, default_value, unit, doc) uint32_t field;
+#define SETTING_ONE_OF(tracer, field, numbers, max, default_value, unit, doc) uint32_t field;
+#define SETTING_REAL(tracer, field, min, max, default_value, unit, doc) float field;
+#define SETTING_CHOICE(tracer, field, choices, doc) uint32_t field;
 #include "protocol/tracers.def"
 
 /* Those of all tracers; a tracer looks at its own. */
@@ -50,7 +50,7 @@ extern const size_t tracer_desc_count;
 const struct tracer_desc *tracer_describe(uint32_t number); /* NULL: there is none */
 
 struct setting_fault {
-    char field[64];   /* behind the prefix: "options.ldc_block" */
+    char field[64];   /* behind the prefix: "options.ldc_form" */
     char text[192];   /* what is wrong, with the value, and what is allowed */
     char remedy[128]; /* may be empty */
 };

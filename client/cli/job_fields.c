@@ -144,7 +144,7 @@ static int group_of(const struct field_desc *field)
 {
     enum protocol_tracer tracer = PROTOCOL_TRACER_BVH;
     protocol_tracer_parse(field->tracer, &tracer);
-    return field->is_experiment ? CLI_GROUP_EXPERIMENTS : CLI_GROUP_TRACERS + (int)tracer;
+    return CLI_GROUP_TRACERS + (int)tracer;
 }
 
 static struct cli_field *add(const char *name, const struct field_desc *field)

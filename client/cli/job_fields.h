@@ -16,8 +16,7 @@ enum cli_group {
     CLI_GROUP_METHOD,
     CLI_GROUP_LIGHT,
     CLI_GROUP_TRACERS, /* from here on one per tracer */
-    CLI_GROUP_EXPERIMENTS = 100,
-    CLI_GROUP_TALK
+    CLI_GROUP_TALK = 100
 };
 
 struct cli_field {

@@ -510,7 +510,7 @@ static void add_option(const struct argp_option *option)
         options[count] = *option;
 }
 
-/* "Tracer ldc, layered depth cubes: .." above the settings that are no experiments. */
+/* "Tracer ldc, layered depth cubes: .." above the settings of each. */
 static void add_tracer_headers(void)
 {
     static char titles[PROTOCOL_TRACER_COUNT][200];
@@ -533,9 +533,6 @@ static const struct argp_option *all_options(void)
     for (const struct argp_option *option = special; option->name || option->doc; option++)
         add_option(option);
     add_tracer_headers();
-    add_option(&(struct argp_option){
-        .doc = "Experiments, forms of the tracers that are compared with their papers, or measured:",
-        .group = CLI_GROUP_EXPERIMENTS});
     for (size_t i = 0; i < cli_field_count(); i++) {
         const struct cli_field *field = cli_field_at(i);
         add_option(&(struct argp_option){.name = field->option,

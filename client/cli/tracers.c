@@ -13,8 +13,7 @@
 
 static void print_setting(const struct cli_field *setting)
 {
-    printf("  --%-20s %s%s\n", setting->option, setting->help,
-           setting->field->is_experiment ? " [experiment]" : "");
+    printf("  --%-20s %s\n", setting->option, setting->help);
     if (setting->field->kind != FIELD_ENUM)
         return;
     for (size_t i = 0; i < setting->field->enumeration->value_count; i++) {
@@ -65,9 +64,8 @@ static json_t *setting_json(const struct cli_field *setting)
     const struct field_desc *field = setting->field;
     const bool is_auto = field->zero_is_default && field->default_int == 0;
     snprintf(option, sizeof(option), "--%s", setting->option);
-    json_t *object =
-        json_pack("{s:s, s:s, s:s, s:b, s:s}", "name", setting->member, "option", option, "unit",
-                  field->unit ? field->unit : "", "experiment", field->is_experiment, "doc", field->doc);
+    json_t *object = json_pack("{s:s, s:s, s:s, s:s}", "name", setting->member, "option", option, "unit",
+                               field->unit ? field->unit : "", "doc", field->doc);
     field_default_text(field, usual, sizeof(usual));
     if (field->kind == FIELD_ENUM) {
         json_object_set_new(object, "choices", choices_json(field->enumeration));
@@ -176,8 +174,7 @@ static void print_schema(void)
 
 static void print_manual_setting(const struct cli_field *setting)
 {
-    printf(".It Fl -%s Ar %s\n%s%s.\n", setting->option, setting->argument,
-           setting->field->is_experiment ? "Experiment: " : "", setting->help);
+    printf(".It Fl -%s Ar %s\n%s.\n", setting->option, setting->argument, setting->help);
     if (setting->field->kind != FIELD_ENUM)
         return;
     printf(".Bl -tag -width overlap -compact\n");
@@ -188,7 +185,7 @@ static void print_manual_setting(const struct cli_field *setting)
     printf(".El\n");
 }
 
-/* Items of the list of options: all tracers, then settings, experiments behind the others. */
+/* Items of the list of options: all tracers, then settings. */
 static void print_manual(void)
 {
     printf(".It Fl -tracer Ar NAME\nWhat finds intersections; the default is\n.Cm %s .\n"
@@ -198,10 +195,9 @@ static void print_manual(void)
         printf(".It Cm %s\n%s%s%s\n", tracer_descs[i].name, tracer_descs[i].doc,
                tracer_descs[i].needs[0] != '\0' ? "; in builds with " : "", tracer_descs[i].needs);
     printf(".El\n");
-    for (int is_experiment = 0; is_experiment < 2; is_experiment++)
-        for (size_t i = 0; i < cli_field_count(); i++)
-            if (cli_field_at(i)->field->tracer && cli_field_at(i)->field->is_experiment == is_experiment)
-                print_manual_setting(cli_field_at(i));
+    for (size_t i = 0; i < cli_field_count(); i++)
+        if (cli_field_at(i)->field->tracer)
+            print_manual_setting(cli_field_at(i));
 }
 
 /* ---- the commands ---- */

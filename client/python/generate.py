@@ -28,10 +28,10 @@ ROWS = {
     "OPTION_REAL": "field, min, max, default_value, unit, doc", "REALS": "field, count, min, max, doc",
     "BYTES": "field, count, doc", "STRING": "field, max, doc", "ARRAY": "record, field, max, doc",
     "BULK": "field, max, doc",
-    "SETTING_WHOLE": "tracer, field, min, max, default_value, unit, mark, doc",
-    "SETTING_ONE_OF": "tracer, field, numbers, max, default_value, unit, mark, doc",
-    "SETTING_REAL": "tracer, field, min, max, default_value, unit, mark, doc",
-    "SETTING_CHOICE": "tracer, field, choices, mark, doc",
+    "SETTING_WHOLE": "tracer, field, min, max, default_value, unit, doc",
+    "SETTING_ONE_OF": "tracer, field, numbers, max, default_value, unit, doc",
+    "SETTING_REAL": "tracer, field, min, max, default_value, unit, doc",
+    "SETTING_CHOICE": "tracer, field, choices, doc",
     "ENUMERATION": "PREFIX, name, doc", "VALUE": "PREFIX, NAME, number, text, doc", "LIMIT": "type, name, doc",
 }
 STRINGS = {"doc", "unit", "text", "numbers"}
@@ -124,18 +124,18 @@ class Field:
     def bulk(self, field, high):
         self.make(field, f"bulk({{name}}, {high})", "Bytes", 'b""')
 
-    def setting_whole(self, tracer, field, low, high, _default, _unit, _mark):
+    def setting_whole(self, tracer, field, low, high, _default, _unit):
         self.make(f"{tracer}_{field}", f'whole({{name}}, "I", {low}, {high}, zero=True)', "int", 0)
 
-    def setting_one_of(self, tracer, field, numbers, high, _default, _unit, _mark):
+    def setting_one_of(self, tracer, field, numbers, high, _default, _unit):
         self.make(f"{tracer}_{field}", f'whole({{name}}, "I", 0, {high}, listed=(0, {numbers}))', "int", 0)
 
-    def setting_real(self, tracer, field, low, high, default, _unit, _mark):
+    def setting_real(self, tracer, field, low, high, default, _unit):
         zero = float(low) > 0
         self.make(f"{tracer}_{field}", f"real({{name}}, {real(low)}, {real(high)}, zero={zero})", "float",
                   "0.0" if zero else real(default))
 
-    def setting_choice(self, tracer, field, choices, _mark):
+    def setting_choice(self, tracer, field, choices):
         self.enum(choices, f"{tracer}_{field}")
 
 

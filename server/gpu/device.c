@@ -105,6 +105,13 @@ static void ask_facts(struct gpu_facts *facts, const struct gpu_device_info *inf
         .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),
         .work_groups_max = groups > 0 ? (uint32_t)groups : 65535,
     };
+    /* On hardware a SIMD group traverses together already, and several rays an invocation cost registers. */
+    facts->packet_rays = facts->software ? 8 : 1;
+    /* A ray of a large scene needs some hundred; it has enough of them to be finished in one dispatch, unless the
+     * scene is made to keep it. Software GL leaves a loop after 65535 rounds. */
+    facts->ray_tests_max = facts->software ? 65000 : 1u << 16;
+    facts->builds_on_host = facts->software;
+    facts->axes_samples_max = (facts->software ? 1 : 8) * (4ull * 3 * 1024 * 1024);
     gpu_limits_ask(facts->limits);
     facts->texture_buffer_texels_max = facts->limits[GPU_MAX_TEXTURE_BUFFER_SIZE];
     facts->texture_size_max = (uint32_t)facts->limits[GPU_MAX_TEXTURE_SIZE];

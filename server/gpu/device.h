@@ -48,6 +48,11 @@ struct gpu_facts {
     uint32_t work_groups_max;  /* on x; more is a GL error */
     uint32_t texture_size_max; /* texels along an edge of a 2D texture */
     uint32_t texture_layers_max;
+    /* Numbers by which passes choose sizes. */
+    uint32_t packet_rays;      /* of a packet that bvh traverses where packets pay; 1: they never do */
+    uint32_t ray_tests_max;    /* elements or primitives that a ray may have of a dispatch */
+    uint64_t axes_samples_max; /* of a structure of samples along axes: ldc, abuffer */
+    bool builds_on_host;       /* where the host has a way to build a structure of its own */
     uint64_t limits[GPU_LIMIT_COUNT];
     struct gpu_memory memory;
 };

@@ -52,9 +52,6 @@ static unsigned create_name(enum gpu_object_kind kind)
     case GPU_TIMESTAMP_QUERY:
         glCreateQueries(GL_TIMESTAMP, 1, &name);
         break;
-    case GPU_PRIMITIVES_QUERY:
-        glCreateQueries(GL_TRANSFORM_FEEDBACK_PRIMITIVES_WRITTEN, 1, &name);
-        break;
     case GPU_VERTEX_ARRAY:
         glCreateVertexArrays(1, &name);
         break;
@@ -82,7 +79,6 @@ static void delete_name(enum gpu_object_kind kind, GLuint name)
         glDeleteProgram(name);
         break;
     case GPU_TIMESTAMP_QUERY:
-    case GPU_PRIMITIVES_QUERY:
         glDeleteQueries(1, &name);
         break;
     case GPU_VERTEX_ARRAY:

@@ -13,7 +13,6 @@ enum gpu_object_kind {
     GPU_FRAMEBUFFER,
     GPU_PROGRAM,
     GPU_TIMESTAMP_QUERY,
-    GPU_PRIMITIVES_QUERY, /* how many a transform feedback has written */
     GPU_VERTEX_ARRAY,
     GPU_OBJECT_KIND_COUNT
 };

@@ -163,8 +163,6 @@ struct frame_result {
     uint32_t comparison_count;
 };
 void frame_result_finish(struct frame_result *result);
-/* The set of all layers that there are. */
-uint32_t frame_layers_all(void);
 /* Of width x height: DEPTH f32, metres along the view to the first surface that the pixel's first sample met, 0
  * where there is none; NORMALS 4 u8, (n / 2 + 1/2) * 255 of the mean of the samples in world space, then 255, all
  * 0 where there is none; STICKING 4 u8, the first: 255 times the mean of the samples' shares that mirrors, glass

@@ -91,7 +91,6 @@ struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *
     }
     resolved = tracer_options_of(&settings, &resolved.limits);
     if (options) {
-        resolved.bench = options->bench;
         resolved.quadtree_leaves = options->quadtree_leaves;
         resolved.picture_pixels = options->picture_pixels;
     }

@@ -26,22 +26,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Options of benchmarks and tests alone; zero is the default of each. */
-struct tracer_bench {
-    enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout; /* plain: sphere links in a storage buffer */
-    uint32_t naive_tests, bvh_elements; /* of a ray in a dispatch, of bvh on a GPU; 0: as many as it may have */
-    uint32_t reference_rays;            /* in a call of Embree; 0: chosen; 1, 4, 8, 16 */
-    uint32_t ldc_layers_together;       /* of a texel, tested at once; 0: chosen; 1, 4 */
-    uint32_t ldc_on_device;             /* 1: shaders make samples and cells on software GL, too */
-    uint32_t ldc_count_steps;           /* 1: hits hold counts of the traversal (shaders/ldc/cube.glsl) */
-    uint32_t abuffer_count_steps;       /* likewise */
-    uint32_t abuffer_on_device;         /* 1: its runs are sorted by shaders on software GL, too */
-    uint32_t axes_samples;              /* of ldc and abuffer: coarser beyond these; 0: chosen */
-    uint32_t rayspace_pairs;            /* of a stack of it; 0: chosen */
-    uint32_t quadtree_stack; /* 1: the traversal keeps the ancestors of a node (shaders/quadtree/traverse.glsl) */
-    uint32_t quadtree_count_steps; /* hits hold counts of the traversal (shaders/quadtree/traverse.glsl) */
-};
-
 /* Options of all tracers; zero is the default of each. A tracer gets them with the defaults of tracers.def in
  * place, and looks at those of its own name: options->ldc.resolution. Words only, without bytes between them:
  * tracer_options_same() compares all. */
@@ -54,7 +38,6 @@ struct tracer_options {
     /* Of the pictures that are asked for, the nearest power of two, so that a window may change its size a little:
      * by it a structure of samples chooses its resolution. 0: not known, or a resolution was asked for. */
     uint32_t picture_pixels;
-    struct tracer_bench bench;
 };
 /* clang-format on */
 

@@ -3,21 +3,10 @@
 // point).
 //
 // A sample stands for the plane through it, within its texel: a depth alone would turn every slope into steps.
-//
-// Defines: ABUFFER_PARITY bodies are told from what is around them by parity, as in the paper, where the winding tells
-// bodies in bodies apart, too; ABUFFER_COUNT_STEPS for tests, intersections hold counts and not samples: visited blocks of voxels in
-// place of the distance, visited samples in place of the primitive, visited texels in place of the instance.
 #include "abuffer/layout.h"
 #include "raster/layout.h"
 #include "shared/bindings.h"
 #include "common/cell_ray.glsl"
-
-#ifdef ABUFFER_COUNT_STEPS
-uvec3 abuffer_counts = uvec3(0u);
-#define ABUFFER_COUNT(what) abuffer_counts.what++
-#else
-#define ABUFFER_COUNT(what)
-#endif
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer abuffer_texels;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples; // two per texel
@@ -34,7 +23,6 @@ struct column {
 
 column column_at(int axis, ivec2 texel)
 {
-    ABUFFER_COUNT(y);
     uint tiles_along = ABUFFER_TILES_ALONG(uint(abuffer_resolution));
     uvec2 place = uvec2(texel);
     uvec2 words = texelFetch(abuffer_texels, int(ABUFFER_TEXEL(tiles_along, uint(axis), place.x, place.y))).xy;
@@ -55,7 +43,6 @@ struct column_sample {
 
 uvec2 words_at(int index)
 {
-    ABUFFER_COUNT(z);
     uvec4 two = texelFetch(abuffer_samples, index >> 1);
     return (index & 1) == 0 ? two.xy : two.zw;
 }
@@ -105,7 +92,6 @@ column_scan scan_of(column c)
 // as rounds of the same loop, so that columns without it do not wait for code that they skip.
 bool scan(inout column_scan c, float depth_min, out int index, out uvec2 words)
 {
-    ABUFFER_COUNT(z);
     bool is_far = c.bound - c.next > PASSED;
     int at = is_far ? (c.next + c.bound) >> 1 : c.next;
     uvec4 two = texelFetch(abuffer_samples, at >> 1);
@@ -120,21 +106,9 @@ bool scan(inout column_scan c, float depth_min, out int index, out uvec2 words)
     return !is_far && index < c.end && depth_of(words) >= depth_min;
 }
 
-// What says where a point is: the winding, or, by parity, whether it is odd. Each surface of a body changes the winding
-// by one, so it is odd where an odd number of them is before the point.
-int inside_of(int winding)
+// The winding at a point of a texel: the number of bodies around it.
+int winding_at(int axis, ivec2 texel, vec3 p)
 {
-#ifdef ABUFFER_PARITY
-    return winding & 1;
-#else
-    return winding;
-#endif
-}
-
-// The winding at a point of the image: the number of bodies around it.
-int winding_at(int axis, vec3 p)
-{
-    ivec2 texel = texel_of(p.xy);
     vec2 from_middle = p.xy - vec2(texel) - 0.5;
     column_scan c = scan_of(column_at(axis, texel));
     int winding = 0; // behind all samples
@@ -150,5 +124,5 @@ int winding_at(int axis, vec3 p)
             winding += !is_behind && plane_depth(s, from_middle) < p.z ? s.step_ : 0;
         }
     } while (c.next < c.end && !is_behind);
-    return inside_of(winding);
+    return winding;
 }

@@ -6,7 +6,7 @@
 #include "abuffer/planes.glsl"
 #include "raster/line_triangle.glsl"
 
-#if defined KEEPS_SAMPLE && !defined ABUFFER_STEPS
+#if defined KEEPS_SAMPLE && !defined ABUFFER_PARITY
 
 // How far beyond its texel a sample's plane is tested, in cells. Where surfaces bend by more than ABUFFER_SLACK, rays
 // would pass between planes; intersections are verified with triangles, so the search may reach farther.
@@ -119,7 +119,7 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
 
 #endif
 
-#ifndef ABUFFER_STEPS
+#ifndef ABUFFER_PARITY
 
 const int PASSES_MAX = 8; // then the sample's plane is the answer
 

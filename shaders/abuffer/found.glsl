@@ -10,11 +10,11 @@
 #if defined ANY_HIT && !defined HAS_TRANSLUCENT
 #define ANYTHING_ENDS // the first intersection is the answer, wherever it is
 #endif
-#if !defined ANY_HIT || defined ANYTHING_ENDS && !defined ABUFFER_STEPS
+#if !defined ANY_HIT || defined ANYTHING_ENDS && !defined ABUFFER_PARITY
 #define KEEPS_SAMPLE // the intersected sample is looked at again, behind the search
 #endif
 
-#if defined ANY_HIT && defined HAS_TRANSLUCENT && !defined ABUFFER_STEPS
+#if defined ANY_HIT && defined HAS_TRANSLUCENT && !defined ABUFFER_PARITY
 #define OFFERS_LATER // intersections in a part of a voxel are offered behind its search
 #endif
 

@@ -5,18 +5,18 @@
 // The host (trace/abuffer/trace.c) sets, besides the defines of trace/wave.comp, those that the files included here
 // name.
 //
-// Defines: ABUFFER_STEPS the search is by this number of steps per subvoxel (abuffer/steps.glsl), with ABUFFER_PARITY (abuffer/column.glsl), else by 2D DDA
-// (abuffer/planes.glsl), verified with triangles (abuffer/exact.glsl); ABUFFER_EMPTY the scene has no samples.
+// Defines: ABUFFER_PARITY the search is the paper's (abuffer/parity.glsl), else by planes (abuffer/planes.glsl), verified with
+// triangles (abuffer/exact.glsl); ABUFFER_EMPTY the scene has no samples.
 #include "abuffer/exact.glsl"
-#include "abuffer/steps.glsl"
+#include "abuffer/parity.glsl"
 
 void traverse_ray(trace_ray r, inout abuffer_found found)
 {
 #ifndef ABUFFER_EMPTY
     voxel_traversal w;
     begin_traversal(r, found.end, w);
-#ifdef ABUFFER_STEPS
-    traverse_steps(r, w, found);
+#ifdef ABUFFER_PARITY
+    traverse_parity(r, w, found);
 #else
     traverse_planes(r, w, found);
 #endif
@@ -40,12 +40,8 @@ void trace_closest(trace_ray r, inout candidate best)
 {
     abuffer_found found = found_of(r, best);
     traverse_ray(r, found);
-#ifdef ABUFFER_COUNT_STEPS
-    best = candidate(float(abuffer_counts.x), abuffer_counts.z, abuffer_counts.y, vec2(0.0));
-#else
     if (found.sample_index >= 0)
         best = candidate(found.end, uint(found.sample_index), HIT_NO_PRIMITIVE - 1u, vec2(0.0));
-#endif
 }
 
 #endif

@@ -98,7 +98,6 @@ struct voxel_step {
 // Past an occupied subvoxel, or past empty space. True: it is occupied.
 bool step_on(inout voxel_traversal w, out voxel_step step_)
 {
-    ABUFFER_COUNT(x);
     bvec3 down = notEqual(w.flip, ivec3(0));
     uvec3 subvoxel = uvec3(turned(w.subvoxel, w.flip, abuffer_grid << 4)), voxel = subvoxel >> 2u;
     int block = block_at(voxel);

@@ -3,9 +3,9 @@
 // traversal of a sphere BVH', sections 4 (links), 5 (packets) and 6 (transform elements).
 //
 // The host (trace/bvh/tracer.c) sets, besides the defines of trace/wave.comp:
-//   BVH_SPHERES  bounds are spheres, not boxes
+//   BVH_SPHERES  the paper's form: bounds are spheres, there is one order for all directions, and the rays of a packet stay
+//                together, whether they go the same way or not
 //   BVH_PACKED   boxes are on a grid
-//   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions
 //   BVH_ONE_INSTANCE  there is one instance: no top tree is traversed
 //   SHARED_ORIGIN     all rays of the wave begin at one point, and do so in each instance: what follows from it alone is
 //                     computed once for a packet
@@ -34,11 +34,7 @@
 #include "bvh/leaf.glsl"
 #include "bvh/packet.glsl"
 
-#ifdef BVH_PLAIN
-layout(std430, binding = BIND_TRACER_0) readonly buffer bvh_element_block { bvh_element bvh_elements[]; };
-#else
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer bvh_elements;
-#endif
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer bvh_transforms;
 
 #ifdef BVH_ONE_INSTANCE
@@ -54,7 +50,7 @@ uniform vec3 bvh_top_cells_per_unit;
 // Shadow rays that are traversed one by one have few octants in common: all read the first octant's copy, whose order
 // is as good for finding any hit, and which stays in the processor's cache. Measured on software GL with 146K triangles:
 // ambient occlusion takes 0.9 of the time. (Closest hits take 1.5 of it without their order.)
-#if defined SOFTWARE_GL && defined ANY_HIT && PACKET_RAYS == 1
+#if defined SOFTWARE_GL && defined ANY_HIT && PACKET_RAYS == 1 && !defined BVH_SPHERES
 #define ONE_ORDER
 #endif
 
@@ -85,7 +81,7 @@ struct tree_traversal {
 
 void begin_tree(inout tree_traversal traversal, uint first_element, uint element_count, uint octant)
 {
-#ifdef BVH_PLAIN
+#ifdef BVH_SPHERES
     traversal.first = first_element;
 #elif defined ONE_ORDER
     traversal.first = first_element * BVH_OCTANTS;
@@ -120,11 +116,7 @@ distances_left left_of(trace_ray r[PACKET_RAYS], answer found[PACKET_RAYS])
 uint test_element(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[PACKET_RAYS],
                   answer found[PACKET_RAYS])
 {
-#ifdef BVH_PLAIN
-    bvh_element e = bvh_elements[traversal.first + traversal.element];
-    vec4 lower = vec4(e.lower_x, e.lower_y, e.lower_z, e.upper_x);
-    uint link = e.link;
-#elif !defined BVH_PACKED
+#ifndef BVH_PACKED
     int texel = int(traversal.first + traversal.element) * 2;
     uvec4 first_half = texelFetch(bvh_elements, texel);
     vec3 lower_corner = uintBitsToFloat(first_half.xyz);
@@ -512,7 +504,8 @@ void trace_closest(trace_ray r, inout candidate best)
 #define TRACE_GROUP trace_closest_rays
 #endif
 
-// Each packet has all remaining rays with a direction similar to the first one's; the first in any case, NaN included.
+// Each packet has all remaining rays with a direction similar to the first one's; the first in any case, NaN included. In the
+// paper's form it has all.
 void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 {
     uint waiting = 0u;
@@ -536,8 +529,12 @@ void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 #ifdef SHARED_ORIGIN
             packet[k].origin = leading.origin; // a dead ray has none
 #endif
+#ifdef BVH_SPHERES
+            const bool goes = true;
+#else
             bool goes = k == first ||
                         form_packet(leading.origin, leading.direction, r[k].origin, r[k].direction);
+#endif
             if (goes && (waiting >> k & 1u) != 0u)
                 waiting &= ~(1u << k);
             else

@@ -90,7 +90,6 @@ void begin_cells(trace_ray r, float end, int pass, out cell_traversal w)
 // is passed.
 void step_on(inout cell_traversal w, inout found_cell found, bvec3 down)
 {
-        LDC_COUNT(x);
         uvec4 words = texelFetch(ldc_nodes, w.at);
         uvec3 b = uvec3(cube_cell(w, w.cell)) >> w.shift;
         uint bit = part_bit(b);

@@ -6,20 +6,11 @@
 //
 // Rays in a cube are those of common/cell_ray.glsl.
 //
-// Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes this near to a sample's depth, else where it
-// intersects the sample's plane; LDC_COUNT_STEPS for tests, intersections hold counts and not samples: visited
-// nodes, blocks and texels in place of the distance, tested samples in place of the primitive, texels or cells with
-// tested samples in place of the instance.
+// Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes within LDC_TOLERANCE_CELLS of a sample's depth,
+// else where it intersects the sample's plane.
 #include "shared/bindings.h"
 #include "common/cell_ray.glsl"
 #include "ldc/plane.glsl"
-
-#ifdef LDC_COUNT_STEPS
-uvec3 ldc_counts = uvec3(0u);
-#define LDC_COUNT(what) ldc_counts.what++
-#else
-#define LDC_COUNT(what)
-#endif
 
 #ifndef LDC_CELLS
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
@@ -32,9 +23,6 @@ uniform vec4 ldc_place[LDC_CUBES]; // lower corner, world; size of a cell
 uniform int ldc_resolution[LDC_CUBES];
 uniform int ldc_first_texel[LDC_CUBES];
 uniform int ldc_first_node[LDC_CUBES];
-#ifdef LDC_TOLERANCE
-uniform float ldc_tolerance[LDC_CUBES]; // cells
-#endif
 
 // A uniform with one index for a whole SIMD group is read once, with an index per lane lane by lane.
 #if LDC_CUBES == 1
@@ -53,7 +41,6 @@ cell_ray cube_ray_of(trace_ray r, int cube)
 bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side,
                       out float beside)
 {
-    LDC_COUNT(z);
     vec3 to_sample = vec3(texel + 0.5, depth) - o;
     float height = dot(normal, to_sample);
     side = dot(normal, d);
@@ -64,7 +51,7 @@ bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 no
     vec2 near = min(a, b), far = max(a, b);
     s = min(max(to_sample.z / d.z, max(near.x, near.y)), min(far.x, far.y));
     beside = 0.0;
-    bool intersects = abs(s * d.z - to_sample.z) <= ldc_tolerance[CUBE(cube)];
+    bool intersects = abs(s * d.z - to_sample.z) <= LDC_TOLERANCE_CELLS;
 #else
     s = height / side;
     vec2 from_middle = abs(s * d.xy - to_sample.xy);

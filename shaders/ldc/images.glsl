@@ -5,18 +5,14 @@
 // The image of the ray's dominant axis comes first, as the ray passes the fewest of its texels; an intersection in one
 // image ends the ray in the next.
 //
-// Defines: LDC_LEVEL_BITS nodes have 2^bits x 2^bits children; LDC_BLOCKS there is one level, else up to a single node;
-// LDC_LAYERS_TOGETHER 1 or 4: the number of a texel's samples that are tested at once.
+// Four of a texel's samples are tested at once (paper, section 4).
 #include "ldc/found.glsl"
 
 #ifndef LDC_CELLS
 
-layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of nodes: minimum and maximum depth
+layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of blocks: minimum and maximum depth
 
-uniform int ldc_top[LDC_CUBES]; // the top level; 0 are the texels
-#ifdef LDC_BLOCKS
-uniform int ldc_row[LDC_CUBES]; // nodes
-#endif
+uniform int ldc_row[LDC_CUBES]; // blocks
 
 struct image_traversal {
     vec3 o, d; // cells of the image
@@ -25,7 +21,7 @@ struct image_traversal {
     float s_min, s_limit; // between which an intersection counts
     float begin, scale; // cell_ray's
     ivec2 texel;
-    int level;
+    int level; // 0: of texels; 1: of blocks
     int cube, axis;
 };
 
@@ -55,29 +51,14 @@ void begin_image(trace_ray r, float end, int pass, out image_traversal w)
     clip(w.s, w.s_end, w.o, inverse, vec3(0.0, 0.0, -LDC_SPAN), vec3(cells, cells, cells + LDC_SPAN));
     w.s_end = c.scale > 0.0 && resolution > 0 ? w.s_end : -1e30;
     w.texel = clamp(ivec2(floor(w.o.xy + w.s * w.d.xy)), ivec2(0), ivec2(resolution - 1));
-    w.level = ldc_top[CUBE(w.cube)];
+    w.level = 1;
 }
 
-int node_index(image_traversal w, ivec2 node)
+int block_index(image_traversal w)
 {
-    int top = ldc_top[CUBE(w.cube)];
-#ifdef LDC_BLOCKS
     int row = ldc_row[CUBE(w.cube)];
-    return ldc_first_node[CUBE(w.cube)] + (w.axis * row + node.y) * row + node.x;
-#else
-    // The first node of a level; levels are stored from the top on, each with all nodes of its square.
-    int bits = LDC_LEVEL_BITS * (top - w.level);
-#if LDC_LEVEL_BITS == 1
-    const int levels = 0x55555555, image_shift = 2;
-#elif LDC_LEVEL_BITS == 2
-    const int levels = 0x11111111;
-#else
-    const int levels = 0x41041041;
-#endif
-    int first = levels & ((1 << 2 * bits) - 1);
-    int of_image = levels & ((1 << 2 * LDC_LEVEL_BITS * top) - 1);
-    return ldc_first_node[CUBE(w.cube)] + w.axis * of_image + first + (node.y << bits) + node.x;
-#endif
+    ivec2 block = w.texel >> LDC_BLOCK_SHIFT;
+    return ldc_first_node[CUBE(w.cube)] + (w.axis * row + block.y) * row + block.x;
 }
 
 // Where the ray leaves its current node of a level, and by which side.
@@ -97,8 +78,7 @@ void leave_node(inout image_traversal w, int shift, float s_out, bool by_u)
     ivec2 next = clamp(ivec2(floor(w.o.xy + s_out * w.d.xy)), first, last);
     next = by_u ? ivec2(w.d.x >= 0.0 ? last.x + 1 : first.x - 1, next.y)
                 : ivec2(next.x, w.d.y >= 0.0 ? last.y + 1 : first.y - 1);
-    ivec2 parents = (next ^ w.texel) >> (shift + LDC_LEVEL_BITS);
-    w.level = parents != ivec2(0) && w.level < ldc_top[CUBE(w.cube)] ? w.level + 1 : w.level;
+    w.level = (next ^ w.texel) >> LDC_BLOCK_SHIFT != ivec2(0) ? 1 : w.level;
     w.texel = next;
     uint resolution = uint(ldc_resolution[CUBE(w.cube)]);
     w.s = w.s < s_out ? s_out : w.s;
@@ -116,8 +96,7 @@ bool next_texel(inout image_traversal w, out uvec4 words, out float z_min, out f
     int resolution = ldc_resolution[CUBE(w.cube)];
     int first_texel = ldc_first_texel[CUBE(w.cube)] + w.axis * resolution * resolution;
     for (int round_ = 0; round_ < IMAGE_ROUNDS && w.s < w.s_end; round_++) {
-        LDC_COUNT(x);
-        int shift = w.level * LDC_LEVEL_BITS;
+        int shift = w.level * LDC_BLOCK_SHIFT;
         bool by_u;
         float s_out = node_exit(w, shift, by_u);
         float s_last = s_out < w.s_end ? s_out : w.s_end;
@@ -129,10 +108,10 @@ bool next_texel(inout image_traversal w, out uvec4 words, out float z_min, out f
             words = texelFetch(ldc_texels, first_texel + w.texel.y * resolution + w.texel.x);
             range = uintBitsToFloat(words.zw) + vec2(-LDC_SPAN, LDC_SPAN);
         } else {
-            range = texelFetch(ldc_ranges, node_index(w, w.texel >> shift)).xy;
+            range = texelFetch(ldc_ranges, block_index(w)).xy;
         }
 #ifdef LDC_TOLERANCE
-        range += vec2(-ldc_tolerance[CUBE(w.cube)], ldc_tolerance[CUBE(w.cube)]);
+        range += vec2(-LDC_TOLERANCE_CELLS, LDC_TOLERANCE_CELLS);
 #endif
         if (z_max >= range.x && z_min <= range.y) {
             if (w.level == 0)
@@ -162,10 +141,9 @@ void test_texel(inout image_traversal w, uvec4 words, float z_min, float z_max, 
     uint count = words.y & LDC_TEXEL_COUNT_MASK;
     float low = z_min - LDC_SPAN, high = z_max + LDC_SPAN;
 #ifdef LDC_TOLERANCE
-    low -= ldc_tolerance[CUBE(w.cube)];
-    high += ldc_tolerance[CUBE(w.cube)];
+    low -= LDC_TOLERANCE_CELLS;
+    high += LDC_TOLERANCE_CELLS;
 #endif
-#if LDC_LAYERS_TOGETHER == 4
     uint first_quad = words.y >> LDC_TEXEL_QUAD_SHIFT;
     float middle = 0.5 * (low + high), reach = 0.5 * (high - low);
     for (uint i = 0u; i < count; i += 4u) {
@@ -182,16 +160,6 @@ void test_texel(inout image_traversal w, uvec4 words, float z_min, float z_max, 
         if (depths.w > high)
             break;
     }
-#else
-    for (uint i = 0u; i < count; i++) {
-        uvec4 g = texelFetch(ldc_geometry, int(words.x + i));
-        float depth = uintBitsToFloat(g.x);
-        if (depth > high)
-            break;
-        if (depth >= low)
-            test_sample(w, words.x + i, depth, g.y, found);
-    }
-#endif
     bool by_u;
     float s_out = node_exit(w, 0, by_u);
     leave_node(w, 0, s_out, by_u);

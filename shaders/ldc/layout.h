@@ -56,6 +56,11 @@
 #define LDC_SPAN ((1.0f + 2.0f * LDC_SLACK) / AXES_OVERLAP)
 /* Texels by their numbers of fragments; the last bin has those with more, too. */
 #define LDC_HISTOGRAM_BINS 256u
+/* A block: 8 x 8 texels of an image. */
+#define LDC_BLOCK_SHIFT 3
+/* How near to a sample's depth a ray hits it in the paper's form: there 0.001 of bodies about 1 wide, in images of
+ * 1024 texels. */
+#define LDC_TOLERANCE_CELLS 1.0f
 /* The rounding error of depths and positions, in cells: some units in the last place of 4096. */
 #define LDC_ROUNDING 0.002f
 /* That of the planes of closest hits, which are verified with triangles (ldc/exact.glsl): between planes that end

@@ -5,8 +5,6 @@
 //
 // The rays of a tile pass through a rectangle at each w. Between two of them lies what they may meet; what the nodes
 // there hold brings these two closer, and so on.
-//
-// Defines: QUADTREE_DDA as traverse.glsl has it: rays begin at the nearest surface.
 #include "common/dispatch.glsl"
 #include "common/camera.glsl"
 #include "quadtree/eye.glsl"
@@ -19,11 +17,7 @@ uniform float eye_reach; // how far samples are from the middles of their pixels
 uniform float eye_near; // where rays begin, along the eye's view, metres
 uniform float eye_far;  // beyond all that the face sees, from its eye, metres
 
-#ifdef QUADTREE_DDA
-const int ROUNDS = 0;
-#else
 const int ROUNDS = 6;
-#endif
 const float ROUNDING = 1e-3; // a share of w, and a texel
 
 struct beam {
@@ -97,12 +91,8 @@ void main()
     }
     vec4 start = places_at(b, w_greatest);
     bool is_inside = is_one_view && all(greaterThanEqual(start.xy, vec2(0.0))) && all(lessThan(start.zw, vec2(size)));
-#ifdef QUADTREE_DDA
-    int begins = 0;
-#else
     // Somewhat smaller than what the tile sees: such nodes are nearer to the surface than large ones, and seen as fast.
     int begins = (is_one_view ? max(level - 2, 0) : QUADTREE_TOP) + (is_inside ? QUADTREE_BEAM_INSIDE : 0);
-#endif
     vec3 eye = eye_of(view_of_pixel(first));
     float reach = length(vec3(eye.xy / quadtree.scale_centre.xy, eye.z)) + eye_far;
     imageStore(beams, int(item), vec4(w_greatest, float(begins), reach, 0.0));

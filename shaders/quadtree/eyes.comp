@@ -2,8 +2,7 @@
 // Where the rays of pinhole eyes meet the layers of a view (shared/eye_hit.h): what traverse.glsl finds, of rays that
 // are made on the way from planes alone.
 //
-// Defines: SPREAD as common/sample_place.glsl has it; QUADTREE_DDA as traverse.glsl has it; QUADTREE_LAYERS how many layers
-// the face has.
+// Defines: SPREAD as common/sample_place.glsl has it; QUADTREE_LAYERS how many layers the face has.
 #include "shared/eye_hit.h"
 #include "common/dispatch.glsl"
 #include "common/sample_place.glsl"
@@ -20,11 +19,7 @@ layout(std430, binding = BIND_QUADTREE_COUNTS) buffer count_block
 
 uniform uint first_slot, first_item, end_item;
 
-#ifdef QUADTREE_DDA
-const int START = 0;
-#else
 const int START = QUADTREE_TOP;
-#endif
 const float NEVER = -1.0; // of a w: behind all that a ray may meet
 
 // A ray on its way through a layer, from greater w to lesser.
@@ -90,17 +85,10 @@ void walk_layer(uint layer, inout eye_walk walk)
             }
         }
 
-#ifdef QUADTREE_DDA
-        goes_down = false;
-#endif
         ivec2 low = cell * 2, step_ = exits.x > exits.y ? ivec2(2 * forward.x - 1, 0) : ivec2(0, 2 * forward.y - 1);
         ivec2 next = cell + step_;
         bool is_out = any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << level, padded));
-#ifdef QUADTREE_DDA
-        int up = 0;
-#else
         int up = min(findMSB((cell.x ^ next.x) | (cell.y ^ next.y)), QUADTREE_TOP - level);
-#endif
         ivec2 below = clamp(ivec2(floor(far + w * along)) >> max(level - 1, 0), low, low + 1);
         cell = goes_down ? below : next >> up;
         level += goes_down ? -1 : up;

@@ -9,7 +9,6 @@
 //
 // Defines:
 //   NODES_OF_LEAVES   level 1 of one slice, from `planes`; and its leaves themselves, whose flags are found here
-//   QUADTREE_MINMAX   boxes only, to compare with
 #include "common/dispatch.glsl"
 #include "quadtree/node.glsl"
 
@@ -209,9 +208,6 @@ void main()
     float error = max_of(off) + ROUNDING * w_max;
     bool merges = all(is_plane) && error <= tolerance_of(w, w_max) && all(is_something) &&
                   !is_turned(node_centre(level, place), h, w, slopes, w4, sx, sy, growth_of(w));
-#ifdef QUADTREE_MINMAX
-    merges = false;
-#endif
     if (all(is_plane) && !any(is_something)) { // nothing
         merges = true;
         error = 0.0;

@@ -5,10 +5,8 @@
 // A ray is traced through the first layer of a face. Where it is behind what that layer holds, what it may hit there is
 // in the next one, and only there is it traced through that. Where it is behind the last layer, nothing is known.
 //
-// Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive; QUADTREE_DDA
-// from texel to texel, not by the tree; QUADTREE_STACK the way back up the tree is by a stack, to compare with;
-// QUADTREE_VIEW there is one face; QUADTREE_COUNT_STEPS hits are counts: nodes, layers, and primitives
-// looked for.
+// Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive;
+// QUADTREE_VIEW there is one face.
 #define INTERSECTION_FLAGS walk_flags
 
 #include "shared/path.h"
@@ -68,7 +66,6 @@ struct node_passage {
 };
 
 uint walk_flags = 0u;
-uint walk_steps = 0u, walk_meetings = 0u;
 
 uint slice_of(layer_walk walk)
 {
@@ -216,11 +213,7 @@ bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_typ
 void begin_layer(uint layer, float u, int level, inout layer_walk walk)
 {
     ivec2 last = ivec2(quadtree.padded_width, quadtree.padded_height) - 1;
-#ifdef QUADTREE_DDA
-    walk.level = 0;
-#else
     walk.level = level;
-#endif
     walk.layer = layer;
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
@@ -263,20 +256,8 @@ node_passage look(layer_walk walk)
     return p;
 }
 
-#ifdef QUADTREE_STACK
-uint walk_ancestors[QUADTREE_TOP + 1]; // of the node that the ray is in, by level
-
-uint packed_cell(ivec2 cell)
-{
-    return uint(cell.x) | uint(cell.y) << 16;
-}
-#endif
-
 void go_down(inout layer_walk walk)
 {
-#ifdef QUADTREE_STACK
-    walk_ancestors[walk.level] = packed_cell(walk.cell);
-#endif
     walk.level--;
     ivec2 low = walk.cell * 2;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u)) >> walk.level, low, low + 1);
@@ -320,19 +301,9 @@ void leave(node_passage p, inout layer_walk walk)
     walk.u = p.u_out;
     if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << walk.level, size)))
         walk.u = walk.u_end;
-#ifdef QUADTREE_DDA
-    walk.cell = next;
-#elif defined QUADTREE_STACK
-    walk.cell = next;
-    while (walk.level < QUADTREE_TOP && walk_ancestors[walk.level + 1] != packed_cell(walk.cell >> 1)) {
-        walk.cell >>= 1;
-        walk.level++;
-    }
-#else
     int up = min(findMSB((walk.cell.x ^ next.x) | (walk.cell.y ^ next.y)), QUADTREE_TOP - walk.level);
     walk.level += up;
     walk.cell = next >> up;
-#endif
 }
 
 // Nodes that the ray passes, until it may meet something in one of them: true. The end of the loop has two ways out:
@@ -341,7 +312,6 @@ bool walk_on(inout layer_walk walk, out node_passage p)
 {
     bool meets = false;
     for (int i = 0; i < STEPS_TOGETHER; i++) {
-        walk_steps++;
         p = look(walk);
         bool goes_down = !p.is_plane && p.gap_in == 0.0;
         bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
@@ -592,7 +562,6 @@ bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
     bool ends = false;
     for (int i = 0; i < MEETINGS_MAX; i++) {
         if (walk_on(walk, p)) {
-            walk_meetings++;
             ends = meet_in(r, p, walk, found);
             SHORTEN(walk, found);
             if (walk.u_end < p.u_out) {
@@ -706,7 +675,7 @@ void trace_closest(trace_ray r, inout candidate best)
     if (!is_ray(r))
         return;
     view_walk seen = begin_view_walk(r);
-    walk_flags = walk_steps = walk_meetings = 0u;
+    walk_flags = 0u;
     walk_view(r, seen, best);
     note_outside(r, best.distance, seen);
     bool is_unknown = seen.t_unknown < best.distance;
@@ -716,9 +685,6 @@ void trace_closest(trace_ray r, inout candidate best)
         if (best.primitive == HIT_NO_PRIMITIVE)
             fill(r, seen, best);
     }
-#ifdef QUADTREE_COUNT_STEPS
-    best = candidate(float(walk_steps), seen.layers, walk_meetings, vec2(0.0));
-#endif
 }
 
 #endif

@@ -7,14 +7,13 @@
 
 layout(std430, binding = BIND_RAYSPACE_STOPPED) buffer stopped_block { uint stopped[]; };
 
-uniform uint last_from, last_to, last_later; // the stacks of the last pass
-uniform uint from, to, later;                // and of the next one
+uniform uint last_from, last_to; // the stacks of the last pass
+uniform uint from, to;           // and of the next one
 uniform uint capacity;         // pairs of a stack, and of the leaves
 uniform uint leaves_wanted;    // so many are worth a dispatch; 0: all are tested, 0xffffffff: none can be now
 uniform uint limit_max;        // pairs of a pass
 // The last places of a stack are for passes of one pair: one after another, these go down to the leaves with few.
 uniform uint reserve;
-uniform float band;
 uniform uint children; // that a pass has room for, of each pair that it takes; 0: it takes what it can
 uniform uint seeds;        // pairs that were put onto stack `from` since
 uniform uint ends;         // RAYSPACE_END_*
@@ -23,14 +22,13 @@ uniform uint stopped_word; // in `stopped`; 0xffffffff: the slice cannot be stop
 void main()
 {
     rayspace_control c = control;
-    uint waiting[RAYSPACE_STACKS] = uint[RAYSPACE_STACKS](c.waiting_0, c.waiting_1, c.waiting_2);
+    uint waiting[RAYSPACE_STACKS] = uint[RAYSPACE_STACKS](c.waiting_0, c.waiting_1);
     bool fits = true;
     if (c.taken > 0u) {
-        fits = c.written <= c.room && c.put_off <= c.put_off_room && c.leaves_written <= c.leaves_room;
+        fits = c.written <= c.room && c.leaves_written <= c.leaves_room;
         if (fits) {
             waiting[last_from] -= c.taken;
             waiting[last_to] += c.written;
-            waiting[last_later] += c.put_off;
             c.leaves += c.leaves_written;
             c.limit = min(c.limit * 2u, limit_max);
             c.failed_in_turn = 0u;
@@ -42,9 +40,9 @@ void main()
         c.passes++;
     }
     waiting[from] += seeds;
-    uint all = waiting[0] + waiting[1] + waiting[2];
+    uint all = waiting[0] + waiting[1];
     c.pairs_max = max(c.pairs_max, all + c.leaves);
-    bool is_due = c.leaves >= leaves_wanted || waiting[from] + waiting[to] == 0u || !fits;
+    bool is_due = c.leaves >= leaves_wanted || all == 0u || !fits;
     c.leaves_taken = is_due && leaves_wanted != 0xffffffffu ? c.leaves : 0u;
     c.leaves -= c.leaves_taken;
     c.taken = ends != RAYSPACE_END_NOTHING ? 0u : min(waiting[from], c.limit);
@@ -53,14 +51,10 @@ void main()
         c.taken = clamp(unreserved / children, 1u, c.taken);
     c.room = c.taken <= 1u ? free : unreserved;
     c.first = waiting[from] - c.taken;
-    // Where there is hardly room for what is put off, nothing is.
-    c.put_off_room = capacity - waiting[later];
-    c.band = c.put_off_room > capacity / 2u ? band : 3e38;
     c.leaves_room = capacity - c.leaves;
-    c.written = c.put_off = c.leaves_written = 0u;
+    c.written = c.leaves_written = 0u;
     c.waiting_0 = waiting[0];
     c.waiting_1 = waiting[1];
-    c.waiting_2 = waiting[2];
     uvec3 pass_groups = groups_of(c.taken, RAYSPACE_CHUNK), leaf_groups = groups_of(c.leaves_taken, 1u);
     c.pass_groups_x = pass_groups.x;
     c.pass_groups_y = pass_groups.y;

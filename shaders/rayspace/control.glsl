@@ -8,7 +8,7 @@ layout(std430, binding = BIND_RAYSPACE_CONTROL) buffer control_block { rayspace_
 
 uint waiting_on(uint stack)
 {
-    return stack == 0u ? control.waiting_0 : stack == 1u ? control.waiting_1 : control.waiting_2;
+    return stack == 0u ? control.waiting_0 : control.waiting_1;
 }
 
 // The work groups of a dispatch with an invocation for `each` items, as common/dispatch.glsl counts them.

@@ -18,13 +18,12 @@ layout(binding = UNIT_RAYSPACE_PAIRS) uniform usamplerBuffer pairs; // of the st
 layout(std430, binding = BIND_RAYSPACE_SLOTS) writeonly buffer slot_block { uvec4 slots_written[]; };
 #else
 layout(std430, binding = BIND_RAYSPACE_PAIRS) writeonly buffer pair_block { uvec4 pairs_written[]; };
-layout(std430, binding = BIND_RAYSPACE_PUT_OFF) writeonly buffer put_off_block { uvec4 pairs_put_off[]; };
 layout(std430, binding = BIND_RAYSPACE_LEAVES) writeonly buffer leaf_block { uvec4 leaves_written[]; };
 #endif
 
 uniform uint level_first[16]; // RAYSPACE_LEVELS: node of each level
 uniform uint level_count[16];
-uniform uint to, later; // the stacks that are written to
+uniform uint to; // the stack that is written to
 
 // The node is divided while it is wider than a fraction of the element, by that factor: what is coarse on both sides
 // costs tests and culls little.
@@ -70,7 +69,7 @@ const uint KEPT_MAX = RAYSPACE_CHUNK_SLOTS;
 // handed over.
 uvec4 kept[KEPT_MAX];
 uint kept_count = 0u;
-uint leaf_mask = 0u, far_mask = 0u; // a bit for each
+uint leaf_mask = 0u; // a bit for each
 uint tests = 0u;
 
 void test(uvec4 pair, bool is_ray_leaf, bundle b, bounds what)
@@ -78,26 +77,19 @@ void test(uvec4 pair, bool is_ray_leaf, bundle b, bounds what)
     tests++;
     if (!may_meet(b, what))
         return;
-    bool is_far = control.band < 3e38 && distance(b.centre, what.centre) - b.radius - what.radius > control.band;
-    if (is_far) {
-        pair.w |= RAYSPACE_AGAIN;
-        far_mask |= 1u << kept_count;
-    } else if (is_ray_leaf) {
+    if (is_ray_leaf)
         leaf_mask |= 1u << kept_count;
-    }
     kept[kept_count++] = pair;
 }
 
 void take(uvec4 pair)
 {
     uint level = pair.x >> RAYSPACE_LEVEL_SHIFT, index = pair.x & RAYSPACE_INDEX_MASK;
-    bool again = (pair.w & RAYSPACE_AGAIN) != 0u;
     uvec4 made = pair;
-    made.w &= ~RAYSPACE_AGAIN;
     bundle b;
 #ifdef RAYSPACE_FLAT
     bounds bounds_ = bounds_of_item(pair.y);
-    bool itself = again || level == 0u, by_node = true;
+    bool itself = level == 0u, by_node = true;
     if (itself)
         b = bundle_at(pair.x);
     uint link = pair.y, next = 0u, end = 0u;
@@ -110,7 +102,7 @@ void take(uvec4 pair)
     bounds bounds_ = bounds_of(tree, element);
     uint link = element.link, next = pair.y + 1u, end = link;
     bool for_one = is_for_one_ray(tree.is_top, pair.y, link);
-    bool itself = again || (level == 0u && for_one);
+    bool itself = level == 0u && for_one;
     bool by_node = itself || divides_node(level, b, for_one, link, bounds_);
     if (!by_node && is_leaf(link)) { // the only instance of a scene: its tree's root is the one child
         made.z = link & BVH_LEAF_FIRST_MASK;
@@ -175,25 +167,18 @@ void main()
         slots_written[begin * (RAYSPACE_CHILDREN + 1u) + k] = slot;
     }
 #else
-    uint leaf_count = uint(bitCount(leaf_mask)), far_count = uint(bitCount(far_mask));
-    uint near_count = kept_count - leaf_count - far_count;
+    uint leaf_count = uint(bitCount(leaf_mask)), pair_count = kept_count - leaf_count;
     uint leaf_place = leaf_count > 0u ? atomicAdd(control.leaves_written, leaf_count) : 0u;
-    uint far_place = far_count > 0u ? atomicAdd(control.put_off, far_count) : 0u;
-    uint near_place = near_count > 0u ? atomicAdd(control.written, near_count) : 0u;
-    bool leaves_fit = leaf_place + leaf_count <= control.leaves_room;
-    bool far_fit = far_place + far_count <= control.put_off_room, near_fit = near_place + near_count <= control.room;
+    uint place = pair_count > 0u ? atomicAdd(control.written, pair_count) : 0u;
+    bool leaves_fit = leaf_place + leaf_count <= control.leaves_room, pairs_fit = place + pair_count <= control.room;
     leaf_place += control.leaves;
-    far_place += waiting_on(later);
-    near_place += waiting_on(to);
+    place += waiting_on(to);
     for (uint k = 0u; k < kept_count; k++) {
         if ((leaf_mask >> k & 1u) != 0u) {
             if (leaves_fit)
                 leaves_written[leaf_place++] = kept[k];
-        } else if ((far_mask >> k & 1u) != 0u) {
-            if (far_fit)
-                pairs_put_off[far_place++] = kept[k];
-        } else if (near_fit) {
-            pairs_written[near_place++] = kept[k];
+        } else if (pairs_fit) {
+            pairs_written[place++] = kept[k];
         }
     }
 #endif

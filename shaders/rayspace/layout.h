@@ -25,15 +25,13 @@ SHARED_SIZE(rayspace_node, 96)
  *   x  node: level, and its number in the level
  *   y  joint descent: element of the tree over the instance, or of the top tree; flat: item of the batch
  *   z  instance, RAYSPACE_TOP: the top tree
- *   w  joint descent: how many children of the element have been tested; the rest is to be. RAYSPACE_AGAIN: the
- *      pair was put off, and is itself to be tested again
+ *   w  joint descent: how many children of the element have been tested; the rest is to be
  * A pair of a ray and a leaf, or of a ray and a small part of a tree:
  *   x  ray;  y  joint descent: element; flat: item;  z  instance;
  *   then, once it was tested, z: rank of the nearest primitive, w: its distance, as ordered_bits() */
 #define RAYSPACE_LEVEL_SHIFT 27u
 #define RAYSPACE_INDEX_MASK 0x07ffffffu
 #define RAYSPACE_TOP 0xffffffffu
-#define RAYSPACE_AGAIN 0x80000000u
 #define RAYSPACE_PAIR_BYTES 16u
 #define RAYSPACE_CHUNK 4u    /* pairs of an invocation */
 #define RAYSPACE_CHILDREN 4u /* of a pair in a pass: nodes, or elements; more elements wait for the next pass */
@@ -56,30 +54,28 @@ SHARED_SIZE(rayspace_node, 96)
  * of the box, and the instance; upper corner, and the primitive's number in its geometry. */
 #define RAYSPACE_ITEM_TEXELS 3
 
-/* Three stacks of pairs: a pass takes pairs from the top of one, puts their children onto the second, and those
- * that are far away onto the third, which waits for the next round. What did not fit is as if it had not happened:
- * the next pass takes half as many. */
-#define RAYSPACE_STACKS 3u
+/* Two stacks of pairs: a pass takes pairs from the top of one, and puts their children onto the other. What did
+ * not fit is as if it had not happened: the next pass takes half as many. */
+#define RAYSPACE_STACKS 2u
 struct rayspace_control {
-    uint waiting_0, waiting_1, waiting_2;  /* pairs on each stack */
-    uint leaves;                           /* pairs of rays and leaves that wait */
-    uint taken, first;                     /* pairs of the pass in hand: first .. first + taken - 1 of its stack */
-    uint written, put_off, leaves_written; /* by it; more than there is room for: they were not stored */
-    uint room, put_off_room, leaves_room;  /* for them */
-    uint limit;                            /* pairs of a pass at most */
-    uint leaves_taken;                     /* leaves to be tested before the pass in hand */
+    uint waiting_0, waiting_1;    /* pairs on each stack */
+    uint leaves;                  /* pairs of rays and leaves that wait */
+    uint taken, first;            /* pairs of the pass in hand: first .. first + taken - 1 of its stack */
+    uint written, leaves_written; /* by it; more than there is room for: they were not stored */
+    uint room, leaves_room;       /* for them */
+    uint limit;                   /* pairs of a pass at most */
+    uint leaves_taken;            /* leaves to be tested before the pass in hand */
     uint pass_groups_x, pass_groups_y, pass_groups_z; /* arguments of indirect dispatches */
     uint leaf_groups_x, leaf_groups_y, leaf_groups_z;
     uint sort_groups_x, sort_groups_y, sort_groups_z;
     uint turned, sorted;             /* what a sample of the rays has decided */
-    float band;                      /* metres; what is farther away from its node than this is put off */
     uint cone_tests, triangle_tests; /* so far; boxes that rays alone were tested against count as cones */
     uint pairs_max, passes, halvings;
     uint left_over;      /* not 0: some batch was not traced to its end */
     uint failed_in_turn; /* passes, up to the last one */
     uint pad0, pad1, pad2;
 };
-SHARED_SIZE(rayspace_control, 144)
+SHARED_SIZE(rayspace_control, 128)
 
 /* Of the waves of one kind in a frame, with those that were done again. Sums of tests have 64 bits. */
 struct rayspace_counts {
@@ -95,16 +91,14 @@ SHARED_SIZE(rayspace_counts, 48)
 /* After which pass control.comp runs: no other one is taken yet. Of a batch or of the wave, what then waits is
  * left over, and stops the slice. */
 #define RAYSPACE_END_NOTHING 0u
-#define RAYSPACE_END_ROUND 1u
-#define RAYSPACE_END_BATCH 2u
-#define RAYSPACE_END_WAVE 3u
+#define RAYSPACE_END_BATCH 1u
+#define RAYSPACE_END_WAVE 2u
 
 #define BIND_RAYSPACE_CONTROL BIND_TRACER_0
 #define BIND_RAYSPACE_PAIRS BIND_TRACER_1 /* of the stack that is written to */
 #define BIND_RAYSPACE_LEAVES BIND_PASS_2
 #define BIND_RAYSPACE_ANSWERS BIND_PASS_3
 #define BIND_RAYSPACE_NODES BIND_PASS_4   /* of the pass that makes them */
-#define BIND_RAYSPACE_PUT_OFF BIND_PASS_4 /* of passes */
 #define BIND_RAYSPACE_STOPPED BIND_PASS_4 /* of control.comp */
 #define BIND_RAYSPACE_COUNTS BIND_PASS_4  /* of count.comp */
 #define BIND_RAYSPACE_ORDER BIND_PASS_4   /* of the sort */

@@ -2,14 +2,7 @@
 // One level of the hierarchy over the rays of a wave from the level below it, as mip levels are made (section 3.2). An
 // invocation makes a node.
 //
-// Defines: ANY_HIT the rays of the wave ask for transmittance; and one of these, or none:
-//   NODES_OF_RAYS       level 1, from the rays
-//   NODES_ENDS          only how far rays go on, after hits were found
-//   NODES_ENDS_OF_RAYS  the same of level 1
-#ifdef NODES_ENDS_OF_RAYS
-#define NODES_OF_RAYS
-#define NODES_ENDS
-#endif
+// Defines: ANY_HIT the rays of the wave ask for transmittance; NODES_OF_RAYS level 1, from the rays.
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "rayspace/ray.glsl"
@@ -50,15 +43,6 @@ child child_at(uint index)
 #endif
 }
 
-float end_of(uint index)
-{
-#ifdef NODES_OF_RAYS
-    return ray_at_place(index).end;
-#else
-    return texelFetch(nodes, int(below_first + index) * RAYSPACE_NODE_TEXELS + 3).w;
-#endif
-}
-
 // The angle that a chord of the unit sphere spans, or up to 1.1 % more: the refined Shafer-Fink inequality, as asin() of a
 // device may be off by 2^-11. Exact also for small angles, where the cosine is not.
 float angle_above(float chord)
@@ -74,12 +58,6 @@ void main()
         return;
     uint first = own * RAYSPACE_NODE_CHILDREN, end = min(first + RAYSPACE_NODE_CHILDREN, below_count);
     int texel = int(own_first + own) * RAYSPACE_NODE_TEXELS;
-#ifdef NODES_ENDS
-    float last = -1.0;
-    for (uint i = first; i < end; i++)
-        last = max(last, end_of(i));
-    node_texels[texel + 3].w = last;
-#else
     child all = child(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(3e38), vec3(-3e38), vec3(3e38), vec3(-3e38), -1.0);
     for (uint i = first; i < end; i++) {
         child c = child_at(i);
@@ -116,5 +94,4 @@ void main()
     node_texels[texel + 3] = vec4(all.origin_upper, all.end);
     node_texels[texel + 4] = vec4(all.direction_lower, has_cone ? all.spread : 4.0);
     node_texels[texel + 5] = vec4(all.direction_upper, 0.0);
-#endif
 }

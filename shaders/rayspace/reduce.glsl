@@ -20,9 +20,7 @@ uint first_segment()
 // Of a slot that is not empty.
 uint list_of(uint last)
 {
-    if (last == RAYSPACE_SLOT_LEAF)
-        return RAYSPACE_LIST_LEAVES;
-    return (last & RAYSPACE_AGAIN) != 0u ? RAYSPACE_LIST_PUT_OFF : RAYSPACE_LIST_PAIRS;
+    return last == RAYSPACE_SLOT_LEAF ? RAYSPACE_LIST_LEAVES : RAYSPACE_LIST_PAIRS;
 }
 
 // How many of a list are in a segment.

@@ -8,18 +8,16 @@
 #define RAYSPACE_CHUNK_SLOTS (RAYSPACE_CHUNK * (RAYSPACE_CHILDREN + 1u))
 #define RAYSPACE_SEGMENT 64u /* slots that are reduced together: the size that the paper found best */
 
-/* A slot is a pair, RGBA32UI, whose last word says to which list it goes: RAYSPACE_AGAIN to those that are put
- * off, and these; else to the other stack. */
+/* A slot is a pair, RGBA32UI, whose last word says to which list it goes: these, or to the other stack. */
 #define RAYSPACE_SLOT_EMPTY 0xffffffffu
 #define RAYSPACE_SLOT_LEAF 0xfffffffeu
 #define RAYSPACE_LIST_PAIRS 0u
 #define RAYSPACE_LIST_LEAVES 1u
-#define RAYSPACE_LIST_PUT_OFF 2u
-#define RAYSPACE_LISTS 3u
+#define RAYSPACE_LISTS 2u
 
 /* A segment, once it is reduced: its pairs of each list lie behind one another at its beginning. Words:
- *   x, y, z  places of the first of each in their lists
- *   w        how many of each list there are, RAYSPACE_COUNT_BITS each */
+ *   x, y  places of the first of each in their lists
+ *   w     how many of each list there are, RAYSPACE_COUNT_BITS each */
 #define RAYSPACE_SEGMENT_BYTES 16u
 #define RAYSPACE_COUNT_BITS 8u
 #define RAYSPACE_COUNT_MASK 0xffu
@@ -27,7 +25,6 @@
 #define BIND_RAYSPACE_SLOTS BIND_RAYSPACE_PAIRS /* of the descent */
 #define BIND_RAYSPACE_PACKED BIND_TRACER_1
 #define BIND_RAYSPACE_SEGMENTS BIND_PASS_3
-#define BIND_RAYSPACE_DRAW BIND_PASS_3
 #define UNIT_RAYSPACE_SLOTS UNIT_RAYSPACE_PAIRS
 
 #endif

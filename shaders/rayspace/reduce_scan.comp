@@ -5,34 +5,33 @@
 
 layout(std430, binding = BIND_RAYSPACE_SEGMENTS) buffer segment_block { uvec4 segments[]; };
 
-shared uvec3 sums[GROUP_SIZE];
+shared uvec2 sums[GROUP_SIZE];
 
-uvec3 counts_of(uint segment)
+uvec2 counts_of(uint segment)
 {
     uint counts = segments[segment].w;
-    return uvec3(count_in(counts, 0u), count_in(counts, 1u), count_in(counts, 2u));
+    return uvec2(count_in(counts, 0u), count_in(counts, 1u));
 }
 
 void main()
 {
     uint self = gl_LocalInvocationIndex, count = (slot_count() + RAYSPACE_SEGMENT - 1u) / RAYSPACE_SEGMENT;
     uint run = (count + GROUP_SIZE - 1u) / GROUP_SIZE, first = min(self * run, count), end = min(first + run, count);
-    uvec3 sum = uvec3(0u);
+    uvec2 sum = uvec2(0u);
     for (uint segment = first; segment < end; segment++)
         sum += counts_of(segment);
     sums[self] = sum;
     barrier();
-    uvec3 place = uvec3(0u);
+    uvec2 place = uvec2(0u);
     for (uint before = 0u; before < self; before++)
         place += sums[before];
     if (self == GROUP_SIZE - 1u) {
         control.written = place.x + sum.x;
         control.leaves_written = place.y + sum.y;
-        control.put_off = place.z + sum.z;
     }
     for (uint segment = first; segment < end; segment++) {
-        uvec3 own = counts_of(segment);
-        segments[segment].xyz = place;
+        uvec2 own = counts_of(segment);
+        segments[segment].xy = place;
         place += own;
     }
 }

@@ -6,7 +6,7 @@
  * the depth-first order that meets nearer children first. So the element that follows a hit is the next one, and
  * an element needs one link alone: where to go on after a miss (a leaf goes on at the next either way). Octant o:
  * bit 0: x is negative, 1: y, 2: z. A tree that begins at element f has octant o's copy at BVH_OCTANTS f + o n.
- * Trees that no ray traverses by its direction (trace/rayspace) have octant 0's copy alone, at f.
+ * Trees that no ray traverses by its direction (trace/rayspace, and spheres) have octant 0's copy alone, at f.
  *
  * Two forms of element. Packed: boxes on a grid of 65536 cells an axis that spans the tree, one texel. Whole:
  * boxes or spheres in floats, two texels; for spheres, and for a scene with a tree that has more detail than its
@@ -26,7 +26,7 @@ struct bvh_packed_element {
 SHARED_SIZE(bvh_packed_element, 16)
 #define BVH_GRID_CELLS 65535u
 
-/* Two texels, or an entry of a storage buffer in the plain form, which has one order for all directions.
+/* Two texels.
  * Box: lower and upper corner. Sphere: centre in `lower`, radius in `upper_x`; y and z are 0. */
 struct bvh_element {
     float lower_x, lower_y, lower_z;

@@ -116,8 +116,7 @@ static void look_by_daemon(struct sides *sides, const struct fl_warp_camera *cam
     gpu_buffer_bind_uniform(&uniforms, UNIFORM_FRAME);
     const struct eye_rays rays = {.frame = &frame, .slot_count = COUNT, .hits = &hits};
     assert_true(quadtree_finds_eyes(&sides->daemon.store, &sides->daemon.gpu, &frame, &options));
-    expect_ok(quadtree_eye_hits(&sides->daemon.store, (struct quadtree_state *)state, &rays, &options, &error),
-              &error);
+    expect_ok(quadtree_eye_hits(&sides->daemon.store, (struct quadtree_state *)state, &rays, &error), &error);
     gpu_buffer_read(device, &hits, 0, slots, sizeof(slots));
     expect_ok(gpu_check(device, "eyes", &error), &error);
     sort_into_rows(sides, (const vec4 *)slots);

@@ -78,7 +78,7 @@ static inline void build_by_daemon(struct sides *sides, bool of_client)
             give_planes(sides, stage / 2);
             daemon->build.stage++;
         }
-        progress = quadtree_nodes_go_on(&daemon->build, store, &daemon->gpu, false, &error);
+        progress = quadtree_nodes_go_on(&daemon->build, store, &daemon->gpu, &error);
     }
     expect_ok(progress == TRACER_DONE && gpu_check(device, "nodes", &error), &error);
     free(daemon->nodes);
@@ -236,7 +236,6 @@ static inline struct sides *rendered(const struct scene *scene)
     const struct quadtree_settings settings = {.layers = LAYERS,
                                                .faces = QUADTREE_FACES_VIEW,
                                                .hits = QUADTREE_HITS_PLANE,
-                                               .angle = 90,
                                                .pixels = PIXELS,
                                                .radius = sides->radius};
     /* There is a margin of one texel at the least. */

@@ -265,8 +265,10 @@ TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
     struct fixture *fixture = *state;
     build(fixture);
     struct frame_result expected = render(fixture, true);
-    fixture->request.tracer_options.bench.bvh_elements = 5;
+    const uint32_t tests = fixture->device->facts.ray_tests_max;
+    fixture->device->facts.ray_tests_max = 5;
     struct frame_result got = render(fixture, true);
+    fixture->device->facts.ray_tests_max = tests;
     assert_same_picture(&expected, &got);
     assert_int_equal(got.shadow_rays, expected.shadow_rays);
     assert_int_equal(got.secondary_rays, expected.secondary_rays);

@@ -319,19 +319,19 @@ static void expect_same(const struct frame_result *got, const struct frame_resul
 /* Which of them are cut, and in which ways a structure is built. */
 static const struct way {
     const char *name;
-    unsigned tracer, ldc_build;
+    unsigned tracer, ldc_form;
     bool has_pieces;
 } ways[] = {
-    {"bvh", TRACER_BVH, LDC_BUILD_AUTO, true},         {"reference", TRACER_REFERENCE, LDC_BUILD_AUTO, false},
-    {"ldc, lists", TRACER_LDC, LDC_BUILD_LISTS, true}, {"ldc, peeled", TRACER_LDC, LDC_BUILD_PEEL, true},
-    {"abuffer", TRACER_ABUFFER, LDC_BUILD_AUTO, true},
+    {"bvh", TRACER_BVH, TRACER_FORM_FAST, true},         {"reference", TRACER_REFERENCE, TRACER_FORM_FAST, false},
+    {"ldc, lists", TRACER_LDC, TRACER_FORM_FAST, true},  {"ldc, peeled", TRACER_LDC, TRACER_FORM_PAPER, true},
+    {"abuffer", TRACER_ABUFFER, TRACER_FORM_FAST, true},
 };
 enum { WAYS = sizeof(ways) / sizeof(ways[0]) };
 
 static bool take_way(struct fixture *fixture, const struct way *way)
 {
     fixture->request.tracer = way->tracer;
-    fixture->request.tracer_options.ldc.build = way->ldc_build;
+    fixture->request.tracer_options.ldc.form = way->ldc_form;
     return tracer_impl_by_number(way->tracer) != NULL;
 }
 

@@ -334,7 +334,6 @@ TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is)
     add_glass(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.tracer = TRACER_BVH;
-    fixture->request.tracer_options.bvh.rays = 1;
     fixture->request.samples = 3;
     struct frame_result layers = render(fixture, BIT(LAYER_NORMAL) | BIT(LAYER_DEPTH));
     fixture->request.layers = 0;
@@ -377,7 +376,6 @@ TEST_LONG(neither_the_picture_nor_the_layers_depend_on_each_other)
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.samples = 3;
     fixture->request.tracer = TRACER_BVH;
-    fixture->request.tracer_options.bvh.rays = 1; /* else it follows the slices, and rounding at edges */
     for (int integrator = INTEGRATOR_WHITTED; integrator <= INTEGRATOR_PATH; integrator++) {
         fixture->request.integrator = (enum integrator_kind)integrator;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);

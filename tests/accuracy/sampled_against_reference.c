@@ -4,7 +4,6 @@
  * FARLIGHT_TEST_PICTURES=folder keeps the pictures. */
 #include "tests/accuracy/against_reference.h"
 
-#include "render/frame_state.h"
 #include "tests/harness/test.h"
 
 #define AO_RAYS 64u
@@ -16,34 +15,15 @@ static const struct row {
     const char *name;
     unsigned tracer;
     struct tracer_options options;
-    unsigned search; /* of abuffer, whose structure is the same for each */
     double psnr_min[PICTURE_KINDS];
 } rows[] = {
-    {"ldc", TRACER_LDC, {.ldc = {.resolution = 1024}}, 0, {38, 34, 0}},
-    {"abuffer, dda",
-     TRACER_ABUFFER,
-     {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
-     ABUFFER_SEARCH_DDA,
-     {36, 34, 34}},
-    {"abuffer, linear3",
-     TRACER_ABUFFER,
-     {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
-     ABUFFER_SEARCH_LINEAR3,
-     {36, 34, 34}},
+    {"ldc", TRACER_LDC, {.ldc = {.resolution = 1024}}, {38, 34, 0}},
+    {.name = "abuffer", .tracer = TRACER_ABUFFER, .psnr_min = {36, 34, 34}},
 };
 enum { ROWS = sizeof(rows) / sizeof(rows[0]) };
 
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
-
-/* The structure that was built for an earlier row serves this one too. */
-static void use_search(struct fixture *fixture, const struct row *row)
-{
-    struct tracer_set *set = &fixture->shared->tracers;
-    for (size_t i = 0; i < sizeof(set->slots) / sizeof(set->slots[0]); i++)
-        if (set->slots[i].tracer && set->slots[i].impl == tracer_impl_by_number(TRACER_ABUFFER))
-            set->slots[i].tracer->options.abuffer.search = row->search;
-}
 
 /* ---- pictures ---- */
 
@@ -53,7 +33,6 @@ static struct frame_result render(struct fixture *fixture, unsigned tracer, cons
     char kept[128];
     fixture->request.tracer = tracer;
     fixture->request.tracer_options = row->options;
-    use_search(fixture, row);
     struct frame_result result = fixture_render(fixture);
     snprintf(kept, sizeof(kept), "%s_%s", name, tracer == row->tracer ? row->name : "exact");
     fixture_keep(&result, kept);

@@ -182,7 +182,6 @@ static void a_mixture(struct fixture *fixture)
     fixture_light(fixture, LIGHT_RECTANGLE, -2.0f, 1.0f, 3.0f, 4.0f);
     fixture_environment(fixture, 0.2f, 0.3f, 0.4f);
     fixture->request.tracer = TRACER_BVH;
-    fixture->request.tracer_options.bvh.rays = 1; /* else it follows the slices, and rounding at edges */
     fixture->request.width = WIDTH;
     fixture->request.height = HEIGHT;
     fixture->request.samples = 21; /* together: 16, 4, 1 */

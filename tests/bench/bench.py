@@ -3,7 +3,7 @@
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
 Parts: start, first_picture, oneshot, frames, animation, tracers, family, pixels, rays, link, view; and of the tracers' papers
-parallel, flake, distributed, ldc, abuffer, rayspace, quadtree; all of them where none is named. Each figure is the median of
+flake, distributed, ldc, abuffer, rayspace, quadtree; all of them where none is named. Each figure is the median of
 several runs after a warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of
 FARLIGHT_SCENES (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
 
@@ -54,7 +54,6 @@ PARTS = {
     "rays": ("Time against rays per pixel", bench_rays.measure_rays, bench_rays.show_rays),
     "link": ("A sealed connection beside an open one", bench_link.measure, bench_link.show),
     "view": ("Views whose camera moves", bench_view.measure, bench_view.show),
-    "parallel": ("Packets of rays", bench_bvh.measure_parallel, bench_bvh.show_parallel),
     "flake": ("Time against spheres", bench_bvh.measure_flake, bench_bvh.show_flake),
     "distributed": ("Distributed ray tracing, whole frames", bench_bvh.measure_distributed, bench_bvh.show_distributed),
     "ldc": ("Layered depth cubes", bench_sampled.measure_ldc, bench_sampled.show_ldc),

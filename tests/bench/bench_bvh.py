@@ -1,60 +1,20 @@
 # SPDX-License-Identifier: MIT
 """The parts that hold `bvh` against its paper ('Stackless traversal of a sphere BVH'):
 
-  parallel     results of `bench parallel`: packets of rays (its figure 4)
   flake        results of bench_pictures.py over the sphereflake (figure 6)
   distributed  what `bench distributed` prints: 16 distributed samples beside a plain one (section 7)
 """
 import json
 import pathlib
-import subprocess
 
-from bench_common import Failure, command, figure, fit_exponent, paired_ratio, say, significant, table, with_spread
+from bench_common import command, figure, fit_exponent, paired_ratio, table, with_spread
 from bench_pictures import pictures, size
 from bench_wanted import row
 
-ORDERS = ("coherent", "partly", "incoherent")
-PACKETS = (1, 2, 3, 4, 8)
-# Frames a second on a GeForce 9800: one ray a pixel, then packets of two. Twice the rays a frame.
-PAPER_SIZES = {"512x512": (51, {"coherent": 44, "partly": 26, "incoherent": 14}),
-               "256x256": (72, {"coherent": 66, "partly": 54, "incoherent": 36})}
 FLAKES = {2: 91, 3: 820, 4: 7381, 5: 66430, 6: 597871}
 FLAKE_EXPONENT_MAX = 0.25
 RATIO_MAX, PAPER_RATIO = 8, 13.7
 PLAIN, WHOLE = "whitted, 1 sample", "and motion"  # lens, soft light, gloss and motion
-
-
-# ---- packets of rays ----------------------------------------------------------------------------------
-
-
-def measure_parallel(bench):
-    results = []
-    for triangles in (1000,) if bench.tiny else (1800, 146000):
-        say(f"  {triangles} triangles")
-        full = list(map(str, (*bench.form("parallel"), triangles, bench.times(5))))
-        run = subprocess.run(full, stdout=subprocess.PIPE, text=True, check=False)
-        if not run.stdout:
-            raise Failure(f"{' '.join(full)} ended with {run.returncode}")
-        if run.returncode != 0:
-            bench.faults.append("parallel: wrong answers")
-        results.append(json.loads(run.stdout))
-    return {"results": results}
-
-
-def show_parallel(data):
-    rows = []
-    for result in data["results"]:
-        for order, bounds in ((order, bounds) for order in ORDERS for bounds in ("boxes", "spheres")):
-            runs = {r["packet"]: r["runs_ns"] for r in result["rows"] if (r["order"], r["bounds"]) == (order, bounds)}
-            rays = next(r["rays"] for r in result["rows"] if r["order"] == order)
-            rows.append((f"{result['triangles']} triangles", order, bounds, significant(rays / figure(runs[1])["median"] * 1e3),
-                         *(with_spread(paired_ratio(runs[1], runs[n])) for n in PACKETS[1:]),
-                         *(significant(2 * fps[order] / single) for single, fps in PAPER_SIZES.values())))
-    header = [("scene", "rays", "bounds", "1 ray", *map(str, PACKETS[1:]), *(["paper, 2"] * 2)),
-              ("", "", "", "Mray/s", *(["x 1 ray"] * 4), *PAPER_SIZES)]
-    return ("Coherent: 24 jittered camera rays a pixel; partly: their reflections; incoherent: diffuse bounces in random order.\n"
-            "Of a packet, rays that go apart are traversed one after the other (bvh/packet.glsl), which the paper's are not.\n\n" +
-            table(header, rows))
 
 
 # ---- the sphereflake --------------------------------------------------------------------------------

@@ -13,13 +13,12 @@ VIEW = ["--eye=-6.079,0.764,-0.244", "--look-at=3.862,-0.288,-0.498", "--up=0,0,
 ROOM = [("classroom", "screenspace/classroom.obj", VIEW)]
 FAMILY = (5, 20, 80, 325, 1300)  # thousands of triangles
 ONE, TWO = ["--quadtree-layers", 1], ["--quadtree-layers", 2]
-WAYS = {"quadtree": [], "minmax": ["--quadtree-nodes", "minmax"], "dda": ["--quadtree-walk", "dda"]}
+WAYS = {"quadtree": [], "paper": ["--quadtree-form", "paper"]}
 SAMPLES = (4, 8, 16)
 # The paper's figures, on a GeForce GTX 980 at 1600x900. Table 1: scene, ms.
 PAPER_BUILDS = (("Sponza, 227K", 0.646), ("living room, 456K", 0.636), ("San Miguel, 6550K", 0.657))
 # Table 2, living room: ms of building and both eyes.
-PAPER_STEREO = {"quadtree, 1 layer": 4.35, "quadtree, 2 layers": 5.45, "minmax, 1 layer": 8.5, "dda, 1 layer": 12.33,
-                "dda, 2 layers": 17.01}
+PAPER_STEREO = {"paper, 1 layer": 4.35, "paper, 2 layers": 5.45}
 # Table 3: ms of a frame in the mean, one of four rendered. Table 4, Sponza: ms by rays a pixel.
 PAPER_UPSAMPLING = {"1 layer": 0.86, "2 layers": 1.13}
 PAPER_LENS = {"1 layer": {4: 2.8, 8: 5.32}, "2 layers": {4: 3.21, 8: 5.85}}

@@ -12,7 +12,7 @@ from bench_pictures import MIRRORS, form_of, median_ratio, models, ms, pictures,
 from bench_wanted import row
 
 BVH, JOINT = ["--tracer", "bvh"], ["--tracer", "rayspace"]
-FLAT = [*JOINT, "--rayspace-mode", "flat", "--rayspace-bounds", "sphere"]
+FLAT = [*JOINT, "--rayspace-form", "paper"]
 TESTS = [("bunny 5K", "rayspace/bunny-5187.glb", []), ("bunny 69K", "common/bunny-69k.obj", []),
          ("dragon 101K", "gltf/chinesedragon.gltf", [])]
 KITCHEN = [("kitchen", "rayspace/kitchen.obj", KITCHEN_VIEW)]

@@ -20,7 +20,7 @@ PAPER_ABUFFER = {"mirrors": ("Figure 1(b)", (13.2, 11.6, 2.7), (42.8, 84.6, 3.8)
                  "glass": ("Figure 8 top", (10.8, 8.7, 2.6), (35.6, 79.6, 2.9))}
 LOOKS = {"mirrors": MIRRORS, "glass": GLASS}
 CLOSED = [("spot 5.9K", "gltf/spot.obj", []), ("dragon 101K", "gltf/chinesedragon.gltf", [])]
-SEARCHES = ("linear3", "linear1", "dda")  # the first is the paper's in the table
+FORMS = ("paper", "fast")
 TEXELS = 1024
 
 
@@ -66,7 +66,7 @@ def show_ldc(data):
 def measure_abuffer(bench):
     left_out, results = [], []
     texels = ["--tracer", "abuffer", "--abuffer-resolution", TEXELS // 16 if bench.tiny else TEXELS]
-    forms = {**{search: [*texels, "--abuffer-search", search] for search in SEARCHES}, "bvh": ["--tracer", "bvh"]}
+    forms = {**{form: [*texels, "--abuffer-form", form] for form in FORMS}, "bvh": ["--tracer", "bvh"]}
     for (title, model, _), (how, look) in zip(models(bench, CLOSED, left_out), LOOKS.items()):
         options = [*size(bench, "800x600"), "--samples", 1, "--depth", 3, *look]
         results.append({"how": how, **pictures(bench, title, model, forms, options)})
@@ -84,5 +84,5 @@ def show_abuffer(data):
         lines += [(f"  the paper, {name}", which, *times, significant(sum(times)))
                   for which, times in zip(("A-buffers", "octree"), paper)]
     return (f"The paper's table 1, 800x600, depth 3, {TEXELS} texels; others: all of the picture but building and its rays.\n"
-            "The paper's on a GeForce GTX 780; its search is linear3.\n\n" +
-            table([("picture", "search", "construction", "tracing", "others", "total"), ("", "", "ms", "ms", "ms", "ms")], lines))
+            "The paper's on a GeForce GTX 780.\n\n" +
+            table([("picture", "form", "construction", "tracing", "others", "total"), ("", "", "ms", "ms", "ms", "ms")], lines))

@@ -125,9 +125,6 @@ class Benchmark(unittest.TestCase):
 
     def test_papers_have_their_tables(self):
         parts = self.document["parts"]
-        self.assertEqual({(row["order"], row["bounds"], row["packet"]) for row in parts["parallel"]["results"][0]["rows"]},
-                         {(order, bounds, n) for order in ("coherent", "partly", "incoherent")
-                          for bounds in ("boxes", "spheres") for n in (1, 2, 3, 4, 8)})
         self.assertEqual([row["spheres"] for row in parts["flake"]["results"]], [91, 820, 7381])
         still, figure = parts["ldc"]["results"]
         self.assertEqual([form["structure"].get("static/resolution") for form in still["forms"]], [32, 64, None])

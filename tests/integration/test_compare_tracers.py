@@ -67,7 +67,7 @@ class Comparisons(OneDaemon):
 
     @long_test
     def test_options_of_render_are_accepted_and_a_limit_decides_the_status(self):
-        report = self.report("--depth", "0", "--eye", "3,3,3", "--look-at", "0,0,0", "--up", "0,0,1", "--bvh-bounds", "sphere",
+        report = self.report("--depth", "0", "--eye", "3,3,3", "--look-at", "0,0,0", "--up", "0,0,1", "--bvh-form", "paper",
                              "--fail-above", "agree=99.99%", "--fail-above", "psnr=60")
         self.assertEqual({w["wave"] for w in report["waves"]}, {0})
         # 64 pixels are too few for SSIM, and what was not measured is within no limit.

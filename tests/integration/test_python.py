@@ -75,7 +75,7 @@ class Codec(Case):
     def test_a_value_that_may_not_be_sent_names_its_field_and_what_is_allowed(self):
         for values, field, text in (({"width": 0}, "render.width", "1 .. 8192"), ({"width": 1.5}, "render.width", "whole"),
                                     ({"tracer": "bwh"}, "render.tracer", "bvh, naive"), ({"noise": float("nan")}, "render.noise", "0"),
-                                    ({"quadtree_layers": 9}, "render.quadtree_layers", "3"), ({"bvh_rays": 5}, "render.bvh_rays", "1, 2, 3"),
+                                    ({"quadtree_layers": 9}, "render.quadtree_layers", "3"), ({"abuffer_voxels": 5}, "render.abuffer_voxels", "16, 32"),
                                     ({"keys": [3]}, "render.keys[0]", "CameraKey"), ({"exposure_stops": "x"}, "render.exposure_stops", "number")):
             with self.subTest(**values), self.assertRaises(farlight.InvalidValue) as raised:
                 fields.encode(messages.Render(scene=1, channel=2, **values))

@@ -19,9 +19,8 @@ EXAMPLES = {
         "background": "#10a0ff", "camera": 0,
         "frames": "1-240:2", "fps": 23.976, "shard": "3/8", "size": [64, 48], "samples": 4, "depth": 0, "seed": 7,
         "exposure": -1.5, "tone_map": "aces", "shutter": 0.5, "filter": "gaussian", "tracer": "bvh",
-        "bvh_bounds": "sphere", "bvh_rays": 2, "ldc_resolution": 512, "ldc_block": 4, "ldc_build": "lists",
-        "ldc_levels": "pyramid", "ldc_images": "one", "ldc_tolerance": 0.001, "ldc_rays": 4,
-        "abuffer_resolution": 512, "abuffer_voxels": 16, "abuffer_search": "linear3", "brdf": "ward", "clamp": 5, "ao_distance": 0.5, "ao_falloff": 1,
+        "bvh_form": "paper", "ldc_resolution": 512, "ldc_form": "paper", "quadtree_pixels": 0.5,
+        "abuffer_resolution": 512, "abuffer_voxels": 16, "abuffer_form": "fast", "brdf": "ward", "clamp": 5, "ao_distance": 0.5, "ao_falloff": 1,
         "ao_rays": 4, "layer_opacity": 0.25, "layers": ["beauty", "depth", "id"], "integrator": "path", "primary": "trace", "encoding": "zstd",
         "quality": 3, "format": "exr", "half": True, "float": False, "output": "%04d.exr"},
     "movie": {
@@ -260,15 +259,13 @@ class Schema(Shots):
                 ("stills", ("size",), ([1, 8192], [0, 1], [1, 8193], [1], [1, 1, 1])),
                 ("stills", ("exposure",), (-64, 64, 64.5)),
                 ("stills", ("shutter",), (0, 64, 64.1, -0.1)),
-                ("stills", ("bvh_rays",), range(-1, 10)),
                 ("stills", ("tracer",), ("naive", "reference", "ldc", "ldc ")),
                 ("stills", ("ldc_resolution",), (0, 1, 15, 16, 4096, 4097, 512.5)),
-                ("stills", ("ldc_block",), range(34)),
-                ("stills", ("ldc_rays",), range(6)),
-                ("stills", ("ldc_tolerance",), (0, 1e6, 1.1e6, -0.1)),
+                ("stills", ("quadtree_layers",), range(-1, 5)),
+                ("stills", ("quadtree_pixels",), (0.001, 64, 64.5, -0.1)),
                 ("stills", ("abuffer_resolution",), (0, 1, 15, 16, 4096, 4097, 512.5)),
                 ("stills", ("abuffer_voxels",), (0, 8, 16, 17, 32, 64, 100, 128, 256, 512, -1, "auto", "all", "64", 16.5)),
-                ("stills", ("abuffer_search",), ("auto", "dda", "linear1", "linear2")),
+                ("stills", ("abuffer_form",), ("fast", "paper", "papers")),
                 ("stills", ("clamp",), (0, 1e6, 1.1e6, -0.1)),
                 ("stills", ("ao_distance",), (0, 1e12, 1.1e12, -0.1)),
                 ("stills", ("ao_falloff",), (0, 64, 64.5, -0.1)),
@@ -298,8 +295,7 @@ class Schema(Shots):
 
     def test_the_schema_lists_the_names_that_the_program_knows(self):
         properties = json.loads(SCHEMA.read_text())["properties"]
-        for name in ("tone_map", "filter", "tracer", "bvh_bounds", "ldc_build", "ldc_levels", "ldc_images", "integrator",
-                     "abuffer_search", "brdf", "primary", "encoding"):
+        for name in ("tone_map", "filter", "tracer", "bvh_form", "quadtree_hits", "integrator", "brdf", "primary", "encoding"):
             with self.subTest(name=name):
                 result = self.expect(self.try_shot({"model": "teapot.glb", name: "nonsense"}), 2)
                 known = re.search(r"known: ([^)]*)\)", result.stderr).group(1).split(", ")

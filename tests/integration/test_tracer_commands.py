@@ -12,20 +12,15 @@ SMALL = ["--size", "48x36", "--integrator", "whitted", "--samples", "1"]
 ROOM, TEAPOT, CAROUSEL = (f"{name}.glb" for name in ("cornell", "teapot", "carousel"))
 
 WRONG = (  # option, values, what is allowed
-    ("--ldc-resolution", ("15", "4097", "fine"), "16 to 4096"), ("--ldc-block", ("12", "64"), "2, 4, 8, 16, 32"),
-    ("--ldc-rays", ("2", "8"), "auto, 1, 4"), ("--ldc-build", ("magic",), "auto, peel, lists"),
-    ("--ldc-levels", ("tree",), "auto, blocks, pyramid, cells"), ("--ldc-images", ("two",), "overlap, one"),
-    ("--ldc-tolerance", ("-1", "nan"), ""),
+    ("--ldc-resolution", ("15", "4097", "fine"), "16 to 4096"), ("--ldc-form", ("papers",), "fast, paper"),
+    ("--quadtree-pixels", ("-1", "nan"), ""),
     ("--abuffer-resolution", ("15", "4097", "fine"), "16 to 4096"),
     ("--abuffer-voxels", ("100", "512", "8", "many"), "auto, 16, 32, 64, 128, 256"),
-    ("--abuffer-search", ("linear2",), "auto, dda, linear3, linear1, voxels3, voxels1, parity3, parity1"),
     ("--integrator", ("photons",), "whitted, distributed, raycast, ao, path"), ("--brdf", ("phong",), "ggx, ward"),
     ("--ao-distance", ("-1",), "-1"), ("--ao-falloff", ("65",), "64"), ("--ao-rays", ("0", "257"), "256"),
     ("--layer-opacity", ("0", "1.5"), "from 1e-06 to 1"), ("--bounces", ("33",), "32"), ("--denoise", ("much",), "off, on, auto"))
 
 CONTRADICTORY = (  # options, what is said
-    (["--tracer", "ldc", "--ldc-levels", "cells", "--ldc-tolerance", "0.1"],
-     ["--ldc-levels: cells cannot be combined with --ldc-tolerance (leave out one of them)"]),
     (["--abuffer-resolution", "64", "--abuffer-voxels", "128"], ["--abuffer-voxels: 128", "64 texels", "--abuffer-resolution"]),
     (["--depth", "3", "--bounces", "0"], ["--bounces: 0 contradicts --depth 3", "(leave out one of them)"]),
     (["--bounces", "3", "--depth", "0"], ["--depth: 0 contradicts --bounces 3"]))
@@ -100,8 +95,8 @@ class Options(Case):
 
     def test_the_shell_completes_options_and_their_values(self):
         rows = [("_farlight", "farlight " + words, wanted) for words, wanted in (
-            ("tra", ["tracers"]), ("render --ldc-bl", ["--ldc-block"]), ("render --ldc-levels py", ["pyramid"]),
-            ("render --ldc-block 1", ["16"]), ("render --tracer nai", ["naive"]), ("render --metadata f", ["full"]))]
+            ("tra", ["tracers"]), ("render --ldc-f", ["--ldc-form"]), ("render --ldc-form pa", ["paper"]),
+            ("render --abuffer-voxels 12", ["128"]), ("render --tracer nai", ["naive"]), ("render --metadata f", ["full"]))]
         rows += [("_farlight_program", words, wanted) for words, wanted in (
             ("farlightd --key", ["--key-file"]), ("farlightd --device s", ["software"]), ("farlightd --log-level d", ["debug"]),
             ("farlight-view --tracer nai", ["naive"]), ("farlight-view --headl", ["--headless"]),

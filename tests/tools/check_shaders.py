@@ -24,24 +24,21 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
            for parts in ({}, {"NAIVE_PARTS": "1"})] + [
     {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": packet, **bounds}
     for packet in ("1", "8")
-    for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})] + [
+    for bounds in ({"BVH_PACKED": "1"}, {})] + [
+    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": "2", "BVH_SPHERES": "1"}] + [
     {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": "1", "RAY_PAIRS": "1", **bounds}
-    for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"})] + [
-    {"TRAVERSE": '"ldc/traverse.glsl"', "TRACER_LDC": "1", "LDC_CUBES": cubes, "LDC_LAYERS_TOGETHER": layers,
-     "PACKET_RAYS": packet, "LDC_LEVEL_BITS": bits, **levels}
-    for cubes, layers, packet, bits, levels in (
-        ("1", "4", "1", "0", {"LDC_CELLS": "1"}), ("2", "4", "4", "0", {"LDC_CELLS": "1"}),
-        ("2", "1", "4", "2", {}), ("1", "4", "1", "3", {"LDC_BLOCKS": "1"}))] + [
+    for bounds in ({"BVH_PACKED": "1"}, {})] + [
+    {"TRAVERSE": '"ldc/traverse.glsl"', "TRACER_LDC": "1", "LDC_CUBES": cubes, "PACKET_RAYS": "1", **way}
+    for cubes in "12" for way in ({"LDC_CELLS": "1"}, {}, {"LDC_TOLERANCE": "1"})] + [
     {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"},
     {"TRAVERSE": '"quadtree/traverse.glsl"', "TRACER_QUADTREE": "1", "PACKET_RAYS": "1"}] + [
     {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
-    for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"}, {"ABUFFER_STEPS": "1", "ABUFFER_PARITY": "1"})]
+    for search in ({}, {"ABUFFER_PARITY": "1"})]
 CHOICES = {
     "trace/wave.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
     "tree/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}], [{}, {"BVH_ONE_ORDER": "1"}]],
     "rayspace/leaves.comp": [[{"LEAVES_" + stage: "1"} for stage in "TEST RANK SETTLE".split()]],
     "abuffer/voxels.comp": [[{"VOXELS_" + stage: "1"} for stage in "JUDGE REACH_X REACH_Y REACH_Z".split()]],
-    "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
     "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
                         "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
     "render/gather_views.comp": [[{}, {"MARK": "1"}, {"KEPT": "1"}], [{}, {"EYES": "1"}],
@@ -72,7 +69,6 @@ MAY_MOVE = ("render/path.comp", "render/distributed.comp", "render/ground.comp",
 NOTES_LIGHT = ("render/path.comp", "render/distributed.comp", "render/ground.comp", "render/gather.comp")
 IN_ALL_THE_SAME = {"HAS_MOTION": MAY_MOVE, "LIGHT_LAYERS": NOTES_LIGHT}
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
-          "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
           "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"]}
 # What a stage declares, and the limit that is asked of a driver for it (server/gpu/limits.def); none: nothing is there.

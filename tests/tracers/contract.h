@@ -40,6 +40,11 @@ struct tracer_row {
         double cells;        /* distances agree to so many cells ... */
         double wrong_max;    /* ... but for this share of the rays that pass no edge within BLUR_CELLS */
         const char *reason;
+        /* It takes depths for surfaces: why it is not asked of rays that begin on one or come from afar, and of
+         * light that passes. */
+        const char *coarse;
+        /* Why it may meet nothing within two cells of a ray's origin. */
+        const char *own_way;
     } sampled;
     /* A tracer that knows what a view sees, and marks what it guesses (HIT_UNKNOWN). 0 layers: it knows
      * everything. Its answers are judged where it is to know them (seen.h), and it must say that it does. */
@@ -76,6 +81,7 @@ struct scene_row {
     void (*move)(struct scene_motion *motion, uint32_t pose_count);
     uint32_t pose_count;      /* of the open shutter; 0: it is closed, and the pose comes as a later edit */
     bool is_finer_than_cells; /* of textures: for exact tracers alone */
+    bool is_tinted;           /* light passes: not for what takes depths for surfaces */
     /* Phases of edits (conformance.c) after which answers are judged without FARLIGHT_TEST_LONG, a bit each. Each
      * set of features is another program of every tracer. */
     unsigned phases, phases_sampled; /* of exact tracers, and of those that sample; 0: the scene is left out */
@@ -93,6 +99,8 @@ struct contract_case {
 enum check_scope {
     CHECK_EACH_SCENE = 1, /* of scene_rows */
     CHECK_FORMS = 2,      /* of forms, too */
+    CHECK_SURFACES = 4,   /* not of what takes depths for surfaces */
+    CHECK_BESIDE = 8,     /* not of what may meet nothing within two cells of a ray's origin */
 };
 
 struct check {

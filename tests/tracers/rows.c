@@ -22,59 +22,33 @@ static const struct tracer_row rows[] = {
         .name = "bvh" form, .number = 0, __VA_ARGS__                                                              \
     }
     BVH("", .is_form = false),
-    BVH(", one ray alone", .is_form = true, .options.bvh.rays = 1),
-    BVH(", packets of two", .is_form = true, .options.bvh.rays = 2),
-    BVH(", packets of eight", .is_form = true, .options.bvh.rays = 8),
-    BVH(" in the plain form", .is_form = true, .options.bench.bvh_layout = BVH_LAYOUT_PLAIN),
-    BVH(" with spheres, packets of four", .is_form = true,
-        .options = {.bvh.bounds = BVH_BOUNDS_SPHERE, .bvh.rays = 4}),
-#define REFERENCE(form, ...)                                                                                      \
-    {                                                                                                             \
-        .name = "reference" form, .number = 2, __VA_ARGS__                                                        \
-    }
-    /* As many rays a call as the processor takes at once. */
-    REFERENCE("", .refuses_sizes = "Embree's numbers end at 1e18, and it cannot invert what is scaled by less"),
-    REFERENCE(", one ray a call", .is_form = true, .options.bench.reference_rays = 1),
-    REFERENCE(", four rays a call", .is_form = true, .options.bench.reference_rays = 4),
-    REFERENCE(", eight rays a call", .is_form = true, .options.bench.reference_rays = 8),
+    BVH(", as in the paper", .is_form = true, .options.bvh.form = TRACER_FORM_PAPER),
+    {.name = "reference",
+     .number = 2,
+     .refuses_sizes = "Embree's numbers end at 1e18, and it cannot invert what is scaled by less"},
 #define LDC(form, ...)                                                                                            \
     {                                                                                                             \
-        .name = "ldc" form, .number = 3, .is_form = sizeof(form) > 1,                                             \
-        .options = {.ldc.resolution = 256, __VA_ARGS__}, .sampled = {256, 0.25, 0.004, BORDERS},                  \
-        .refuses_motion = STILL                                                                                   \
+        .name = "ldc" form, .number = 3, .is_form = sizeof(form) > 1, .refuses_motion = STILL, __VA_ARGS__        \
     }
-    LDC("", .ldc.build = LDC_BUILD_AUTO),
-    LDC(", peeled, packets of four", .ldc.build = LDC_BUILD_PEEL, .ldc.rays = 4),
-    LDC(", in lists, by a pyramid", .ldc.build = LDC_BUILD_LISTS, .ldc.levels = LDC_LEVELS_PYRAMID),
-    LDC(" by a pyramid, packets of four, layers one by one", .ldc.levels = LDC_LEVELS_PYRAMID, .ldc.rays = 4,
-        .bench.ldc_layers_together = 1),
-    LDC(" by blocks of 8", .ldc.levels = LDC_LEVELS_BLOCKS),
-    LDC(" by blocks of 2, packets of four", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 2, .ldc.rays = 4),
-    LDC(" by blocks of 32, layers one by one", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 32,
-        .bench.ldc_layers_together = 1),
+    LDC("", .options.ldc.resolution = 256, .sampled = {256, 0.25, 0.004, BORDERS}),
+    LDC(", as in the paper", .options.ldc = {.resolution = 256, .form = TRACER_FORM_PAPER},
+        .sampled = {256, 2.5, 0.03, BORDERS, .coarse = "what comes within a cell of a sample's depth has hit it"}),
 #define ABUFFER(form, ...)                                                                                        \
     {                                                                                                             \
-        .name = "abuffer" form, .number = 4, .is_form = sizeof(form) > 1,                                         \
-        .options.abuffer = {.resolution = 256, __VA_ARGS__}, .sampled = {256, 0.25, 0.01, BORDERS},               \
-        .refuses_motion = STILL                                                                                   \
+        .name = "abuffer" form, .number = 4, .is_form = sizeof(form) > 1, .refuses_motion = STILL, __VA_ARGS__    \
     }
-    ABUFFER("", .search = ABUFFER_SEARCH_DDA),
-    ABUFFER(", three columns a step", .search = ABUFFER_SEARCH_LINEAR3),
-    ABUFFER(", one column a step", .search = ABUFFER_SEARCH_LINEAR1),
-    ABUFFER(", in voxels of 16 cells", .voxels = 16),
+    ABUFFER("", .options.abuffer.resolution = 256, .sampled = {256, 0.25, 0.01, BORDERS}),
+    ABUFFER(", in voxels of 16 cells", .options.abuffer = {.resolution = 256, .voxels = 16},
+            .sampled = {256, 0.25, 0.01, BORDERS}),
+    ABUFFER(", as in the paper", .options.abuffer = {.resolution = 256, .form = TRACER_FORM_PAPER},
+            .sampled = {256, 0.25, 0.01, BORDERS, .own_way = "whether it is inside is asked a step away"}),
 #define RAYSPACE(form, ...)                                                                                       \
     {                                                                                                             \
         .name = "rayspace" form, .number = 5, .is_form = sizeof(form) > 1, .options = { __VA_ARGS__ }             \
     }
     RAYSPACE("", .rayspace.mode = RAYSPACE_MODE_JOINT),
     RAYSPACE(", flat", .rayspace.mode = RAYSPACE_MODE_FLAT),
-    RAYSPACE(", flat, by spheres, in batches of 256", .rayspace.mode = RAYSPACE_MODE_FLAT,
-             .rayspace.bounds = RAYSPACE_BOUNDS_SPHERE, .rayspace.batch = 256),
-    RAYSPACE(", sorted, turned round, in four rounds, reduced by segments", .rayspace.sort = RAYSPACE_CHANCE_ON,
-             .rayspace.turn = RAYSPACE_CHANCE_ON, .rayspace.rounds = 4,
-             .rayspace.reduce = RAYSPACE_REDUCE_SEGMENTS),
-    RAYSPACE(" with little room, in two rounds, reduced by a geometry shader", .bench.rayspace_pairs = 512,
-             .rayspace.rounds = 2, .rayspace.reduce = RAYSPACE_REDUCE_GEOMETRY),
+    RAYSPACE(", as in the paper", .rayspace.form = TRACER_FORM_PAPER),
 /* 256 texels along a face: those of a scene 3 metres before the eye are 2 cm wide. A plane may be off by 1/4 pixel
  * for an eye 100 metres aside, which is 1/4 / (128 * 100) of 1 / depth: less than 1 mm at 3 metres. */
 #define QUADTREE(form, ...)                                                                                       \
@@ -106,9 +80,14 @@ static const struct tracer_row rows[] = {
                       .layers = 3,
                       .off = 0.25 / (128 * 100.0),
                       .blind = 2.2}),
-    QUADTREE(", of boxes", QUADTREE_OPTIONS(.layers = 3, .nodes = QUADTREE_NODES_MINMAX),
-             QUADTREE_SEEN(.layers = 3)),
-    QUADTREE(", texel by texel", QUADTREE_OPTIONS(.layers = 3, .walk = QUADTREE_WALK_DDA),
-             QUADTREE_SEEN(.layers = 3)),
+    /* Its bounds grow to four times that where things are far off, and planes go on as much farther. */
+    QUADTREE(", as in the paper", QUADTREE_OPTIONS(.form = TRACER_FORM_PAPER),
+             .seen = {.resolution = 256,
+                      .wrong_max = 0.02,
+                      .judged_min = JUDGED_MIN,
+                      .reason = BEYOND,
+                      .layers = 1,
+                      .off = 4 * 0.25 / (128 * 100.0),
+                      .blind = 2.2}),
 };
 TRACER_ROWS(rows)

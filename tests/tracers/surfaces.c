@@ -254,7 +254,7 @@ static void expect_ball_left(struct fixture *fixture, struct answered *a, bool i
                  grazing, wrong, stopped);
 }
 
-CHECK(a_ray_does_not_hit_the_ball_that_it_leaves, CHECK_FORMS)
+CHECK(a_ray_does_not_hit_the_ball_that_it_leaves, CHECK_FORMS | CHECK_SURFACES)
 {
     const struct contract_case *of = *state;
     struct answered *a = malloc(sizeof(*a));
@@ -276,7 +276,7 @@ CHECK(a_ray_does_not_hit_the_ball_that_it_leaves, CHECK_FORMS)
 /* What is small is met by rays that begin millions of its cells away, as those of a large scene meet what moves in
  * it: a ball has no cracks, and is met where it is, but for what the floats round that tell where the ray begins.
  */
-CHECK(rays_from_afar_meet_what_is_small, CHECK_FORMS)
+CHECK(rays_from_afar_meet_what_is_small, CHECK_FORMS | CHECK_SURFACES)
 {
     const struct contract_case *of = *state;
     struct answered *a = malloc(sizeof(*a));
@@ -325,7 +325,7 @@ CHECK(rays_from_afar_meet_what_is_small, CHECK_FORMS)
 /* A floor with a box that stands on it in the middle of a cell: from the floor, a cell and more from the box,
  * straight and steeply towards it. And along the floor, as low as integrators begin, which the floor must not
  * stop. */
-CHECK(what_stands_on_a_floor_is_met_from_a_cell_on, CHECK_FORMS)
+CHECK(what_stands_on_a_floor_is_met_from_a_cell_on, CHECK_FORMS | CHECK_SURFACES)
 {
     const struct contract_case *of = *state;
     struct answered *a = malloc(sizeof(*a));
@@ -368,7 +368,7 @@ CHECK(what_stands_on_a_floor_is_met_from_a_cell_on, CHECK_FORMS)
 /* In the corner of a room: from beside a wall, nearer than a cell, into it; not from so near that it could be the
  * bent surface that the ray begins on (a quarter of a cell). What would look through it would see the sky along
  * all its corners. */
-CHECK(a_wall_beside_the_origin_is_not_passed, CHECK_FORMS)
+CHECK(a_wall_beside_the_origin_is_not_passed, CHECK_FORMS | CHECK_SURFACES | CHECK_BESIDE)
 {
     const struct contract_case *of = *state;
     struct answered *a = malloc(sizeof(*a));
@@ -444,7 +444,7 @@ static void expect_tints(struct fixture *fixture, struct answered *a, int surfac
 }
 
 /* Panes across and askew: neighbouring samples' planes overlap, but a pane tints once. */
-CHECK(a_pane_of_glass_tints_once, CHECK_FORMS)
+CHECK(a_pane_of_glass_tints_once, CHECK_FORMS | CHECK_SURFACES)
 {
     const struct contract_case *of = *state;
     struct answered *a = malloc(sizeof(*a));
@@ -469,7 +469,7 @@ CHECK(a_pane_of_glass_tints_once, CHECK_FORMS)
 }
 
 /* A ball is two surfaces, also where the images of two axes meet. */
-CHECK(a_ball_of_glass_tints_twice, CHECK_FORMS)
+CHECK(a_ball_of_glass_tints_twice, CHECK_FORMS | CHECK_SURFACES)
 {
     const struct contract_case *of = *state;
     struct answered *a = malloc(sizeof(*a));

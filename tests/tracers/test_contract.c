@@ -85,7 +85,9 @@ static void add_tests_of(const struct tracer_row *row)
     }
     for (size_t c = 0; c < check_count; c++) {
         const struct check *check = checks[c];
-        if (row->is_form && !(check->scope & CHECK_FORMS))
+        if ((row->is_form && !(check->scope & CHECK_FORMS)) ||
+            (row->sampled.coarse && (check->scope & CHECK_SURFACES)) ||
+            (row->sampled.own_way && (check->scope & CHECK_BESIDE)))
             continue;
         if (!(check->scope & CHECK_EACH_SCENE))
             add_test(row->name, check->name, NULL, check->run, (struct contract_case){row, NULL});
@@ -94,7 +96,7 @@ static void add_tests_of(const struct tracer_row *row)
             const unsigned phases = row->sampled.resolution ? scene->phases_sampled : scene->phases;
             if ((scene->pose_count > 1 && row->refuses_motion) ||
                 (scene->is_finer_than_cells && row->sampled.resolution) ||
-                (phases == 0 && !getenv("FARLIGHT_TEST_LONG")))
+                (scene->is_tinted && row->sampled.coarse) || (phases == 0 && !getenv("FARLIGHT_TEST_LONG")))
                 continue;
             add_test(row->name, check->name, scene->name, check->run, (struct contract_case){row, scene});
         }

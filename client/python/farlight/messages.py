@@ -404,49 +404,11 @@ class Tracer(Word):
     QUADTREE = 6  # quadtrees over the surfaces that a view sees, nearest first
 
 
-class BvhBounds(Word):
-    """bounding volume of the tracer bvh"""
+class TracerForm(Word):
+    """whose form of a tracer's algorithm answers"""
 
-    AUTO = 0  # the faster one
-    BOX = 1  # axis-aligned boxes
-    SPHERE = 2  # spheres, as in the paper
-
-
-class LdcBuild(Word):
-    """how the samples of a cube are created; both ways give the same samples"""
-
-    AUTO = 0  # the faster one
-    PEEL = 1  # layer by layer, one pass each, as in the paper
-    LISTS = 2  # all layers in one pass, then sorted
-
-
-class LdcLevels(Word):
-    """what lets a ray skip empty space"""
-
-    AUTO = 0  # the fastest one that fits into memory
-    BLOCKS = 1  # minimum and maximum depths of blocks of `ldc_block` texels, as in the paper
-    PYRAMID = 2  # the same of blocks of many sizes, up to the whole image
-    CELLS = 3  # one tree over the cells of all three images, front to back; not with a tolerance
-
-
-class LdcImages(Word):
-    """which of the three images of a cube hold a surface"""
-
-    OVERLAP = 0
-    ONE = 1  # that of the dominant axis alone, as in the paper
-
-
-class AbufferSearch(Word):
-    """how the intersection with a ray is found in a voxel that holds a surface"""
-
-    AUTO = 0  # dda
-    DDA = 1  # texel by texel: the most exact
-    LINEAR3 = 2  # in three steps, then by bisection
-    LINEAR1 = 3  # in one step, then by bisection: the fastest, for soft light
-    VOXELS3 = 4  # as linear3, in steps of whole voxels, as in the paper: thin bodies are missed
-    VOXELS1 = 5  # as linear1, likewise
-    PARITY3 = 6
-    PARITY1 = 7  # as voxels1, likewise
+    FAST = 0  # ours
+    PAPER = 1  # the paper's own, as near as it can be, to be compared with: slower
 
 
 class RayspaceMode(Word):
@@ -454,29 +416,6 @@ class RayspaceMode(Word):
 
     JOINT = 0  # the trees over the scene that are kept: the fastest
     FLAT = 1
-
-
-class RayspaceBounds(Word):
-    """what bounds rays and surfaces in the tracer rayspace"""
-
-    BOTH = 0  # spheres and cones, and boxes beside them
-    SPHERE = 1  # spheres and cones alone, as in the paper
-
-
-class RayspaceChance(Word):
-    """whether something is done to the rays of a wave"""
-
-    AUTO = 0  # where a sample of them says that it pays
-    ON = 1  # always
-    OFF = 2  # never
-
-
-class RayspaceReduce(Word):
-    """how the pairs that a pass of the tracer rayspace keeps are brought together; all ways give the same answers"""
-
-    CHUNK = 0  # by the pass itself, a few pairs at a time: the fastest
-    SEGMENTS = 1  # 64 at a time, then segment behind segment, as in the paper
-    GEOMETRY = 2  # by a geometry shader, as in the paper
 
 
 class QuadtreeFaces(Word):
@@ -492,27 +431,6 @@ class QuadtreeHits(Word):
     AUTO = 0
     PRIMITIVE = 1  # the surface itself that a texel shows: exact distances
     PLANE = 2  # the plane that stands for it in the tree, as in the paper
-
-
-class QuadtreeNodes(Word):
-    """what a node of the tracer quadtree is"""
-
-    PLANES = 0  # a plane where one fits all below it, else a box
-    MINMAX = 1  # a box, but for single texels: a pyramid of least and greatest depths, to compare with
-
-
-class QuadtreeWalk(Word):
-    """how a ray finds its way through a layer of the tracer quadtree"""
-
-    QUADTREE = 0  # down and up the tree, without a stack
-    DDA = 1  # texel by texel, to compare with
-
-
-class QuadtreeAdaptive(Word):
-    """whether planes of the tracer quadtree are coarser where they are far off"""
-
-    OFF = 0  # no: the bound of quadtree_pixels holds everywhere
-    ON = 1  # yes, as in the paper
 
 
 @dataclass
@@ -2035,29 +1953,20 @@ class Render(Message):
     layer_opacity: integrator raycast: opacity of opaque surfaces
     layers: set of layers: bit n stands for the layer of that number; 0: the picture alone. Others need a batch, format
         rgba32f and encoding raw, zstd or predicted
-    bvh_bounds: bounding volume of a node
-    bvh_rays: rays that traverse the hierarchy as one packet
+    bvh_form: paper: bounds are spheres, in one order for all directions; rays traverse them two by two
     ldc_resolution: cells along the longest side of the sampled box; auto: 1024, or as many as are worth their time for
         the layers of the scene and the pixels of the picture
-    ldc_tolerance: a ray hits a sample that it comes this near to; 0: one whose plane it intersects
-    ldc_build: how the samples are created
-    ldc_levels: what lets a ray skip empty space
-    ldc_block: side of a block, for the levels blocks
-    ldc_images: which of the three images hold a surface
-    ldc_rays: rays that traverse a cube as one packet
+    ldc_form: paper: samples are peeled layer by layer, each in one image; minimum and maximum depths of blocks of 8
+        texels; a ray hits a sample that it comes as near to as a cell is wide
     abuffer_resolution: texels along a side of the images of the lists; auto: 1280, or as many as are worth their time
         for the layers of the scene and the pixels of the picture
     abuffer_voxels: voxels along a side of the grid, not more than texels; auto: near the root of three times the
         resolution
-    abuffer_search: how the intersection is found in a voxel that holds a surface
+    abuffer_form: paper: what is inside of a body is told by parity, texel by texel through whole voxels: bodies in
+        bodies are missed
     rayspace_mode: what descends beside the hierarchy over the rays
-    rayspace_bounds: what bounds rays and surfaces
-    rayspace_batch: pairs of rays and surfaces that a pass takes at most, and triangles of a batch of the flat descent;
-        what needs more memory than there is is halved
-    rayspace_sort: whether rays are sorted by place and direction
-    rayspace_turn: whether shadow rays are turned round, so that the light is where they begin
-    rayspace_rounds: rounds from near to far, after each of which rays end at what they have hit
-    rayspace_reduce: how the pairs that a pass keeps are brought together
+    rayspace_form: paper: flat, bounds are spheres and cones alone, and pairs are brought together 64 at a time, segment
+        behind segment
     quadtree_layers: surfaces behind one another that are kept at each texel; auto: 3, but 1 where each is a picture of
         its own that is rendered as a whole, for a lens or for frames between others
     quadtree_resolution: texels along a face of the cube, or along the longer side of the picture; auto: as fine as the
@@ -2068,10 +1977,7 @@ class Render(Message):
     quadtree_margin: of a view, how much more it sees than the picture on each side, as a share of the picture's longer
         side
     quadtree_hits: what a ray hits
-    quadtree_nodes: what a node of the tree is
-    quadtree_walk: how a ray finds its way
-    quadtree_adaptive: whether planes are coarser where they are far off
-    quadtree_angle: the greatest angle between a plane and those that it stands for, the paper's gamma_norm; 90: none
+    quadtree_form: paper: one layer, planes are hit, and merged within 3 degrees and by bounds that grow with distance
     views_across: in one picture, each of width x height pixels, side by side from the leftmost eye; a frame has
         views_across x width by views_down x height pixels
     views_down: one below the other, from the uppermost eye. View (i, j) is that of an eye moved by ((i - (views_across
@@ -2186,25 +2092,14 @@ class Render(Message):
         _f.whole("ao_rays", "I", 1, 256),
         _f.real("layer_opacity", 1e-6, 1.0),
         _f.whole("layers", "I", 0, 268435455),
-        _f.choice("bvh_bounds", BvhBounds),
-        _f.whole("bvh_rays", "I", 0, 8, listed=(0, 1, 2, 3, 4, 8)),
+        _f.choice("bvh_form", TracerForm),
         _f.whole("ldc_resolution", "I", 16, 4096, zero=True),
-        _f.real("ldc_tolerance", 0.0, 1e6, zero=False),
-        _f.choice("ldc_build", LdcBuild),
-        _f.choice("ldc_levels", LdcLevels),
-        _f.whole("ldc_block", "I", 0, 32, listed=(0, 2, 4, 8, 16, 32)),
-        _f.choice("ldc_images", LdcImages),
-        _f.whole("ldc_rays", "I", 0, 4, listed=(0, 1, 4)),
+        _f.choice("ldc_form", TracerForm),
         _f.whole("abuffer_resolution", "I", 16, 4096, zero=True),
         _f.whole("abuffer_voxels", "I", 0, 256, listed=(0, 16, 32, 64, 128, 256)),
-        _f.choice("abuffer_search", AbufferSearch),
+        _f.choice("abuffer_form", TracerForm),
         _f.choice("rayspace_mode", RayspaceMode),
-        _f.choice("rayspace_bounds", RayspaceBounds),
-        _f.whole("rayspace_batch", "I", 1, 4194304, zero=True),
-        _f.choice("rayspace_sort", RayspaceChance),
-        _f.choice("rayspace_turn", RayspaceChance),
-        _f.whole("rayspace_rounds", "I", 1, 16, zero=True),
-        _f.choice("rayspace_reduce", RayspaceReduce),
+        _f.choice("rayspace_form", TracerForm),
         _f.whole("quadtree_layers", "I", 1, 3, zero=True),
         _f.whole("quadtree_resolution", "I", 16, 4096, zero=True),
         _f.choice("quadtree_faces", QuadtreeFaces),
@@ -2212,10 +2107,7 @@ class Render(Message):
         _f.real("quadtree_radius", 1e-6, 1e6, zero=True),
         _f.real("quadtree_margin", 0.001, 1.0, zero=True),
         _f.choice("quadtree_hits", QuadtreeHits),
-        _f.choice("quadtree_nodes", QuadtreeNodes),
-        _f.choice("quadtree_walk", QuadtreeWalk),
-        _f.choice("quadtree_adaptive", QuadtreeAdaptive),
-        _f.real("quadtree_angle", 0.01, 90.0, zero=True),
+        _f.choice("quadtree_form", TracerForm),
         _f.whole("views_across", "I", 1, 64),
         _f.whole("views_down", "I", 1, 64),
         _f.real("baseline", 0.0, 1e6),
@@ -2299,25 +2191,14 @@ class Render(Message):
     ao_rays: int = 8
     layer_opacity: float = 0.5
     layers: int = 0
-    bvh_bounds: BvhBounds | str = BvhBounds(0)
-    bvh_rays: int = 0
+    bvh_form: TracerForm | str = TracerForm(0)
     ldc_resolution: int = 0
-    ldc_tolerance: float = 0.0
-    ldc_build: LdcBuild | str = LdcBuild(0)
-    ldc_levels: LdcLevels | str = LdcLevels(0)
-    ldc_block: int = 0
-    ldc_images: LdcImages | str = LdcImages(0)
-    ldc_rays: int = 0
+    ldc_form: TracerForm | str = TracerForm(0)
     abuffer_resolution: int = 0
     abuffer_voxels: int = 0
-    abuffer_search: AbufferSearch | str = AbufferSearch(0)
+    abuffer_form: TracerForm | str = TracerForm(0)
     rayspace_mode: RayspaceMode | str = RayspaceMode(0)
-    rayspace_bounds: RayspaceBounds | str = RayspaceBounds(0)
-    rayspace_batch: int = 0
-    rayspace_sort: RayspaceChance | str = RayspaceChance(0)
-    rayspace_turn: RayspaceChance | str = RayspaceChance(0)
-    rayspace_rounds: int = 0
-    rayspace_reduce: RayspaceReduce | str = RayspaceReduce(0)
+    rayspace_form: TracerForm | str = TracerForm(0)
     quadtree_layers: int = 0
     quadtree_resolution: int = 0
     quadtree_faces: QuadtreeFaces | str = QuadtreeFaces(0)
@@ -2325,10 +2206,7 @@ class Render(Message):
     quadtree_radius: float = 0.0
     quadtree_margin: float = 0.0
     quadtree_hits: QuadtreeHits | str = QuadtreeHits(0)
-    quadtree_nodes: QuadtreeNodes | str = QuadtreeNodes(0)
-    quadtree_walk: QuadtreeWalk | str = QuadtreeWalk(0)
-    quadtree_adaptive: QuadtreeAdaptive | str = QuadtreeAdaptive(0)
-    quadtree_angle: float = 0.0
+    quadtree_form: TracerForm | str = TracerForm(0)
     views_across: int = 1
     views_down: int = 1
     baseline: float = 0.0

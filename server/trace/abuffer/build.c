@@ -221,8 +221,8 @@ bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *
         .options = options,
         .texel_count = 3 * tiles_along * tiles_along * ABUFFER_TILE_TEXELS,
     };
-    store->without_steep = !abuffer_is_linear(options);
-    store->whole_voxels = abuffer_steps_of_voxels(options);
+    store->whole_voxels = options->abuffer.form == TRACER_FORM_PAPER;
+    store->without_steep = !store->whole_voxels;
     store->sample_count = 0;
     store->depth_max = 0;
     builder->passes = 0;

@@ -8,10 +8,6 @@
 
 #include <epoxy/gl.h>
 
-/* Columns that a linear search looks up (abuffer/steps.glsl): of three steps in three images, and to settle a
- * passage. */
-#define STEP_COLUMNS 9
-#define PASSAGE_COLUMNS 28
 /* Bisection to a depth in a column, and the samples before it. */
 #define SCAN_ROUNDS 36
 
@@ -34,69 +30,32 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
     return true;
 }
 
-/* What a linear search has for ABUFFER_STEPS; NULL: it is by DDA. */
-static const char *steps_of(const struct tracer_options *options)
-{
-    switch (options->abuffer.search) {
-    case ABUFFER_SEARCH_LINEAR3:
-    case ABUFFER_SEARCH_VOXELS3:
-    case ABUFFER_SEARCH_PARITY3:
-        return "3";
-    case ABUFFER_SEARCH_LINEAR1:
-    case ABUFFER_SEARCH_VOXELS1:
-    case ABUFFER_SEARCH_PARITY1:
-        return "1";
-    default:
-        return NULL;
-    }
-}
-
-static bool is_by_parity(const struct tracer_options *options)
-{
-    return options->abuffer.search == ABUFFER_SEARCH_PARITY3 || options->abuffer.search == ABUFFER_SEARCH_PARITY1;
-}
-
-bool abuffer_is_linear(const struct tracer_options *options)
-{
-    return steps_of(options) != NULL;
-}
-
-bool abuffer_steps_of_voxels(const struct tracer_options *options)
-{
-    return options->abuffer.search >= ABUFFER_SEARCH_VOXELS3 && options->abuffer.search <= ABUFFER_SEARCH_PARITY1;
-}
-
 /* With N texels and V voxels along a side, and D samples in the longest list: a ray passes 12 V parts of voxels,
  * and with the voxels and blocks 16 V. In each part and image it begins with the texel where it enters, and passes
- * 2 N texels of each image on its way; a linear search looks up its steps, and settles a passage in each part. Two
- * samples of a column are one round. Two more of each part are those of what it collects for a shadow ray, and of
- * the search itself (abuffer/exact.glsl). */
-uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store, const struct tracer_options *options)
+ * 2 N texels of each image on its way. Two samples of a column are one round; by parity all of a column are looked
+ * at where a surface is passed. Two more of each part are those of what it collects for a shadow ray, and of the
+ * search itself (abuffer/exact.glsl). */
+uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store)
 {
     const uint64_t parts = 12 * (uint64_t)store->voxels_along;
-    const uint64_t columns = abuffer_is_linear(options) ? parts * (STEP_COLUMNS + PASSAGE_COLUMNS)
-                                                        : 3 * (2 * (uint64_t)store->resolution + parts);
-    return 3 * parts + parts / 3 + columns * (SCAN_ROUNDS + store->depth_max / 2);
+    const uint64_t columns = 3 * (2 * (uint64_t)store->resolution + parts);
+    return 3 * parts + parts / 3 + columns * (SCAN_ROUNDS + store->depth_max * 3 / 2);
 }
 
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                        const struct tracer_options *options, struct error *error)
 {
-    struct gpu_define defines[6] = {{"TRACER_ABUFFER", "1"}};
+    struct gpu_define defines[4] = {{"TRACER_ABUFFER", "1"}};
     size_t n = 1;
     if (store->resolution == 0)
         defines[n++] = (struct gpu_define){"ABUFFER_EMPTY", "1"};
-    if (abuffer_is_linear(options))
-        defines[n++] = (struct gpu_define){"ABUFFER_STEPS", steps_of(options)};
-    if (is_by_parity(options))
+    if (options->abuffer.form == TRACER_FORM_PAPER)
         defines[n++] = (struct gpu_define){"ABUFFER_PARITY", "1"};
-    if (options->bench.abuffer_count_steps && rays->wave->kind == WAVE_CLOSEST)
-        defines[n++] = (struct gpu_define){"ABUFFER_COUNT_STEPS", "1"};
     const struct trace_program_source source = {
         .traverse = "abuffer/traverse.glsl",
         .defines = defines,
         .packet_rays = 1,
-        .rays_a_dispatch = trace_rays_a_dispatch(store->device, abuffer_rounds_of_a_ray(store, options)),
+        .rays_a_dispatch = trace_rays_a_dispatch(store->device, abuffer_rounds_of_a_ray(store)),
     };
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)

@@ -12,17 +12,12 @@
 #include <stdbool.h>
 
 /* The most rounds of the traversal's loops that a ray can take. */
-uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store, const struct tracer_options *options);
+uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store);
 /* What tracer_impl.trace_range and .surfaces do. Buffers of the scene are bound. A hit's distance is where the ray
  * meets the sample's plane, its surface that of the sample's own primitive at the place nearest to there. */
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                        const struct tracer_options *options, struct error *error);
 bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
                       struct error *error);
-
-/* Whether intersections are searched in steps, by the winding behind samples in all images. */
-bool abuffer_is_linear(const struct tracer_options *options);
-/* Whether these steps are of whole voxels, as in the paper, and not of voxels' occupied parts. */
-bool abuffer_steps_of_voxels(const struct tracer_options *options);
 
 #endif

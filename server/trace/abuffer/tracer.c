@@ -89,7 +89,7 @@ static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const ui
                 const struct axes_box *box, struct error *error)
 {
     const struct axes_box whole = axes_box_whole(box, axes_greatest_resolution(&abuffer->wish));
-    const float steep = abuffer_is_linear(&abuffer->base.options) ? 0 : ABUFFER_STEEP;
+    const float steep = abuffer->base.options.abuffer.form == TRACER_FORM_PAPER ? 0 : ABUFFER_STEEP;
     const struct axes_layers layers = axes_count_layers(scene, instances, count, 0, steep, &whole);
     uint32_t fitted = axes_choose_resolution(&abuffer->base, layers.mean, &abuffer->wish);
     if (!axes_fit_resolution(&abuffer->base, layers.mean, &fitted, error))

@@ -8,9 +8,9 @@
 
 #include <math.h>
 
-/* The packet size on software GL where packets pay. On hardware a SIMD group traverses together already, and
- * several rays per invocation cost registers; not measured there. */
-#define PACKET_RAYS_SOFTWARE 8u
+/* Groups that coherence is measured of. */
+#define GROUP_RAYS 8u
+#define PACKET_RAYS_PAPER 2u
 /* The traversal of a packet takes as long as four single ones: it pays with more rays than that. */
 #define RAYS_PER_PACKET_MIN 5u
 /* Rays that are farther apart than so many leaves, where the scene is, have few leaves in common. Measured: with
@@ -88,16 +88,16 @@ static bool would_share(const struct closeness *closeness, const struct ray *a, 
 /* Adds the live rays of a group, and the packets that would be best for them. */
 static void count_group(const struct closeness *closeness, const struct ray *rays, uint32_t counts[2])
 {
-    bool waits[PACKET_RAYS_SOFTWARE];
-    for (uint32_t k = 0; k < PACKET_RAYS_SOFTWARE; k++) {
+    bool waits[GROUP_RAYS];
+    for (uint32_t k = 0; k < GROUP_RAYS; k++) {
         waits[k] = rays[k].direction_t_max[3] > rays[k].origin_t_min[3];
         counts[0] += waits[k];
     }
-    for (uint32_t leading = 0; leading < PACKET_RAYS_SOFTWARE; leading++) {
+    for (uint32_t leading = 0; leading < GROUP_RAYS; leading++) {
         if (!waits[leading])
             continue;
         counts[1]++;
-        for (uint32_t k = leading + 1; k < PACKET_RAYS_SOFTWARE; k++)
+        for (uint32_t k = leading + 1; k < GROUP_RAYS; k++)
             waits[k] = waits[k] && !would_share(closeness, &rays[leading], &rays[k]);
     }
 }
@@ -112,14 +112,14 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
     struct closeness closeness = {.reach_squared = reach * reach, .width = leaves * bvh->tree.leaf_extent_world};
     for (int k = 0; k < 3; k++)
         closeness.centre[k] = 0.5f * scene->lower_world[k] + 0.5f * scene->upper_world[k];
-    const uint32_t groups = wave->ray_count / PACKET_RAYS_SOFTWARE;
+    const uint32_t groups = wave->ray_count / GROUP_RAYS;
     const uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
     const struct ray *rays = gpu_buffer_open(scene->device, wave->rays, error);
     if (!rays)
         return false;
     counts[0] = counts[1] = 0;
     for (uint32_t group = 0; group < groups / step; group++)
-        count_group(&closeness, rays + (size_t)group * step * PACKET_RAYS_SOFTWARE, counts);
+        count_group(&closeness, rays + (size_t)group * step * GROUP_RAYS, counts);
     gpu_buffer_unmap(scene->device, wave->rays);
     return true;
 }
@@ -130,35 +130,37 @@ static bool is_of_small_frame(const struct wave *wave)
 }
 
 /* Rays of one origin have the same answers to the bit in packets of any size. */
-static uint32_t packet_rays_of(const struct wave *wave)
+static uint32_t packet_rays_of(const struct gpu_device *device, const struct wave *wave)
 {
-    return wave->shared_origin && is_of_small_frame(wave) ? PACKET_RAYS_SMALL : PACKET_RAYS_SOFTWARE;
+    return wave->shared_origin && is_of_small_frame(wave) ? PACKET_RAYS_SMALL : device->facts.packet_rays;
+}
+
+static bool is_paper(const struct bvh *bvh)
+{
+    return bvh->base.options.bvh.form == TRACER_FORM_PAPER;
 }
 
 uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave)
 {
-    const struct tracer_options *options = &bvh->base.options;
-    const bool measured = bvh->base.device->facts.software && wave->ray_count >= COHERENCE_RAYS_MIN &&
-                          options->bench.bvh_layout != BVH_LAYOUT_PLAIN && options->bvh.rays == 0;
-    if (measured)
-        return wave->shared_origin ? packet_rays_of(wave) : 1;
-    return options->bvh.rays ? options->bvh.rays : 1;
+    if (is_paper(bvh))
+        return PACKET_RAYS_PAPER;
+    const bool measured = bvh->base.device->facts.packet_rays > 1 && wave->ray_count >= COHERENCE_RAYS_MIN;
+    return measured && wave->shared_origin ? packet_rays_of(bvh->base.device, wave) : 1;
 }
 
 uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                          struct error *error)
 {
-    const struct tracer_options *options = &bvh->base.options;
     uint32_t counts[2];
-    if (options->bench.bvh_layout == BVH_LAYOUT_PLAIN)
-        return 1;
-    if (options->bvh.rays != 0)
-        return options->bvh.rays;
-    if (!scene->device->facts.software || wave->ray_count < COHERENCE_RAYS_MIN)
+    if (is_paper(bvh))
+        return PACKET_RAYS_PAPER;
+    if (scene->device->facts.packet_rays == 1 || wave->ray_count < COHERENCE_RAYS_MIN)
         return 1;
     if (!measure_coherence(bvh, scene, wave, counts, error))
         return 0;
-    return counts[0] >= (uint64_t)RAYS_PER_PACKET_MIN * counts[1] && counts[1] > 0 ? packet_rays_of(wave) : 1;
+    return counts[0] >= (uint64_t)RAYS_PER_PACKET_MIN * counts[1] && counts[1] > 0
+               ? packet_rays_of(bvh->base.device, wave)
+               : 1;
 }
 
 bool bvh_ray_pairs(const struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
@@ -166,7 +168,6 @@ bool bvh_ray_pairs(const struct bvh *bvh, const struct gpu_scene *scene, const s
 {
     /* A traversal that stops to ask for materials does so for one ray. */
     const bool asks_materials = scene->has_cutout || (wave->kind == WAVE_ANY && scene->has_translucent);
-    const bool is_chosen = bvh->base.options.bvh.rays == 0 && !bvh->tree.store.settings.plain;
-    return is_chosen && packet_rays == 1 && scene->device->facts.software && !asks_materials &&
+    return !is_paper(bvh) && packet_rays == 1 && scene->device->facts.software && !asks_materials &&
            !is_of_small_frame(wave);
 }

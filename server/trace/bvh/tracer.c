@@ -12,21 +12,14 @@
 #define MINIMUM_RAYS 192u /* a multiple of all packets' sizes */
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX ((1u << 18) / MINIMUM_RAYS * MINIMUM_RAYS)
-/* Elements that a GPU visits in a dispatch, at most: a second's work of a slow one. A ray of a large scene needs
- * some hundred; it has enough of them to be finished in one dispatch, unless the scene is made to keep it. */
+/* Elements that a GPU visits in a dispatch, at most: a second's work of a slow one. */
 #define DISPATCH_ELEMENTS_MAX (1u << 31)
-#define RAY_ELEMENTS_MAX (1u << 16)
 
 static struct bvh_form settings_of(const struct gpu_device *device, const struct tracer_options *options)
 {
-    bool plain = options->bench.bvh_layout == BVH_LAYOUT_PLAIN;
-    /* Boxes are twice as fast as spheres, so `auto` is boxes. */
-    bool spheres = plain || options->bvh.bounds == BVH_BOUNDS_SPHERE;
+    const bool is_paper = options->bvh.form == TRACER_FORM_PAPER;
     return (struct bvh_form){
-        .bounds = spheres ? BVH_BOUNDS_SPHERE : BVH_BOUNDS_BOX,
-        .plain = plain,
-        .refit_by_height = !device->facts.software,
-    };
+        .spheres = is_paper, .one_order = is_paper, .refit_by_height = !device->facts.software};
 }
 
 static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options,
@@ -156,8 +149,7 @@ static enum budget budget_of(const struct bvh *bvh, const struct trace_state *st
 /* Of an invocation; a packet has as many as each of its rays would have. */
 static uint32_t elements_of_a_ray(const struct bvh *bvh, uint32_t rays)
 {
-    const uint32_t fitting = DISPATCH_ELEMENTS_MAX / rays, allowed = bvh->base.options.bench.bvh_elements;
-    const uint32_t maximum = allowed > 0 ? allowed : RAY_ELEMENTS_MAX;
+    const uint32_t fitting = DISPATCH_ELEMENTS_MAX / rays, maximum = bvh->base.device->facts.ray_tests_max;
     return fitting < maximum ? fitting : maximum;
 }
 
@@ -232,12 +224,10 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     const struct bvh_state *own = (const struct bvh_state *)state;
     const uint32_t packet_rays = own->packet_rays;
     const enum budget budget = budget_of(bvh, state);
-    struct gpu_define defines[11] = {{"TRACER_BVH", "1"}};
+    struct gpu_define defines[10] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
-    if (settings->bounds == BVH_BOUNDS_SPHERE)
+    if (settings->spheres)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
-    if (settings->plain)
-        defines[n++] = (struct gpu_define){"BVH_PLAIN", "1"};
     if (bvh_is_packed(settings))
         defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
     if (scene_tree_only_instance(&bvh->tree) != BVH_NONE)

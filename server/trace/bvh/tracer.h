@@ -29,8 +29,8 @@ float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave);
 
 /* What bvh_packet_rays() finds of most such waves. */
 uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave);
-/* The packet size for the wave: that of the options, else the faster one for the wave's coherence, which is
- * measured on a sample. 0: failed. */
+/* The packet size for the wave: the paper's, or the faster one for the wave's coherence, which is measured on a
+ * sample. 0: failed. */
 uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                          struct error *error);
 /* Whether an invocation traverses two packets, of that many rays, side by side. */

@@ -139,14 +139,14 @@ static void place_cube(struct ldc_store *store, unsigned which)
 }
 
 /* In one pass, which is the faster way wherever it was measured (software GL: 8.5 times at 8
- * layers, 40 times at 48); by peeling where that is asked for, or the lists of one pass have no room. */
+ * layers, 40 times at 48); by peeling in the paper's form, or where the lists of one pass have no room. */
 static bool begin(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
     uint64_t texels = (uint64_t)task->cube->first_texel + task->texel_count;
-    task->next = task->options->ldc.build == LDC_BUILD_PEEL ? ldc_peel : ldc_lists;
+    task->next = task->options->ldc.form == TRACER_FORM_PAPER ? ldc_peel : ldc_lists;
     if (texels > device->facts.texture_buffer_texels_max)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
                          "%llu texels are more than the device takes", (unsigned long long)texels);

@@ -40,7 +40,7 @@ bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
         .defines = defines,
         .cell_world = task->cube->cell_world,
         .resolution = task->cube->resolution,
-        .overlap = task->options->ldc.images == LDC_IMAGES_ONE ? 1.0f : AXES_OVERLAP,
+        .overlap = task->options->ldc.form == TRACER_FORM_PAPER ? 1.0f : AXES_OVERLAP,
         .set = set,
         .context = task,
     };

@@ -242,8 +242,7 @@ static bool begin(struct ldc_cells *cells, struct error *error)
 
 /* ---- the whole ---- */
 
-void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned which, uint32_t grid,
-                     bool on_device)
+void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned which, uint32_t grid)
 {
     struct ldc_cube *cube = &store->cubes[which];
     *cells = (struct ldc_cells){
@@ -252,7 +251,7 @@ void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned 
         .grid = grid,
         .next = begin,
         .counts.lower_nodes = {grid, grid, grid, 0},
-        .by_host = store->device->facts.software && !on_device,
+        .by_host = store->device->facts.builds_on_host,
     };
     cube->first_entry = cube->entry_count = 0;
     for (unsigned i = 0; i < which; i++)

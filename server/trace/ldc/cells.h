@@ -40,8 +40,7 @@ struct ldc_cells {
 /* Begins to write nodes, blocks and entries of cube `which`, whose samples are there, and where in it cells hold
  * something. `grid` is the number of nodes along a side; `on_device`: not by the host, whatever the device is. The
  * store must stay until it is done. */
-void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned which, uint32_t grid,
-                     bool on_device);
+void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned which, uint32_t grid);
 /* A pass of it. Queues the work; two of them read counts back. */
 enum tracer_progress ldc_cells_go_on(struct ldc_cells *cells, struct error *error);
 /* Lets go of it, done or not. */

@@ -11,34 +11,15 @@
 #include <stdio.h>
 
 #define RANGE_BYTES (2 * sizeof(float))
-/* 4 x 4 children: half the levels of 2 x 2. */
-#define PYRAMID_BITS 2
 
 struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint32_t resolution,
                                             const struct tracer_options *options)
 {
-    struct ldc_level_layout layout = {.blocks = options->ldc.levels == LDC_LEVELS_BLOCKS};
-    if (layout.blocks) {
-        uint32_t block = options->ldc.block;
-        while (2u << layout.bits <= block)
-            layout.bits++;
-        layout.top = 1;
-        layout.row = (resolution + block - 1) >> layout.bits;
-        layout.image_nodes = layout.row * layout.row;
-        return layout;
-    }
-    const bool may_have_cells = options->ldc.levels == LDC_LEVELS_AUTO && !(options->ldc.tolerance > 0);
-    if (options->ldc.levels == LDC_LEVELS_CELLS || (may_have_cells && !store->no_cells)) {
-        layout.cells = true;
-        layout.grid = (resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
-        return layout;
-    }
-    layout.bits = PYRAMID_BITS;
-    for (layout.top = 1; 1u << layout.bits * layout.top < resolution; layout.top++)
-        ;
-    for (uint32_t k = 0; k < layout.top; k++)
-        layout.image_nodes += 1u << 2 * layout.bits * k;
-    return layout;
+    const bool cells = options->ldc.form == TRACER_FORM_FAST && !store->no_cells;
+    const uint32_t shift = cells ? LDC_NODE_SHIFT : LDC_BLOCK_SHIFT,
+                   along = (resolution + (1u << shift) - 1) >> shift;
+    return cells ? (struct ldc_level_layout){.cells = true, .grid = along}
+                 : (struct ldc_level_layout){.row = along};
 }
 
 bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_count, uint64_t kept,
@@ -59,68 +40,27 @@ bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_c
     return ldc_store_grow(device, &store->nodes, (first + kept) * node_bytes, nodes * node_bytes, error);
 }
 
-/* Where the nodes of a level lie, or the texels. */
-struct place {
-    uint32_t first, row, width, image;
-};
-
-static struct place place_of(const struct ldc_cube *cube, const struct ldc_level_layout *layout, uint32_t level)
-{
-    uint32_t n = cube->resolution;
-    if (level == 0)
-        return (struct place){cube->first_texel, n, n, n * n};
-    if (layout->blocks)
-        return (struct place){cube->first_node, layout->row, layout->row, layout->image_nodes};
-    uint32_t above = layout->top - level, first = cube->first_node;
-    for (uint32_t k = 0; k < above; k++)
-        first += 1u << 2 * layout->bits * k;
-    uint32_t row = 1u << layout->bits * above;
-    return (struct place){first, row, row, layout->image_nodes};
-}
-
-static void set_place(const struct gpu_program *program, const char *which, const struct place *place)
-{
-    const struct {
-        const char *name;
-        uint32_t value;
-    } parts[] = {{"first", place->first}, {"row", place->row}, {"width", place->width}, {"image", place->image}};
-    for (size_t i = 0; i < sizeof(parts) / sizeof(*parts); i++) {
-        char name[32];
-        snprintf(name, sizeof(name), "%s_%s", parts[i].name, which);
-        gpu_uniform_uint(program, name, parts[i].value);
-    }
-}
-
-/* One level of them; the first time, room for all. */
-static enum tracer_progress build_ranges(struct ldc_levels *levels, struct error *error)
+/* Those of the three images of a cube; first room for them. */
+static enum tracer_progress build_blocks(struct ldc_levels *levels, struct error *error)
 {
     struct ldc_store *store = levels->store;
     struct ldc_cube *cube = &store->cubes[levels->at];
-    const struct ldc_level_layout *layout = &levels->layout;
-    const uint32_t level = ++levels->level;
-    if (level == 1 &&
-        !ldc_levels_reserve(store, levels->at, 3 * (uint64_t)layout->image_nodes, 0, RANGE_BYTES, error))
+    const uint64_t row = levels->layout.row, blocks = 3 * row * row;
+    const struct gpu_program_source source = {.compute = "ldc/levels.comp"};
+    if (!ldc_levels_reserve(store, levels->at, blocks, 0, RANGE_BYTES, error))
         return TRACER_FAILED;
-    char bits[4];
-    snprintf(bits, sizeof(bits), "%u", layout->bits);
-    const struct gpu_define defines[] = {
-        {"LDC_LEVEL_BITS", bits}, {level == 1 ? "LDC_FROM_TEXELS" : NULL, "1"}, {NULL, NULL}};
-    const struct gpu_program_source source = {.compute = "ldc/levels.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(store->device, &source, error);
     if (!program)
         return TRACER_FAILED;
-    const struct place below = place_of(cube, layout, level - 1), here = place_of(cube, layout, level);
-    if (level == 1) {
-        gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
-        gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
-    } else {
-        gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_0, GL_RG32F);
-    }
+    gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
     gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, GL_RG32F);
-    set_place(program, "below", &below);
-    set_place(program, "here", &here);
-    gpu_dispatch(store->device, program, 3 * (uint64_t)here.width * here.width);
-    return level < layout->top ? TRACER_MORE : TRACER_DONE;
+    gpu_uniform_uint(program, "first_texel", cube->first_texel);
+    gpu_uniform_uint(program, "first_block", cube->first_node);
+    gpu_uniform_uint(program, "resolution", cube->resolution);
+    gpu_uniform_uint(program, "row", (uint32_t)row);
+    gpu_dispatch(store->device, program, blocks);
+    return TRACER_DONE;
 }
 
 static void begin_cube(struct ldc_levels *levels, unsigned which)
@@ -128,13 +68,12 @@ static void begin_cube(struct ldc_levels *levels, unsigned which)
     struct ldc_store *store = levels->store;
     struct ldc_cube *cube = &store->cubes[which];
     levels->at = which;
-    levels->level = 0;
     cube->node_count = cube->entry_count = 0;
     if (cube->resolution == 0)
         return;
     levels->layout = ldc_level_layout_of(store, cube->resolution, levels->options);
     if (levels->layout.cells)
-        ldc_cells_begin(&levels->cells, store, which, levels->layout.grid, levels->options->bench.ldc_on_device);
+        ldc_cells_begin(&levels->cells, store, which, levels->layout.grid);
 }
 
 /* A unit of the cube in hand. */
@@ -144,7 +83,7 @@ static enum tracer_progress build_levels(struct ldc_levels *levels, struct error
     if (cube->resolution == 0)
         return TRACER_DONE;
     enum tracer_progress progress =
-        levels->layout.cells ? ldc_cells_go_on(&levels->cells, error) : build_ranges(levels, error);
+        levels->layout.cells ? ldc_cells_go_on(&levels->cells, error) : build_blocks(levels, error);
     if (progress == TRACER_FAILED)
         cube->node_count = cube->entry_count = 0;
     if (progress != TRACER_MORE)
@@ -152,11 +91,10 @@ static enum tracer_progress build_levels(struct ldc_levels *levels, struct error
     return progress;
 }
 
-/* Cells failed that were chosen automatically, as there are too many. */
-static bool may_have_ranges(const struct ldc_levels *levels, const struct error *of_cells)
+/* There are too many cells. */
+static bool may_have_blocks(const struct ldc_levels *levels, const struct error *of_cells)
 {
-    return levels->options->ldc.levels == LDC_LEVELS_AUTO && !levels->store->no_cells &&
-           (of_cells->kind == ERROR_LIMIT || of_cells->kind == ERROR_OUT_OF_MEMORY);
+    return levels->layout.cells && (of_cells->kind == ERROR_LIMIT || of_cells->kind == ERROR_OUT_OF_MEMORY);
 }
 
 void ldc_levels_begin(struct ldc_levels *levels, struct ldc_store *store, unsigned which,
@@ -175,8 +113,8 @@ enum tracer_progress ldc_levels_go_on(struct ldc_levels *levels, struct error *e
     gpu_push_group(store->device, "ldc levels");
     enum tracer_progress progress = build_levels(levels, &own);
     gpu_pop_group(store->device);
-    if (progress == TRACER_FAILED && may_have_ranges(levels, &own)) {
-        log_write(LOG_WARNING, "ldc", "%s: rays take the slower way by a pyramid", own.text);
+    if (progress == TRACER_FAILED && may_have_blocks(levels, &own)) {
+        log_write(LOG_WARNING, "ldc", "%s: rays take the slower way by blocks", own.text);
         gpu_buffer_finish(store->device, &store->entries);
         store->no_cells = true;
         begin_cube(levels, 0);

@@ -1,16 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The empty space of a cube that rays skip: by minimum and maximum depth over blocks of an image's texels (the
- * paper's two-level cube, section 1.3) or over all sizes of blocks, a pyramid; or, by default, by the occupied
- * cells of all three images together (ldc/cells.h).
+/* The empty space of a cube that rays skip: by the occupied cells of all three images together (ldc/cells.h); in
+ * the paper's form, and where cells do not fit, by minimum and maximum depth over blocks of an image's texels (the
+ * paper's two-level cube, section 1.3).
  *
  * Million reflected rays a second on two cores of software GL, a dragon of 47,000 triangles at a resolution of
- * 1024: blocks of 8 0.15, of 32 0.19, a pyramid of 2 x 2 children 0.25, of 4 x 4 0.29, of 8 x 8 0.26, cells 4.1.
- * Image by image a ray visits 130 nodes and 54 texels, whose depths it meets but whose planes it misses; by cells,
- * for all images at once, it visits 16 nodes and blocks and 3 cells, and ends with the first intersection. For
- * that cells take 0.2 seconds to build by shaders, and about half of that by the host, where a pyramid takes 0.02;
- * and 16 bytes for each cell that a sample's plane passes, about two per sample. The paper's test, a tolerance,
- * takes a pyramid: cells are of planes.
- */
+ * 1024: blocks 0.15, cells 4.1. Image by image a ray visits 130 nodes and 54 texels, whose depths it meets but
+ * whose planes it misses; by cells, for all images at once, it visits 16 nodes and blocks and 3 cells, and ends
+ * with the first intersection. For that cells take 0.2 seconds to build by shaders, and about half of that by the
+ * host, where blocks take 0.02; and 16 bytes for each cell that a sample's plane passes, about two per sample. */
 #ifndef FARLIGHT_TRACE_LDC_LEVELS_H
 #define FARLIGHT_TRACE_LDC_LEVELS_H
 
@@ -23,16 +20,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* How the nodes over an image lie in store.nodes: two floats each, level after level from the top, image after
- * image. A node of level l covers 2^(bits l) texels along a side; level 0 are the texels themselves. */
+/* How the nodes over a cube lie in store.nodes. */
 struct ldc_level_layout {
-    uint32_t bits;        /* log2 of the children along a side of a node */
-    uint32_t top;         /* the highest level */
-    uint32_t row;         /* blocks: nodes in a row; of a pyramid each level has 2^(bits (top - l)) */
-    uint32_t image_nodes; /* of one of the three */
-    bool blocks;          /* one level, not a pyramid up to a single node */
-    bool cells;           /* none of this, but nodes over cells of all three images: Cells of ldc/layout.h */
-    uint32_t grid;        /* cells: nodes along a side */
+    bool cells;    /* they are nodes over cells of all three images: Cells of ldc/layout.h; else blocks, two floats
+                      each, image after image, row after row */
+    uint32_t grid; /* cells: nodes along a side */
+    uint32_t row;  /* blocks: along a side of an image */
 };
 struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint32_t resolution,
                                             const struct tracer_options *options);
@@ -48,13 +41,12 @@ struct ldc_levels {
     const struct tracer_options *options;
     unsigned which, at; /* up to which cube, and the one in hand */
     struct ldc_level_layout layout;
-    uint32_t level; /* of ranges: the last that was made */
     struct ldc_cells cells;
 };
 
 /* Begins to write the nodes of cube `which`, whose samples are there. Where cells are more than the device takes
- * (of some twenty million samples on software GL) and were not asked for by name, all cubes get a pyramid. Store
- * and options must stay until it is done. */
+ * (of some twenty million samples on software GL), all cubes get blocks. Store and options must stay until it is
+ * done. */
 void ldc_levels_begin(struct ldc_levels *levels, struct ldc_store *store, unsigned which,
                       const struct tracer_options *options);
 /* A pass of it. Queues the work; some read counts back. */

@@ -10,17 +10,14 @@
 #include <stdio.h>
 
 static void set_cube(const struct gpu_program *program, unsigned slot, const struct ldc_cube *cube,
-                     const struct ldc_level_layout *layout, const struct tracer_options *options)
+                     const struct ldc_level_layout *layout)
 {
     const struct {
         const char *name;
         uint32_t value;
     } whole[] = {
-        {"ldc_resolution", cube->resolution},
-        {"ldc_first_texel", cube->first_texel},
-        {"ldc_first_node", cube->first_node},
-        {"ldc_top", layout->top},
-        {"ldc_row", layout->row},
+        {"ldc_resolution", cube->resolution}, {"ldc_first_texel", cube->first_texel},
+        {"ldc_first_node", cube->first_node}, {"ldc_row", layout->row},
         {"ldc_grid", layout->grid},
     };
     char name[32];
@@ -37,8 +34,6 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
     gpu_uniform_vec(program, name, 3, lower);
     snprintf(name, sizeof(name), "ldc_upper[%u]", slot);
     gpu_uniform_vec(program, name, 3, upper);
-    snprintf(name, sizeof(name), "ldc_tolerance[%u]", slot);
-    gpu_uniform_float(program, name, options->ldc.tolerance / cube->cell_world);
 }
 
 static void bind(struct ldc_store *store, bool cells)
@@ -73,29 +68,18 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
         if (store->cubes[i].resolution)
             cubes[cube_count++] = &store->cubes[i];
     cube_count = cube_count ? cube_count : 1;
-    char number_of_cubes[12], bits[4];
+    char number_of_cubes[12];
     snprintf(number_of_cubes, sizeof(number_of_cubes), "%u", cube_count);
     const struct ldc_level_layout layout = ldc_level_layout_of(store, cubes[0]->resolution, options);
-    snprintf(bits, sizeof(bits), "%u", layout.bits);
-    struct gpu_define defines[10] = {
-        {"TRACER_LDC", "1"},
-        {"LDC_CUBES", number_of_cubes},
-        {"LDC_LEVEL_BITS", bits},
-        {"LDC_LAYERS_TOGETHER", options->bench.ldc_layers_together == 1 ? "1" : "4"},
-    };
-    size_t n = 4;
-    if (options->bench.ldc_count_steps && rays->wave->kind == WAVE_CLOSEST)
-        defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
+    struct gpu_define defines[6] = {{"TRACER_LDC", "1"}, {"LDC_CUBES", number_of_cubes}};
+    size_t n = 2;
     if (layout.cells)
         defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
-    if (layout.blocks)
-        defines[n++] = (struct gpu_define){"LDC_BLOCKS", "1"};
-    if (options->ldc.tolerance > 0)
+    if (options->ldc.form == TRACER_FORM_PAPER)
         defines[n++] = (struct gpu_define){"LDC_TOLERANCE", "1"};
     const struct trace_program_source source = {
         .traverse = "ldc/traverse.glsl",
         .defines = defines,
-        .packet_rays = options->ldc.rays ? options->ldc.rays : 1,
         .rays_a_dispatch = trace_rays_a_dispatch(store->device, ldc_rounds_of_a_ray(store)),
     };
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
@@ -104,7 +88,7 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
     bind(store, layout.cells);
     for (unsigned i = 0; i < cube_count; i++) {
         const struct ldc_level_layout own = ldc_level_layout_of(store, cubes[i]->resolution, options);
-        set_cube(program, i, cubes[i], &own, options);
+        set_cube(program, i, cubes[i], &own);
     }
     trace_program_run(program, scene, rays, &source);
     return true;

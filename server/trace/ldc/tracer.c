@@ -49,10 +49,6 @@ struct ldc {
 
 static bool check_options(const struct tracer_options *options, struct error *error)
 {
-    const uint32_t layers = options->bench.ldc_layers_together;
-    if (layers != 0 && layers != 1 && layers != 4)
-        return error_set(error, ERROR_INVALID, "options.ldc_layers_together",
-                         "1 or 4 layers are tested together, not %u", layers);
     if (options->limits.ldc_layers > LDC_LAYERS_MAX)
         return error_set(error, ERROR_INVALID, "options.ldc_layers", "%u layers; at most %u can be kept",
                          options->limits.ldc_layers, LDC_LAYERS_MAX);
@@ -211,7 +207,7 @@ static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene
     const struct ldc_parts_settings settings = {
         .tracer = &ldc->base,
         .wish = ldc->wish,
-        .overlap = ldc->base.options.ldc.images == LDC_IMAGES_ONE ? 1.0f : AXES_OVERLAP,
+        .overlap = ldc->base.options.ldc.form == TRACER_FORM_PAPER ? 1.0f : AXES_OVERLAP,
     };
     bool any = changed & CHANGED_SURFACES;
     if (!ldc_parts_update(&ldc->parts, scene, &settings, changed & CHANGED_GEOMETRY, ldc->stale, error))

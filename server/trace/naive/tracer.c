@@ -12,14 +12,12 @@
 /* Of one dispatch: rays times primitives, which the slowest of GPUs takes a second for, and those of one ray, one
  * after the other. */
 #define DISPATCH_TESTS_MAX ((uint64_t)1 << 30)
-#define RAY_TESTS_MAX (1u << 16)
 /* Software GL (llvmpipe) leaves the loops of an invocation after 65535 rounds in all, without a word; what lies
  * behind would be missed. Materials that are evaluated at an intersection have loops of their own, whose rounds
  * count for each primitive, hit or not: five were measured. */
-#define SOFTWARE_ROUNDS_MAX 65000u
 #define ROUNDS_WITH_MATERIALS 8u
 /* On software GL a step of the smallest range of rays would take longer than a cancel may. */
-#define SOFTWARE_PRIMITIVES_MAX SOFTWARE_ROUNDS_MAX
+#define SOFTWARE_PRIMITIVES_MAX 65000u
 
 struct naive {
     struct tracer base;
@@ -54,7 +52,6 @@ static enum tracer_progress naive_update(struct tracer *tracer, struct gpu_scene
     struct naive *naive = (struct naive *)tracer;
     const bool software = tracer->device->facts.software;
     const uint32_t rounds = scene->has_cutout || scene->has_translucent ? ROUNDS_WITH_MATERIALS : 1;
-    const uint32_t allowed = tracer->options.bench.naive_tests;
     uint64_t primitives = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         primitives += scene->geometries[scene->instances[i].geometry].device.primitive_count;
@@ -64,7 +61,7 @@ static enum tracer_progress naive_update(struct tracer *tracer, struct gpu_scene
         error_remedy(error, "take another tracer");
         return TRACER_FAILED;
     }
-    naive->ray_tests_max = allowed > 0 ? allowed : software ? SOFTWARE_ROUNDS_MAX / rounds : RAY_TESTS_MAX;
+    naive->ray_tests_max = tracer->device->facts.ray_tests_max / (software ? rounds : 1);
     naive->has_parts = primitives + scene->instance_count > naive->ray_tests_max;
     return TRACER_DONE;
 }

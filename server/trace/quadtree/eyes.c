@@ -83,11 +83,10 @@ bool quadtree_finds_eyes(const struct quadtree_store *store, const struct gpu_sc
                          const struct frame_uniforms *frame, const struct tracer_options *options)
 {
     const struct quadtree_uniforms *u = &store->uniforms;
-    const bool is_plain = options->quadtree.hits == QUADTREE_HITS_PLANE && !options->bench.quadtree_stack &&
-                          !options->bench.quadtree_count_steps;
     const bool is_perspective = u->depths[2] == 0.0f && frame->extent_near[3] == 0.0f;
-    return is_plain && is_perspective && options->quadtree.faces == QUADTREE_FACES_VIEW &&
-           scene->disc_count == 0 && frame->lens[0] == 0.0f && is_near(u, frame) && goes_ahead(u, frame);
+    return quadtree_hits_planes(&options->quadtree) && is_perspective &&
+           options->quadtree.faces == QUADTREE_FACES_VIEW && scene->disc_count == 0 && frame->lens[0] == 0.0f &&
+           is_near(u, frame) && goes_ahead(u, frame);
 }
 
 /* ---- uniforms ---- */
@@ -134,19 +133,14 @@ struct programs {
 };
 
 /* Both may be announced. */
-static bool get_programs(const struct quadtree_store *store, bool spread, bool dda, struct programs *programs,
+static bool get_programs(const struct quadtree_store *store, bool spread, struct programs *programs,
                          struct error *error)
 {
     static const char *const numbers[QUADTREE_LAYERS_MAX + 1] = {"0", "1", "2", "3"};
-    struct gpu_define defines[4] = {0};
-    size_t n = 0;
-    if (dda)
-        defines[n++] = (struct gpu_define){"QUADTREE_DDA", "1"};
-    const struct gpu_program_source beams = {.compute = "quadtree/beams.comp", .defines = defines};
+    const struct gpu_define defines[] = {
+        {"QUADTREE_LAYERS", numbers[store->uniforms.layers]}, {spread ? "SPREAD" : NULL, "1"}, {NULL, NULL}};
+    const struct gpu_program_source beams = {.compute = "quadtree/beams.comp"};
     programs->beams = gpu_program_get(store->device, &beams, error);
-    defines[n++] = (struct gpu_define){"QUADTREE_LAYERS", numbers[store->uniforms.layers]};
-    if (spread)
-        defines[n++] = (struct gpu_define){"SPREAD", "1"};
     const struct gpu_program_source eyes = {.compute = "quadtree/eyes.comp", .defines = defines};
     programs->eyes = gpu_program_get(store->device, &eyes, error);
     return programs->eyes && programs->beams;
@@ -188,12 +182,11 @@ static void dispatch(const struct quadtree_store *store, const struct gpu_progra
 }
 
 bool quadtree_eye_hits(struct quadtree_store *store, struct quadtree_state *state, const struct eye_rays *rays,
-                       const struct tracer_options *options, struct error *error)
+                       struct error *error)
 {
-    const bool dda = options->quadtree.walk == QUADTREE_WALK_DDA;
     const uint32_t samples = rays->slot_count << rays->frame->sample_shift;
     struct programs programs;
-    if (!get_programs(store, rays->spread, dda, &programs, error) || !quadtree_trace_begin(&state->base, error))
+    if (!get_programs(store, rays->spread, &programs, error) || !quadtree_trace_begin(&state->base, error))
         return false;
     quadtree_store_bind(store);
     if (!make_beams(store, state, rays, programs.beams, error))

@@ -12,6 +12,6 @@ bool quadtree_finds_eyes(const struct quadtree_store *store, const struct gpu_sc
                          const struct frame_uniforms *frame, const struct tracer_options *options);
 /* As tracer_impl.eye_hits. */
 bool quadtree_eye_hits(struct quadtree_store *store, struct quadtree_state *state, const struct eye_rays *rays,
-                       const struct tracer_options *options, struct error *error);
+                       struct error *error);
 
 #endif

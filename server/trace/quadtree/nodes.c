@@ -233,14 +233,9 @@ static void clear_slice(struct quadtree_node_build *build, struct quadtree_store
 
 /* Level 1: of one slice, with its leaves. */
 static bool make_level(struct quadtree_node_build *build, struct quadtree_store *store, uint32_t slice,
-                       uint32_t level, uint64_t count, bool minmax, struct error *error)
+                       uint32_t level, uint64_t count, struct error *error)
 {
-    struct gpu_define defines[3] = {{0}};
-    unsigned n = 0;
-    if (level == 1)
-        defines[n++] = (struct gpu_define){"NODES_OF_LEAVES", "1"};
-    if (minmax)
-        defines[n++] = (struct gpu_define){"QUADTREE_MINMAX", "1"};
+    const struct gpu_define defines[] = {{level == 1 ? "NODES_OF_LEAVES" : NULL, "1"}, {NULL, NULL}};
     const struct gpu_program *program = program_get(store, "quadtree/nodes.comp", defines, error);
     if (!program)
         return false;
@@ -275,7 +270,7 @@ static bool find_nearest(struct quadtree_store *store, struct error *error)
 }
 
 enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, struct quadtree_store *store,
-                                          struct gpu_scene *scene, bool minmax, struct error *error)
+                                          struct gpu_scene *scene, struct error *error)
 {
     const struct quadtree_uniforms *uniforms = &store->uniforms;
     const uint32_t slices = slice_stages(uniforms),
@@ -293,7 +288,7 @@ enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, str
     if (level == 0)
         good = make_leaves(build, store, scene, slice, count, error);
     else if (build->stage + 1 < stage_count(uniforms))
-        good = make_level(build, store, slice, level, count, minmax, error);
+        good = make_level(build, store, slice, level, count, error);
     else
         good = find_nearest(store, error);
     gpu_pop_group(store->device);

@@ -37,7 +37,7 @@ uint32_t quadtree_nodes_units(const struct quadtree_store *store);
 bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error);
 /* A unit; queues the work. `minmax`: boxes only, but for leaves and where nothing is. */
 enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, struct quadtree_store *store,
-                                          struct gpu_scene *scene, bool minmax, struct error *error);
+                                          struct gpu_scene *scene, struct error *error);
 void quadtree_nodes_finish(struct quadtree_node_build *build, struct gpu_device *device); /* leaves it empty */
 uint64_t quadtree_nodes_bytes(const struct quadtree_node_build *build);
 

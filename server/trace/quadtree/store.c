@@ -14,9 +14,21 @@
 #define CUBE_TEXELS_MIN 256u
 #define CUBE_TEXELS_STEP 128u
 
+#define PAPER_COSINE 0.99862953f /* of 3 degrees: its gamma_norm */
+
+static bool is_paper(const struct quadtree_settings *settings)
+{
+    return settings->form == TRACER_FORM_PAPER;
+}
+
 uint32_t quadtree_layer_count(const struct quadtree_settings *settings)
 {
-    return settings->layers ? settings->layers : QUADTREE_LAYERS_MAX;
+    return settings->layers ? settings->layers : is_paper(settings) ? 1 : QUADTREE_LAYERS_MAX;
+}
+
+bool quadtree_hits_planes(const struct quadtree_settings *settings)
+{
+    return settings->hits == QUADTREE_HITS_PLANE || (settings->hits == QUADTREE_HITS_AUTO && is_paper(settings));
 }
 
 void quadtree_store_finish(struct quadtree_store *store)
@@ -150,11 +162,9 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     u->scale_centre[2] = (float)u->width / 2.0f;
     u->scale_centre[3] = (float)u->height / 2.0f;
     place_depths(u, scene, view);
-    u->bounds[0] =
-        error_of_w(u, view, settings) * (settings->hits == QUADTREE_HITS_PLANE ? 1.0f : ERROR_TO_PRIMITIVES);
-    u->bounds[1] = settings->angle < 90.0f ? cosf(settings->angle * 0.0174532925f) : 0.0f;
-    u->bounds[2] =
-        settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
+    u->bounds[0] = error_of_w(u, view, settings) * (quadtree_hits_planes(settings) ? 1.0f : ERROR_TO_PRIMITIVES);
+    u->bounds[1] = is_paper(settings) ? PAPER_COSINE : 0.0f;
+    u->bounds[2] = is_paper(settings) ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
     u->bounds[3] = settings->radius / u->depths[0];
     quadtree_drop_empty_faces(u, scene, &store->runs);
     u->padded_width = padded(u->width);

@@ -29,6 +29,7 @@ struct quadtree_store {
 
 /* How many are asked for. */
 uint32_t quadtree_layer_count(const struct quadtree_settings *settings);
+bool quadtree_hits_planes(const struct quadtree_settings *settings);
 void quadtree_store_finish(struct quadtree_store *store); /* leaves it empty */
 uint64_t quadtree_store_bytes(const struct quadtree_store *store);
 /* The view whose pixels are the texels of a view's face: `view` with its margin, at the resolution that is asked

@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-#define SOURCE_DEFINES 7
+#define SOURCE_DEFINES 4
 
 /* The buffer of counts. */
 struct counts {
@@ -112,19 +112,13 @@ static struct trace_program_source source_of(const struct tracer_options *option
 {
     size_t n = 0;
     defines[n++] = (struct gpu_define){"TRACER_QUADTREE", "1"};
-    if (options->quadtree.hits == QUADTREE_HITS_PLANE)
+    if (quadtree_hits_planes(&options->quadtree))
         defines[n++] = (struct gpu_define){"QUADTREE_PLANES", "1"};
     if (options->quadtree.faces == QUADTREE_FACES_VIEW)
         defines[n++] = (struct gpu_define){"QUADTREE_VIEW", "1"};
     else /* NVIDIA's compiler (driver 580) came to no end in minutes over the loops in one another, faces, layers,
             nodes */
         defines[n++] = (struct gpu_define){"PRAGMA", "optionNV(unroll none)"};
-    if (options->quadtree.walk == QUADTREE_WALK_DDA)
-        defines[n++] = (struct gpu_define){"QUADTREE_DDA", "1"};
-    if (options->bench.quadtree_stack)
-        defines[n++] = (struct gpu_define){"QUADTREE_STACK", "1"};
-    if (options->bench.quadtree_count_steps)
-        defines[n++] = (struct gpu_define){"QUADTREE_COUNT_STEPS", "1"};
     return (struct trace_program_source){.traverse = "quadtree/traverse.glsl", .defines = defines};
 }
 

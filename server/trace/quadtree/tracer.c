@@ -92,11 +92,9 @@ static bool begin_update(struct quadtree *quadtree, const struct gpu_scene *scen
 
 static enum tracer_progress do_unit(struct quadtree *quadtree, struct gpu_scene *scene, struct error *error)
 {
-    const struct quadtree_settings *settings = &quadtree->base.options.quadtree;
     const bool at_once = quadtree->base.step_end_ns == STEP_WITHOUT_END;
     if (quadtree->phase == QUADTREE_BUILD)
-        return quadtree_nodes_go_on(&quadtree->nodes, &quadtree->store, scene,
-                                    settings->nodes == QUADTREE_NODES_MINMAX, error);
+        return quadtree_nodes_go_on(&quadtree->nodes, &quadtree->store, scene, error);
     const enum tracer_progress progress = quadtree_layers_go_on(&quadtree->layers, scene, at_once, error);
     if (progress != TRACER_DONE)
         return progress;
@@ -213,8 +211,7 @@ static bool eye_hits(struct tracer *tracer, struct gpu_scene *scene, struct trac
                      const struct eye_rays *rays, struct error *error)
 {
     (void)scene;
-    return quadtree_eye_hits(&((struct quadtree *)tracer)->store, (struct quadtree_state *)state, rays,
-                             &tracer->options, error);
+    return quadtree_eye_hits(&((struct quadtree *)tracer)->store, (struct quadtree_state *)state, rays, error);
 }
 
 const struct tracer_impl tracer_quadtree_impl = {

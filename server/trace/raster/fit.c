@@ -191,21 +191,14 @@ struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32
     return layers;
 }
 
-static double hardware_times(const struct tracer *tracer)
-{
-    return tracer->device->facts.software ? 1 : AXES_HARDWARE_TIMES;
-}
-
-static double samples_max(const struct tracer *tracer)
-{
-    if (tracer->options.bench.axes_samples > 0)
-        return tracer->options.bench.axes_samples;
-    return AXES_SAMPLES_MAX * hardware_times(tracer);
-}
-
 uint32_t axes_greatest_resolution(const struct axes_wish *wish)
 {
     return wish->resolution > 0 ? wish->resolution : wish->usual;
+}
+
+double axes_times(const struct gpu_device *device)
+{
+    return (double)device->facts.axes_samples_max / AXES_SAMPLES_USUAL;
 }
 
 uint32_t axes_choose_resolution(const struct tracer *tracer, double layers, const struct axes_wish *wish)
@@ -214,7 +207,7 @@ uint32_t axes_choose_resolution(const struct tracer *tracer, double layers, cons
     if (wish->resolution > 0 || pixels == 0)
         return axes_greatest_resolution(wish);
     const double counted = pixels > AXES_PICTURE_PIXELS_MIN ? pixels : AXES_PICTURE_PIXELS_MIN;
-    const double samples = wish->samples_per_pixel * counted * hardware_times(tracer);
+    const double samples = wish->samples_per_pixel * counted * axes_times(tracer->device);
     const double fitting = fmax(sqrt(samples / (3 * (layers + AXES_TEXEL_COST))), AXES_FITTED_MIN);
     return (uint32_t)fmin(fitting, wish->usual);
 }
@@ -227,7 +220,7 @@ uint32_t axes_wanted_resolution(const struct tracer *tracer, const struct axes_w
 
 bool axes_fit_resolution(const struct tracer *tracer, double layers, uint32_t *resolution, struct error *error)
 {
-    const double maximum = samples_max(tracer);
+    const double maximum = (double)tracer->device->facts.axes_samples_max;
     if (!(layers * 3 * *resolution * *resolution > maximum))
         return true;
     const double fitting = sqrt(maximum / (3 * layers));

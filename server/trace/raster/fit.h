@@ -11,11 +11,11 @@
 #include "trace/structure.h"
 #include "trace/tracer.h"
 
-/* A structure of more samples than this is made coarser: what all three images have at 1024 texels along a side
- * where every texel has four layers; on a GPU, which is as much faster, and whose texel buffers end a little
- * farther on, eight times as many. */
-#define AXES_SAMPLES_MAX (4.0 * 3.0 * 1024.0 * 1024.0)
-#define AXES_HARDWARE_TIMES 8.0
+/* A structure of more samples than facts.axes_samples_max is made coarser. This many all three images have at 1024
+ * texels along a side where every texel has four layers: what software GL may have. A GPU, which is as much
+ * faster, and whose texel buffers end a little farther on, may have some times as many. */
+#define AXES_SAMPLES_USUAL (4.0 * 3.0 * 1024.0 * 1024.0)
+double axes_times(const struct gpu_device *device);
 /* Coarser than this, a picture would show nothing of what is so deep. */
 #define AXES_FITTED_MIN 128u
 

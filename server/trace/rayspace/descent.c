@@ -9,7 +9,6 @@
 #include "trace/program.h"
 
 #include <epoxy/gl.h>
-#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -26,10 +25,9 @@
  * one of hundreds, and so does a level of few nodes. */
 #define SEEDS_MAX 256u
 #define ITEMS_MAX (1u << 20) /* of a batch */
-#define ROUNDS 1u
-/* Where the host does not wait: passes that are queued for a round of the joint descent, whose two hierarchies
- * have some forty levels; of a batch of the flat one beyond those of the rays; and of how many passes leaves are
- * tested together. */
+/* Where the host does not wait: passes that are queued for the joint descent, whose two hierarchies have some
+ * forty levels; of a batch of the flat one beyond those of the rays; and of how many passes leaves are tested
+ * together. */
 #define PASSES_JOINT 64u
 #define PASSES_FLAT 16u
 #define PASSES_A_TEST 8u
@@ -45,35 +43,35 @@ bool rayspace_is_ahead(const struct rayspace_state *state)
     return state->base.wave.stopped && !state->base.patient;
 }
 
+static bool is_paper(const struct tracer_options *options)
+{
+    return options->rayspace.form == TRACER_FORM_PAPER;
+}
+
+bool rayspace_is_flat(const struct tracer_options *options)
+{
+    return is_paper(options) || options->rayspace.mode == RAYSPACE_MODE_FLAT;
+}
+
 static bool is_flat(const struct rayspace_state *state)
 {
-    return state->base.options.rayspace.mode == RAYSPACE_MODE_FLAT;
+    return rayspace_is_flat(&state->base.options);
 }
 
 /* Passes of their own reduce the stream. */
 static bool leaves_slots(const struct rayspace_state *state)
 {
-    return state->base.options.rayspace.reduce != RAYSPACE_REDUCE_CHUNK;
+    return is_paper(&state->base.options);
 }
 
-static uint32_t rounds_of(const struct rayspace_state *state)
+static struct gpu_buffer *stack_taken_from(struct rayspace_state *state)
 {
-    const uint32_t rounds = state->base.options.rayspace.rounds;
-    return rounds ? rounds : ROUNDS;
+    return &state->stacks[state->turn];
 }
 
-static struct rayspace_roles roles_of(const struct rayspace_state *state)
+static struct gpu_buffer *stack_written_to(struct rayspace_state *state)
 {
-    const uint32_t a = state->round % RAYSPACE_STACKS, b = (state->round + 1) % RAYSPACE_STACKS;
-    return (struct rayspace_roles){
-        .from = state->turn ? b : a, .to = state->turn ? a : b, .later = (state->round + 2) % RAYSPACE_STACKS};
-}
-
-/* What is farther from a node than this waits for the next round. */
-static float band_of(const struct rayspace_state *state, const struct gpu_scene *scene)
-{
-    const uint32_t rounds = rounds_of(state);
-    return state->round + 1 < rounds ? ldexpf(scene->diagonal, (int)(state->round + 1) - (int)rounds) : 3e38f;
+    return &state->stacks[!state->turn];
 }
 
 const struct gpu_program *rayspace_program_get(const struct gpu_scene *scene, const struct rayspace_state *state,
@@ -123,10 +121,10 @@ static uint32_t at_most(uint32_t number, uint32_t maximum)
 /* Pairs that each stack has room for, if memory allows. */
 static uint32_t capacity_of(const struct rayspace_state *state)
 {
-    const uint32_t rays = state->base.wave.ray_count, asked = state->base.options.bench.rayspace_pairs;
+    const uint32_t rays = state->base.wave.ray_count;
     const uint32_t wanted =
         rays < PAIRS_MIN / PAIRS_A_RAY ? PAIRS_MIN : at_most(rays, PAIRS_MAX / PAIRS_A_RAY) * PAIRS_A_RAY;
-    return at_most(asked ? asked : wanted, state->capacity_fits ? state->capacity_fits : UINT32_MAX);
+    return at_most(wanted, state->capacity_fits ? state->capacity_fits : UINT32_MAX);
 }
 
 /* Of them, for passes of one pair. */
@@ -138,8 +136,7 @@ static uint32_t reserved_of(const struct rayspace_state *state)
 /* Pairs of a pass, and items of a batch. What was halved for the last waves of the family is taken halved. */
 static uint32_t batch_of(const struct rayspace_state *state, uint32_t maximum)
 {
-    const uint32_t wanted = state->base.options.rayspace.batch;
-    const uint32_t batch = at_most(wanted ? wanted : maximum, maximum) >> state->halved[state->base.wave.family];
+    const uint32_t batch = maximum >> state->halved[state->base.wave.family];
     return batch > 0 ? batch : 1;
 }
 
@@ -163,9 +160,7 @@ static bool try_to_reserve(struct rayspace_state *state, struct gpu_device *devi
         good = good && gpu_buffer_reserve(device, &state->items,
                                           (size_t)state->batch_max * RAYSPACE_ITEM_TEXELS * sizeof(vec4), error);
     if (leaves_slots(state))
-        good = good && rayspace_reduction_reserve(device, &state->reduction,
-                                                  (enum rayspace_reduce)state->base.options.rayspace.reduce,
-                                                  pass_max(state, device), error);
+        good = good && rayspace_reduction_reserve(device, &state->reduction, pass_max(state, device), error);
     return good && gpu_buffer_reserve(device, &state->leaves, pair_bytes, error);
 }
 
@@ -176,7 +171,6 @@ static void release_stacks(struct rayspace_state *state, struct gpu_device *devi
     gpu_buffer_finish(device, &state->leaves);
     gpu_buffer_finish(device, &state->items);
     rayspace_reduction_finish(device, &state->reduction);
-    state->reduction = (struct rayspace_reduction){0};
 }
 
 /* Stacks that memory has no room for are halved, and stay so: passes then take fewer pairs. */
@@ -252,11 +246,11 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
     if (scene->disc_count > 0 && !test_discs(scene, state, error))
         return false;
-    state->round = state->next_rank = state->seeds = 0;
+    state->next_rank = state->seeds = 0;
     state->turn = false;
     if (!is_flat(state))
         put_seeds(state, device, rayspace->tree.top.element_count > 0);
-    return rayspace_order_rays(state, scene, error) && rayspace_nodes_build(state, scene, false, error);
+    return rayspace_order_rays(state, scene, error) && rayspace_nodes_build(state, scene, error);
 }
 
 /* ---- passes ---- */
@@ -277,21 +271,17 @@ static bool dispatch_control(struct rayspace_state *state, const struct gpu_scen
         gpu_program_get(scene->device, &(struct gpu_program_source){.compute = "rayspace/control.comp"}, error);
     if (!program)
         return false;
-    const struct rayspace_roles next = roles_of(state);
     gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
     if (wave->stopped)
         gpu_buffer_bind_storage(wave->stopped, BIND_RAYSPACE_STOPPED);
-    gpu_uniform_uint(program, "last_from", state->last.from);
-    gpu_uniform_uint(program, "last_to", state->last.to);
-    gpu_uniform_uint(program, "last_later", state->last.later);
-    gpu_uniform_uint(program, "from", next.from);
-    gpu_uniform_uint(program, "to", next.to);
-    gpu_uniform_uint(program, "later", next.later);
+    gpu_uniform_uint(program, "last_from", state->last_turn);
+    gpu_uniform_uint(program, "last_to", !state->last_turn);
+    gpu_uniform_uint(program, "from", state->turn);
+    gpu_uniform_uint(program, "to", !state->turn);
     gpu_uniform_uint(program, "capacity", state->capacity);
     gpu_uniform_uint(program, "leaves_wanted", leaves_wanted);
     gpu_uniform_uint(program, "limit_max", pass_max(state, scene->device));
     gpu_uniform_uint(program, "reserve", reserved_of(state));
-    gpu_uniform_float(program, "band", band_of(state, scene));
     gpu_uniform_uint(program, "children", children_with_room(state));
     gpu_uniform_uint(program, "seeds", state->seeds);
     gpu_uniform_uint(program, "ends", end);
@@ -379,7 +369,7 @@ static const struct gpu_program *pass_get(const struct rayspace *rayspace, const
         own[n++] = (struct gpu_define){"RAYSPACE_FLAT", "1"};
     else if (bvh_is_packed(&rayspace->tree.store.settings))
         own[n++] = (struct gpu_define){"RAYSPACE_PACKED", "1"};
-    if (state->base.options.rayspace.bounds == RAYSPACE_BOUNDS_SPHERE)
+    if (is_paper(&state->base.options))
         own[n++] = (struct gpu_define){"RAYSPACE_SPHERES", "1"};
     if (leaves_slots(state))
         own[n++] = (struct gpu_define){"RAYSPACE_TO_SLOTS", "1"};
@@ -394,15 +384,12 @@ static bool dispatch_pass(struct rayspace *rayspace, struct gpu_scene *scene, st
     const struct gpu_program *program = pass_get(rayspace, scene, state, error);
     if (!program)
         return false;
-    const struct rayspace_roles roles = roles_of(state);
     bind_descent(scene, rayspace, state, program);
     gpu_buffer_bind_texels(scene->device, &state->nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
-    gpu_buffer_bind_texels(scene->device, &state->stacks[roles.from], UNIT_RAYSPACE_PAIRS, GL_RGBA32UI);
-    gpu_buffer_bind_storage(leaves_slots(state) ? &state->reduction.slots : &state->stacks[roles.to],
+    gpu_buffer_bind_texels(scene->device, stack_taken_from(state), UNIT_RAYSPACE_PAIRS, GL_RGBA32UI);
+    gpu_buffer_bind_storage(leaves_slots(state) ? &state->reduction.slots : stack_written_to(state),
                             BIND_RAYSPACE_PAIRS);
-    gpu_buffer_bind_storage(&state->stacks[roles.later], BIND_RAYSPACE_PUT_OFF);
-    gpu_uniform_uint(program, "to", roles.to);
-    gpu_uniform_uint(program, "later", roles.later);
+    gpu_uniform_uint(program, "to", !state->turn);
     set_tree(program, &rayspace->tree);
     set_levels(program, &state->levels);
     gpu_uniform_float(program, "split_factor", SPLIT_FACTOR);
@@ -412,26 +399,16 @@ static bool dispatch_pass(struct rayspace *rayspace, struct gpu_scene *scene, st
     if (!leaves_slots(state))
         return true;
     const struct rayspace_lists lists = {.control = &state->control,
-                                         .pairs = &state->stacks[roles.to],
+                                         .pairs = stack_written_to(state),
                                          .leaves = &state->leaves,
-                                         .put_off = &state->stacks[roles.later],
-                                         .to = roles.to,
-                                         .later = roles.later};
+                                         .to = !state->turn};
     return rayspace_reduction_run(scene->device, &state->reduction, &lists, error);
 }
 
 static void next_pass(struct rayspace_state *state)
 {
-    state->last = roles_of(state);
+    state->last_turn = state->turn;
     state->turn = !state->turn;
-}
-
-/* Rays end at what they have hit, and what was far away has its turn. */
-static bool next_round(struct gpu_scene *scene, struct rayspace_state *state, struct error *error)
-{
-    state->round++;
-    state->turn = false;
-    return rayspace_nodes_build(state, scene, true, error);
 }
 
 /* The next primitives against the root. */
@@ -444,12 +421,11 @@ static bool next_batch(struct rayspace *rayspace, struct gpu_scene *scene, struc
     const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
     if (!program)
         return false;
-    state->round = 0;
     state->turn = false;
     state->seeds = at_most(rayspace->rank_count - state->next_rank, state->batch_max);
     gpu_buffer_bind_texels(scene->device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
     gpu_buffer_bind_storage(&state->items, BIND_RAYSPACE_ITEMS);
-    gpu_buffer_bind_storage(&state->stacks[roles_of(state).from], BIND_RAYSPACE_PAIRS);
+    gpu_buffer_bind_storage(stack_taken_from(state), BIND_RAYSPACE_PAIRS);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
     gpu_uniform_uint(program, "batch_first", state->next_rank);
     gpu_uniform_uint(program, "batch_count", state->seeds);
@@ -465,13 +441,6 @@ static bool has_more_batches(const struct rayspace *rayspace, const struct raysp
 }
 
 /* ---- with the host ---- */
-
-static bool is_empty(const struct rayspace_control *control, const struct rayspace_state *state)
-{
-    const uint32_t waiting[RAYSPACE_STACKS] = {control->waiting_0, control->waiting_1, control->waiting_2};
-    const struct rayspace_roles roles = roles_of(state);
-    return waiting[roles.from] + waiting[roles.to] + control->leaves == 0;
-}
 
 /* Until about that time. The host waits for each pass, and leaves out what there is none of. */
 static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gpu_scene *scene,
@@ -493,14 +462,10 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
             return TRACER_FAILED;
         if (control->taken > 0 && !dispatch_pass(rayspace, scene, state, error))
             return TRACER_FAILED;
-        const bool empty = is_empty(control, state);
         next_pass(state);
-        if (!empty) {
+        if (control->waiting_0 + control->waiting_1 + control->leaves > 0) {
             if (step_is_over(step_end_ns))
                 return TRACER_MORE;
-        } else if (control->waiting_0 + control->waiting_1 + control->waiting_2 > 0) {
-            if (!next_round(scene, state, error))
-                return TRACER_FAILED;
         } else if (has_more_batches(rayspace, state)) {
             if (!next_batch(rayspace, scene, state, error))
                 return TRACER_FAILED;
@@ -545,17 +510,9 @@ static bool descend_ahead(struct rayspace *rayspace, struct gpu_scene *scene, st
     do {
         if (is_flat(state) && has_more_batches(rayspace, state) && !next_batch(rayspace, scene, state, error))
             return false;
-        for (;;) {
-            if (!queue_passes(rayspace, scene, state, passes, error))
-                return false;
-            if (state->round + 1 >= rounds_of(state))
-                break;
-            if (!dispatch_control(state, scene, LEAVES_ALL, RAYSPACE_END_ROUND, error) ||
-                !dispatch_leaves(rayspace, scene, state, error) || !next_round(scene, state, error))
-                return false;
-        }
         const uint32_t end = has_more_batches(rayspace, state) ? RAYSPACE_END_BATCH : RAYSPACE_END_WAVE;
-        if (!dispatch_control(state, scene, LEAVES_ALL, end, error) ||
+        if (!queue_passes(rayspace, scene, state, passes, error) ||
+            !dispatch_control(state, scene, LEAVES_ALL, end, error) ||
             !dispatch_leaves(rayspace, scene, state, error))
             return false;
     } while (has_more_batches(rayspace, state));

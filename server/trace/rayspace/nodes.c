@@ -26,13 +26,12 @@ bool rayspace_nodes_reserve(struct rayspace_state *state, struct gpu_device *dev
     return gpu_buffer_reserve(device, &state->nodes, nodes * sizeof(struct rayspace_node), error);
 }
 
-bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene, bool ends, struct error *error)
+bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene, struct error *error)
 {
-    static const char *const passes[2][2] = {{NULL, "NODES_OF_RAYS"}, {"NODES_ENDS", "NODES_ENDS_OF_RAYS"}};
     struct gpu_device *device = scene->device;
     const struct rayspace_levels *levels = &state->levels;
     for (uint32_t level = 1; level <= levels->top; level++) {
-        const struct gpu_define own[] = {{passes[ends][level == 1], "1"}, {0}};
+        const struct gpu_define own[] = {{level == 1 ? "NODES_OF_RAYS" : NULL, "1"}, {0}};
         const struct gpu_program *program = rayspace_program_get(scene, state, "rayspace/nodes.comp", own, error);
         if (!program)
             return false;

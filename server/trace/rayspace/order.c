@@ -39,13 +39,12 @@ static void bind(const struct gpu_scene *scene, struct rayspace_state *state, co
 
 static bool sample(struct rayspace_state *state, struct gpu_scene *scene, struct error *error)
 {
-    const struct rayspace_settings *settings = &state->base.options.rayspace;
     const struct gpu_program *program = rayspace_program_get(scene, state, "rayspace/sample.comp", NULL, error);
     if (!program)
         return false;
     bind(scene, state, program);
-    gpu_uniform_uint(program, "sorts", settings->sort);
-    gpu_uniform_uint(program, "turns", settings->turn);
+    gpu_uniform_uint(program, "sorts", state->sorts);
+    gpu_uniform_uint(program, "turns", state->turns);
     gpu_dispatch(scene->device, program, 1);
     return true;
 }
@@ -80,13 +79,12 @@ bool rayspace_order_reserve(struct rayspace_state *state, struct gpu_device *dev
 
 bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error)
 {
-    const struct rayspace_settings *settings = &state->base.options.rayspace;
     /* Rays that are alone from the beginning have no order. */
-    if (state->levels.top == 0 && settings->sort != RAYSPACE_CHANCE_ON && settings->turn != RAYSPACE_CHANCE_ON)
+    if (state->levels.top == 0 && state->sorts != RAYSPACE_CHANCE_ON && state->turns != RAYSPACE_CHANCE_ON)
         return true;
     if (!sample(state, scene, error))
         return false;
-    if (settings->sort == RAYSPACE_CHANCE_OFF)
+    if (state->sorts == RAYSPACE_CHANCE_OFF)
         return true;
     if (!rayspace_is_ahead(state)) {
         gpu_buffer_read(scene->device, &state->control, 0, &state->told, sizeof(state->told));

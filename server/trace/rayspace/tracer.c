@@ -12,8 +12,7 @@ static struct tracer *rayspace_create(struct gpu_device *device, const struct tr
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
     }
-    const struct bvh_form form = {
-        .bounds = BVH_BOUNDS_BOX, .one_order = true, .refit_by_height = !device->facts.software};
+    const struct bvh_form form = {.one_order = true, .refit_by_height = !device->facts.software};
     scene_tree_init(&rayspace->tree, device, &form, &rayspace->base.stats);
     return &rayspace->base;
 }
@@ -64,7 +63,7 @@ static enum tracer_progress rayspace_update(struct tracer *tracer, struct gpu_sc
 {
     struct rayspace *rayspace = (struct rayspace *)tracer;
     enum tracer_progress progress = TRACER_DONE;
-    if (tracer->options.rayspace.mode == RAYSPACE_MODE_JOINT)
+    if (!rayspace_is_flat(&tracer->options))
         progress = scene_tree_update(&rayspace->tree, scene, update, tracer->step_end_ns, error);
     if (progress == TRACER_DONE && update->changed & (CHANGED_GEOMETRY | CHANGED_INSTANCES) &&
         !upload_ranks(rayspace, scene, error))
@@ -91,8 +90,12 @@ static bool rayspace_waits(struct tracer *tracer)
 static struct trace_state *rayspace_state_create(struct gpu_device *device, const struct tracer_options *options,
                                                  struct error *error)
 {
-    (void)device, (void)options;
+    (void)device;
     struct rayspace_state *state = calloc(1, sizeof(*state));
+    if (state && options->rayspace.form == TRACER_FORM_PAPER) {
+        state->sorts = RAYSPACE_CHANCE_OFF;
+        state->turns = RAYSPACE_CHANCE_ON; /* section 3.5.1 */
+    }
     if (state)
         return &state->base;
     error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the state of a wave");

@@ -24,10 +24,8 @@ struct rayspace_levels {
     uint32_t first[RAYSPACE_LEVELS], count[RAYSPACE_LEVELS];
 };
 
-/* A stack has another part in every round: pairs go to and fro between two, and from both onto the third. */
-struct rayspace_roles {
-    uint32_t from, to, later;
-};
+/* Whether something is done to the rays of a wave: where a sample of them says that it pays, always, never. */
+enum rayspace_chance { RAYSPACE_CHANCE_AUTO, RAYSPACE_CHANCE_ON, RAYSPACE_CHANCE_OFF };
 
 /* Of one wave. */
 struct rayspace_state {
@@ -41,12 +39,11 @@ struct rayspace_state {
     uint32_t capacity;                 /* pairs, of each stack and of the leaves */
     uint32_t capacity_fits;            /* at most so many, as memory was short; 0: it was not */
     struct rayspace_reduction reduction;
-    uint32_t batch_max; /* items */
-    uint32_t next_rank; /* the first primitive of the next batch */
-    uint32_t seeds;     /* pairs that were put onto the stack of the next pass */
-    uint32_t round;
-    bool turn;                    /* from the second stack onto the first */
-    struct rayspace_roles last;   /* of the last pass */
+    uint32_t batch_max;   /* items */
+    uint32_t next_rank;   /* the first primitive of the next batch */
+    uint32_t seeds;       /* pairs that were put onto the stack of the next pass */
+    bool turn, last_turn; /* from the second stack onto the first; of the last pass */
+    enum rayspace_chance sorts, turns;
     struct rayspace_control told; /* as the host has last seen it */
     /* Halvings of the batch that the last waves of a family needed. */
     uint8_t halved[WAVE_FAMILIES];
@@ -67,8 +64,7 @@ struct rayspace_levels rayspace_levels_over(uint32_t ray_count);
 /* Memory for the nodes of the levels, and for the order of the rays. */
 bool rayspace_nodes_reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error);
 bool rayspace_order_reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error);
-/* Builds the nodes. `ends`: only how far rays go on. */
-bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene, bool ends, struct error *error);
+bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene, struct error *error);
 /* Decides whether the rays are sorted and turned round, and sorts them. The control is there. */
 bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error);
 
@@ -77,6 +73,8 @@ bool rayspace_counts_add(struct rayspace_state *state, struct gpu_scene *scene, 
 bool rayspace_counts_copy(struct trace_state *state, struct error *error);
 bool rayspace_counts_tell(struct trace_state *state, struct structure_rows *rows, struct error *error);
 
+/* The paper's descent; else that of both hierarchies. */
+bool rayspace_is_flat(const struct tracer_options *options);
 /* Whether all of a wave is queued without the host seeing how far it has come. */
 bool rayspace_is_ahead(const struct rayspace_state *state);
 /* Sets the descent to its beginning; passes until about that time, or all; the answers to the wave's hits. */

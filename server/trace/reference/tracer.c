@@ -124,12 +124,7 @@ static void reference_destroy(struct tracer *tracer)
 static struct tracer *reference_create(struct gpu_device *device, const struct tracer_options *options,
                                        struct error *error)
 {
-    uint32_t width = options->bench.reference_rays;
-    if (width != 0 && width != 1 && width != 4 && width != 8 && width != 16) {
-        error_set(error, ERROR_INVALID, "options.reference_rays", "1, 4, 8 or 16 rays go into a call, not %u",
-                  width);
-        return NULL;
-    }
+    (void)options;
     struct reference *reference = calloc(1, sizeof(*reference));
     if (!reference) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
@@ -146,7 +141,7 @@ static struct tracer *reference_create(struct gpu_device *device, const struct t
     }
     rtcSetDeviceErrorFunction(reference->device, note_failure, reference);
     rtcSetDeviceMemoryMonitorFunction(reference->device, count_memory, reference);
-    reference->width = width ? width : native_width(reference->device);
+    reference->width = native_width(reference->device);
     if (!check_features(reference->device, error)) {
         reference_destroy(&reference->base);
         return NULL;

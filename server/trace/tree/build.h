@@ -86,9 +86,8 @@ struct bvh_refit_plan {
 };
 
 struct bvh_form {
-    enum bvh_bounds bounds;
-    bool plain;              /* the paper's elements, in one order for every direction */
-    bool one_order;          /* likewise for any elements: it is not traversed by direction */
+    bool spheres;            /* bounds are spheres, not boxes */
+    bool one_order;          /* for every direction */
     bool whole;              /* boxes in floats, not on a grid */
     bool refit_by_height;    /* every height has a dispatch when a tree is refitted, however few elements it has */
     unsigned threads;        /* at most; small shapes take one */

@@ -18,12 +18,12 @@
 
 uint32_t bvh_octants(const struct bvh_form *settings)
 {
-    return settings->plain || settings->one_order ? 1 : BVH_OCTANTS;
+    return settings->one_order ? 1 : BVH_OCTANTS;
 }
 
 bool bvh_is_packed(const struct bvh_form *settings)
 {
-    return settings->bounds == BVH_BOUNDS_BOX && !settings->plain && !settings->whole;
+    return !settings->spheres && !settings->whole;
 }
 
 uint32_t bvh_element_words(const struct bvh_form *settings)

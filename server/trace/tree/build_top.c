@@ -29,7 +29,7 @@ static void set_element(struct bvh_top *top, uint32_t e)
 {
     const struct bvh_world_box *box = &top->boxes[e];
     struct bvh_bound bound;
-    if (top->settings.bounds == BVH_BOUNDS_BOX) {
+    if (!top->settings.spheres) {
         bound = bvh_bound_of_box(box->lower, box->upper);
         uint32_t cells[3][2];
         top->left_grid = top->left_grid || (bvh_is_packed(&top->settings) &&

@@ -226,7 +226,7 @@ static void survey(struct work *work)
 {
     const struct bvh_baked *baked = &work->draft->baked;
     struct bvh_tree *tree = work->tree;
-    bool has_grid = work->settings->bounds == BVH_BOUNDS_BOX && !work->settings->plain;
+    bool has_grid = !work->settings->spheres;
     uint32_t step = baked->element_count / SURVEYED_ELEMENTS + 1, count = 0, leaf_count = 0;
     float cost_sum = 0, extent_sum = 0;
     for (uint32_t e = 0; e < baked->element_count; e += step, count++) {
@@ -323,7 +323,7 @@ static bool plan(struct work *work)
     struct bvh_draft *draft = work->draft;
     if (!draft || !build_binary(work))
         return false;
-    if (work->settings->bounds == BVH_BOUNDS_SPHERE && !make_spheres(work))
+    if (work->settings->spheres && !make_spheres(work))
         return false;
     if (is_stopped(work) ||
         !bvh_bake(&draft->baked, &draft->binary, draft->binary.areas, bvh_octants(work->settings), work->threads))
@@ -337,7 +337,7 @@ static bool plan(struct work *work)
     tree->primitive_texels = bvh_primitive_texels(work->shape);
     if (is_stopped(work))
         return false;
-    return !work->shape->deforms || work->settings->plain || make_plan(work);
+    return !work->shape->deforms || make_plan(work);
 }
 
 static void free_draft(struct bvh_tree *tree)

@@ -92,7 +92,7 @@ bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const s
 {
     struct gpu_define defines[3] = {{NULL, NULL}};
     size_t n = 0;
-    if (settings->bounds == BVH_BOUNDS_SPHERE)
+    if (settings->spheres)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
     else if (bvh_is_packed(settings))
         defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};

@@ -75,14 +75,13 @@ uint64_t bvh_store_bytes(const struct bvh_store *store)
 
 /* ---- memory ---- */
 
-/* The capacity of a texel buffer (or a storage buffer, for the plain form's elements). */
+/* The capacity of a texel buffer. */
 static bool check_limits(const struct bvh_store *store, uint64_t elements, uint64_t texels, struct error *error)
 {
     const struct gpu_facts *facts = &store->device->facts;
     uint64_t texels_max = facts->texture_buffer_texels_max;
     size_t element_texels = bvh_element_bytes(&store->settings) / TEXEL_BYTES;
-    uint64_t elements_max = store->settings.plain ? facts->storage_block_bytes_max / sizeof(struct bvh_element)
-                                                  : texels_max / element_texels;
+    uint64_t elements_max = texels_max / element_texels;
     if (elements_max > INT32_MAX / element_texels)
         elements_max = INT32_MAX / element_texels;
     if (elements > elements_max)

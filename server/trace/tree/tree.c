@@ -319,10 +319,7 @@ uint32_t scene_tree_only_instance(const struct scene_tree *tree)
 void scene_tree_bind(struct scene_tree *tree)
 {
     struct bvh_store *store = &tree->store;
-    if (store->settings.plain)
-        gpu_buffer_bind_storage(&store->elements, BIND_TRACER_0);
-    else
-        gpu_buffer_bind_texels(store->device, &store->elements, UNIT_TRACER_0, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->elements, UNIT_TRACER_0, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &tree->transform_buffer, UNIT_TRACER_1, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_2, GL_RGBA32UI);
 }

@@ -47,9 +47,9 @@ TEST(every_value_of_every_enum_has_a_text_that_parses_back)
 TEST(the_list_of_an_enum_is_cut_where_it_does_not_fit)
 {
     char list[64];
-    assert_string_equal(protocol_enum_list("bvh_bounds", list, sizeof(list)), "auto, box, sphere");
-    assert_string_equal(protocol_enum_list("bvh_bounds", list, 10), "auto, box");
-    assert_string_equal(protocol_enum_list("bvh_bounds", list, 1), "");
+    assert_string_equal(protocol_enum_list("quadtree_hits", list, sizeof(list)), "auto, primitive, plane");
+    assert_string_equal(protocol_enum_list("quadtree_hits", list, 16), "auto, primitive");
+    assert_string_equal(protocol_enum_list("quadtree_hits", list, 1), "");
     assert_string_equal(protocol_enum_list("no such enum", list, sizeof(list)), "");
 }
 

@@ -51,7 +51,7 @@ TEST(zero_is_the_default_of_every_setting)
     assert_true(tracer_settings_check(&settings, "", &fault));
     message_init(&message, MESSAGE_RENDER);
     assert_memory_equal(&settings, &message.render.settings, sizeof(settings));
-    assert_int_equal(settings.ldc.block, 8);
+    assert_true(settings.quadtree.pixels == 0.25f);
     assert_int_equal(settings.ldc.resolution, 0); /* the tracer chooses */
 }
 
@@ -69,20 +69,15 @@ TEST(a_wrong_setting_is_reported_with_its_name_and_what_is_allowed)
 {
     expect_fault(&(struct tracer_settings){.ldc = {.resolution = 15}}, "render.", "render.ldc_resolution",
                  "15 is not one of auto, 16 to 4096", "");
-    expect_fault(&(struct tracer_settings){.ldc = {.block = 12}}, "--", "--ldc-block",
-                 "12 is not one of 2, 4, 8, 16, 32 (0: 8)", "");
-    expect_fault(&(struct tracer_settings){.bvh = {.rays = 5}}, "", "bvh_rays", "auto, 1, 2, 3, 4, 8", "");
-    expect_fault(&(struct tracer_settings){.abuffer = {.search = 9}}, "", "abuffer_search", "auto, dda", "");
+    expect_fault(&(struct tracer_settings){.abuffer = {.voxels = 100}}, "--", "--abuffer-voxels",
+                 "100 is not one of auto, 16, 32, 64, 128, 256", "");
+    expect_fault(&(struct tracer_settings){.bvh = {.form = 9}}, "", "bvh_form", "fast, paper", "");
 }
 
 TEST(settings_that_contradict_each_other_are_reported_with_both_names)
 {
     struct setting_fault fault;
-    struct tracer_settings settings = {.ldc = {.levels = PROTOCOL_LDC_LEVELS_CELLS, .tolerance = 1}};
-    expect_fault(&settings, "--", "--ldc-levels", "cells cannot be combined with --ldc-tolerance", "leave out");
-    settings.ldc.levels = PROTOCOL_LDC_LEVELS_PYRAMID;
-    assert_true(tracer_settings_check(&settings, "--", &fault));
-    settings.abuffer.voxels = 64;
+    struct tracer_settings settings = {.abuffer.voxels = 64};
     assert_true(tracer_settings_check(&settings, "--", &fault)); /* of as many texels as the tracer chooses */
     settings.abuffer.resolution = 32;
     expect_fault(&settings, "render.", "render.abuffer_voxels",

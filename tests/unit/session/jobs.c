@@ -173,7 +173,7 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     message.render.focus = 7;
     message.render.shutter = 0.5f;
     message.render.pixel_filter = PROTOCOL_FILTER_TENT;
-    message.render.settings.bvh.rays = 3;
+    message.render.settings.bvh.form = PROTOCOL_TRACER_FORM_PAPER;
     message.render.accumulate = PROTOCOL_ACCUMULATION_ON;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
@@ -186,7 +186,7 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     assert_true(engine.job_clips[0].speed == 0.5f && engine.job_clips[0].loop);
     assert_true(engine.job_clips[1].clip == 5 && engine.job_clips[1].speed == 3.0f && !engine.job_clips[1].loop);
     assert_true(job->shutter == 0.5f && job->frame.filter == FILTER_TENT && job->frame.accumulate);
-    assert_int_equal(job->frame.tracer_options.bvh.rays, 3);
+    assert_int_equal(job->frame.tracer_options.bvh.form, TRACER_FORM_PAPER);
     take_rest();
 }
 
@@ -222,23 +222,13 @@ SESSION_TEST(settings_of_cubes_go_to_the_engine_with_the_daemons_limits)
     struct message message = render_message(0, 1);
     message.render.tracer = PROTOCOL_TRACER_LDC;
     message.render.settings.ldc.resolution = 16;
-    message.render.settings.ldc.block = 32;
-    message.render.settings.ldc.build = PROTOCOL_LDC_BUILD_LISTS;
-    message.render.settings.ldc.levels = PROTOCOL_LDC_LEVELS_BLOCKS;
-    message.render.settings.ldc.images = PROTOCOL_LDC_IMAGES_ONE;
-    message.render.settings.ldc.tolerance = 0.25f;
-    message.render.settings.ldc.rays = 4;
+    message.render.settings.ldc.form = PROTOCOL_TRACER_FORM_PAPER;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
     assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_LDC);
     const struct tracer_options *options = &engine.job.frame.tracer_options;
     assert_int_equal(options->ldc.resolution, 16);
-    assert_int_equal(options->ldc.block, 32);
-    assert_int_equal(options->ldc.build, LDC_BUILD_LISTS);
-    assert_int_equal(options->ldc.levels, LDC_LEVELS_BLOCKS);
-    assert_int_equal(options->ldc.images, LDC_IMAGES_ONE);
-    assert_true(options->ldc.tolerance == 0.25f);
-    assert_int_equal(options->ldc.rays, 4);
+    assert_int_equal(options->ldc.form, TRACER_FORM_PAPER);
     assert_int_equal(options->limits.ldc_layers, 7);
     assert_int_equal(options->limits.ldc_mebibytes, 3);
     take_rest();
@@ -386,16 +376,12 @@ SESSION_TEST(settings_that_no_tracer_has_are_refused_by_their_field)
     } cases[] = {
         {{.ldc.resolution = 1}, "render.ldc_resolution", "16 to 4096"},
         {{.ldc.resolution = 15}, "render.ldc_resolution", "16 to 4096"},
-        {{.ldc.block = 1}, "render.ldc_block", "16, 32"},
-        {{.ldc.block = 24}, "render.ldc_block", "16, 32"},
-        {{.ldc.rays = 2}, "render.ldc_rays", "1, 4"},
-        {{.ldc = {.levels = PROTOCOL_LDC_LEVELS_CELLS, .tolerance = 0.5f}}, "render.ldc_levels", ""},
+        {{.ldc.form = 2}, "render.ldc_form", "fast, paper"},
         {{.abuffer.resolution = 15}, "render.abuffer_resolution", "16 to 4096"},
         {{.abuffer.voxels = 8}, "render.abuffer_voxels", "16, 32, 64"},
         {{.abuffer.voxels = 100}, "render.abuffer_voxels", "16, 32, 64"},
         {{.abuffer = {.resolution = 32, .voxels = 64}}, "render.abuffer_voxels", "the 32 texels"},
-        {{.bvh.rays = 5}, "render.bvh_rays", "1, 2, 3"},
-        {{.bvh.rays = 7}, "render.bvh_rays", "1, 2, 3"},
+        {{.bvh.form = 7}, "render.bvh_form", "fast, paper"},
     };
     open_scene(1, 1);
     for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
@@ -442,7 +428,7 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
     message.render.tracer = PROTOCOL_TRACER_ABUFFER;
     message.render.settings.abuffer.resolution = 64;
     message.render.settings.abuffer.voxels = 64;
-    message.render.settings.abuffer.search = PROTOCOL_ABUFFER_SEARCH_LINEAR1;
+    message.render.settings.abuffer.form = PROTOCOL_TRACER_FORM_PAPER;
     message.render.integrator = PROTOCOL_INTEGRATOR_PATH;
     message.render.brdf = PROTOCOL_BRDF_WARD;
     message.render.ao_distance = 2;
@@ -459,7 +445,7 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
     const struct frame_request *request = &engine.job.frame;
     assert_int_equal(request->tracer_options.abuffer.resolution, 64);
     assert_int_equal(request->tracer_options.abuffer.voxels, 64);
-    assert_int_equal(request->tracer_options.abuffer.search, ABUFFER_SEARCH_LINEAR1);
+    assert_int_equal(request->tracer_options.abuffer.form, TRACER_FORM_PAPER);
     assert_int_equal(request->tracer_options.limits.abuffer_mebibytes, 1);
     assert_int_equal(request->integrator, INTEGRATOR_PATH);
     assert_int_equal(request->brdf, BRDF_WARD);

@@ -297,12 +297,12 @@ TEST(a_clip_plays_pauses_and_begins_again_at_its_end)
     assert_int_equal(tour_clip(&tour, -1), 1);
 }
 
-/* What the panel says of a setting of `ldc`. */
+/* What the panel says of a setting of the tracer. */
 static const char *panel_says(const struct settings *settings, const char *name)
 {
     static char text[40];
     const struct field_desc *setting;
-    for (size_t i = 0; (setting = panel_setting(PROTOCOL_TRACER_LDC, i)); i++)
+    for (size_t i = 0; (setting = panel_setting(settings->tracer, i)); i++)
         if (strcmp(setting->name, name) == 0)
             panel_value(setting, &settings->tracers, text, sizeof(text));
     return text;
@@ -317,7 +317,8 @@ static void choose(struct settings *settings, const char *name)
 
 TEST(the_panel_changes_settings_of_every_kind_within_their_ranges)
 {
-    struct settings settings = {.tracer = PROTOCOL_TRACER_LDC, .tracers.ldc.resolution = 1000};
+    struct settings settings = {.tracer = PROTOCOL_TRACER_LDC,
+                                .tracers = {.ldc.resolution = 1000, .quadtree.pixels = 0.25f}};
     assert_int_equal(settings_act(&settings, ACTION_STEP_ON), SETTINGS_SAME); /* there is no panel yet */
     assert_int_equal(settings_act(&settings, ACTION_PANEL), SETTINGS_DRAWN);
     choose(&settings, "ldc_resolution");
@@ -330,30 +331,27 @@ TEST(the_panel_changes_settings_of_every_kind_within_their_ranges)
     for (int i = 0; i < 20; i++)
         settings_act(&settings, ACTION_STEP_BACK);
     assert_string_equal(panel_says(&settings, "ldc_resolution"), "16");
-    choose(&settings, "ldc_tolerance");
-    assert_int_equal(settings_act(&settings, ACTION_STEP_BACK), SETTINGS_SAME);
+    choose(&settings, "ldc_form");
     settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_form"), "paper");
     settings_act(&settings, ACTION_STEP_ON);
-    assert_string_equal(panel_says(&settings, "ldc_tolerance"), "0.002");
-    for (int i = 0; i < 3; i++)
-        settings_act(&settings, ACTION_STEP_BACK);
-    assert_string_equal(panel_says(&settings, "ldc_tolerance"), "0");
-    choose(&settings, "ldc_block"); /* 2, 4, 8, 16, 32; zero stands for 8 */
-    settings_act(&settings, ACTION_STEP_ON);
-    assert_string_equal(panel_says(&settings, "ldc_block"), "16");
-    settings_act(&settings, ACTION_STEP_ON);
-    settings_act(&settings, ACTION_STEP_ON);
-    assert_string_equal(panel_says(&settings, "ldc_block"), "2");
-    choose(&settings, "ldc_rays"); /* auto, 1, 4 */
+    assert_string_equal(panel_says(&settings, "ldc_form"), "fast");
+    settings.tracer = PROTOCOL_TRACER_ABUFFER;
+    choose(&settings, "abuffer_voxels"); /* auto, 16, 32, 64, 128, 256 */
     settings_act(&settings, ACTION_STEP_BACK);
-    assert_string_equal(panel_says(&settings, "ldc_rays"), "4");
+    assert_string_equal(panel_says(&settings, "abuffer_voxels"), "256");
     settings_act(&settings, ACTION_STEP_ON);
-    assert_string_equal(panel_says(&settings, "ldc_rays"), "auto");
-    choose(&settings, "ldc_images");
+    assert_string_equal(panel_says(&settings, "abuffer_voxels"), "auto");
     settings_act(&settings, ACTION_STEP_ON);
-    assert_string_equal(panel_says(&settings, "ldc_images"), "one");
+    assert_string_equal(panel_says(&settings, "abuffer_voxels"), "16");
+    settings.tracer = PROTOCOL_TRACER_QUADTREE;
+    choose(&settings, "quadtree_pixels"); /* 0.001 to 64 */
     settings_act(&settings, ACTION_STEP_ON);
-    assert_string_equal(panel_says(&settings, "ldc_images"), "overlap");
+    assert_string_equal(panel_says(&settings, "quadtree_pixels"), "0.5");
+    for (int i = 0; i < 30; i++)
+        settings_act(&settings, ACTION_STEP_BACK);
+    assert_string_equal(panel_says(&settings, "quadtree_pixels"), "0.001");
+    assert_int_equal(settings_act(&settings, ACTION_STEP_BACK), SETTINGS_SAME);
     settings.tracer = PROTOCOL_TRACER_REFERENCE; /* which has none */
     assert_int_equal(settings_act(&settings, ACTION_DOWN), SETTINGS_SAME);
     assert_int_equal(settings_act(&settings, ACTION_STEP_ON), SETTINGS_SAME);

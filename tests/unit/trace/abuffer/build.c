@@ -240,6 +240,10 @@ static void expect_scene_like_oracle(struct scene *scene,
     assert_in_range(compared, COMPARED_MIN, 3 * RESOLUTION * RESOLUTION);
     expect_balance(&contents);
     expect_marks(&contents, fixture.gpu.has_spheres);
+    contents_free(&contents);
+    fixture.options.abuffer.form = TRACER_FORM_FAST; /* whose voxels know their occupied parts */
+    build(&fixture, RESOLUTION, VOXELS);
+    contents_read(&contents, &fixture.store);
     expect_subvoxels(&contents, fixture.gpu.has_spheres);
     contents_free(&contents);
     fixture_finish(&fixture);
@@ -296,7 +300,7 @@ TEST(without_windings_no_image_has_steep_samples)
     fixture_init(&fixture, scene_of_bodies_and_others());
     build(&fixture, RESOLUTION, VOXELS);
     contents_read(&all, &fixture.store);
-    fixture.options.abuffer.search = ABUFFER_SEARCH_DDA;
+    fixture.options.abuffer.form = TRACER_FORM_FAST;
     build(&fixture, RESOLUTION, VOXELS);
     contents_read(&some, &fixture.store);
     for (uint32_t texel = 0; texel < texel_count_of(&all); texel++) {

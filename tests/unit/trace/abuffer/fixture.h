@@ -35,8 +35,8 @@ static inline void fixture_update(struct fixture *fixture, const struct scene_mo
 static inline void fixture_init(struct fixture *fixture, struct scene *scene)
 {
     struct error error = {0};
-    /* A search by winding needs every sample. */
-    *fixture = (struct fixture){.scene = scene, .options.abuffer.search = ABUFFER_SEARCH_LINEAR3};
+    /* A search by parity needs every sample. */
+    *fixture = (struct fixture){.scene = scene, .options.abuffer.form = TRACER_FORM_PAPER};
     gpu_scene_init(&fixture->gpu, device);
     fixture_update(fixture, NULL);
     fixture->builder = abuffer_builder_create(device, &error);

@@ -9,11 +9,12 @@
 #define RESOLUTION 72u
 #define VOXELS 16u
 
-static void build_by(struct fixture *fixture, struct contents *contents, uint32_t on_device, bool in_steps)
+static void build_by(struct fixture *fixture, struct contents *contents, bool on_device, bool in_steps)
 {
     struct error error = {0};
     enum tracer_progress progress;
-    fixture->options.bench.abuffer_on_device = on_device;
+    const bool builds_on_host = device->facts.builds_on_host;
+    device->facts.builds_on_host = !on_device;
     place(fixture, RESOLUTION, VOXELS);
     expect_ok(abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
                                   fixture->instance_count, &fixture->options, &error),
@@ -21,6 +22,7 @@ static void build_by(struct fixture *fixture, struct contents *contents, uint32_
     do {
         progress = abuffer_build_step(fixture->builder, in_steps ? 0 : STEP_WITHOUT_END, &error);
     } while (progress == TRACER_MORE);
+    device->facts.builds_on_host = builds_on_host;
     expect_ok(progress == TRACER_DONE, &error);
     contents_read(contents, &fixture->store);
     expect_consistent(contents);
@@ -44,14 +46,14 @@ TEST_LONG(host_and_device_make_the_same_runs)
     struct scene *(*const scenes[])(void) = {scene_of_bodies_and_others, test_scene_translucent,
                                              too_many_for_a_device};
     for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++)
-        for (int search = 0; search < 2; search++) {
+        for (unsigned form = TRACER_FORM_FAST; form <= TRACER_FORM_PAPER; form++) {
             struct fixture fixture;
             struct contents by_host, by_device;
             fixture_init(&fixture, scenes[i]());
-            fixture.options.abuffer.search = search == 0 ? ABUFFER_SEARCH_LINEAR3 : ABUFFER_SEARCH_DDA;
-            build_by(&fixture, &by_host, 0, true);
+            fixture.options.abuffer.form = form;
+            build_by(&fixture, &by_host, false, true);
             assert_in_range(by_host.store.sample_count, 1000, UINT32_MAX);
-            build_by(&fixture, &by_device, 1, false);
+            build_by(&fixture, &by_device, true, false);
             expect_same_within(&by_host, &by_device, within);
             contents_free(&by_device);
             contents_free(&by_host);

@@ -85,7 +85,7 @@ TEST(answers_do_not_depend_on_where_runs_begin)
     struct answers *answers[2];
     struct fixture fixture;
     fixture_init(&fixture, scene_of_a_soup());
-    fixture.options.abuffer.search = ABUFFER_SEARCH_DDA;
+    fixture.options.abuffer.form = TRACER_FORM_FAST;
     build(&fixture, RESOLUTION, VOXELS);
     rays_through_it(rays);
     for (int shifted = 0; shifted < 2; shifted++) {

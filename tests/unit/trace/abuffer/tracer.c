@@ -171,7 +171,7 @@ TEST(options_out_of_range_are_refused_by_name)
         {"options.abuffer_voxels", {.abuffer = {.voxels = 100}}},
         {"options.abuffer_voxels", {.abuffer = {.voxels = 512}}},
         {"options.abuffer_voxels", {.abuffer = {.resolution = 64, .voxels = 128}}},
-        {"options.abuffer_search", {.abuffer = {.search = ABUFFER_SEARCH_PARITY1 + 1}}},
+        {"options.abuffer_form", {.abuffer = {.form = TRACER_FORM_PAPER + 1}}},
     };
     expect_options_refused(TRACER_ABUFFER, rows, sizeof(rows) / sizeof(rows[0]));
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Traversal of A-buffers where the contract does not look: deep columns, the most rounds that a ray takes, and the
- * paper's own searches. */
+/* Traversal of A-buffers where the contract does not look: deep columns, and the paper's own search. */
 #include "tests/unit/trace/abuffer/fixture.h"
 #include "tests/unit/trace/stack_scene.h"
 
@@ -20,10 +19,10 @@ static bool traverse_wave(void *user, const struct wave *wave, struct error *err
     return abuffer_intersect(&fixture->store, &fixture->gpu, &all, &fixture->options, error);
 }
 
-static void fixture_init_by(struct fixture *fixture, struct scene *scene, unsigned search)
+static void fixture_init_by(struct fixture *fixture, struct scene *scene, unsigned form)
 {
     fixture_init(fixture, scene);
-    fixture->options.abuffer.search = search;
+    fixture->options.abuffer.form = form;
     build(fixture, RESOLUTION, VOXELS);
 }
 
@@ -40,7 +39,7 @@ TEST(deep_columns_are_searched_at_their_depth)
     const float apart = 1.3f * CELL;
     struct fixture fixture;
     uint64_t seed = 9;
-    fixture_init_by(&fixture, sheets_scene(SHEETS, apart), ABUFFER_SEARCH_DDA);
+    fixture_init_by(&fixture, sheets_scene(SHEETS, apart), TRACER_FORM_FAST);
     assert_int_equal(fixture.store.depth_max, SHEETS);
     for (uint32_t i = 0; i < RAY_COUNT; i++)
         rays[i] = (struct ray){
@@ -58,27 +57,6 @@ TEST(deep_columns_are_searched_at_their_depth)
     fixture_finish(&fixture);
 }
 
-/* A dispatch must have time for them (trace_rays_a_dispatch). The sheets share cells. */
-TEST(no_ray_takes_more_rounds_than_the_structure_allows)
-{
-    enum { SHEETS = 60 };
-    const float apart = 0.015f * CELL;
-    uint32_t scanned_max = 0;
-    struct fixture fixture;
-    fixture_init_by(&fixture, sheets_scene(SHEETS, apart), ABUFFER_SEARCH_DDA);
-    fixture.options.bench.abuffer_count_steps = 1;
-    rays_between_sheets(rays, RAY_COUNT, SHEETS, apart);
-    trace_rays(traverse_wave, &fixture, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
-    for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        const uint64_t rounds = (uint64_t)hits[i].distance + hits[i].primitive;
-        if (rounds > abuffer_rounds_of_a_ray(&fixture.store, &fixture.options))
-            fail_msg("ray %u takes %llu rounds", i, (unsigned long long)rounds);
-        scanned_max = hits[i].primitive > scanned_max ? hits[i].primitive : scanned_max;
-    }
-    assert_in_range(scanned_max, RESOLUTION * SHEETS / 4, UINT32_MAX);
-    fixture_finish(&fixture);
-}
-
 static double ball_distance(const struct ray *ray, double radius)
 {
     double a = 0, b = 0, c = -radius * radius;
@@ -89,10 +67,10 @@ static double ball_distance(const struct ray *ray, double radius)
     return b * b < a * c ? -1 : (-b - sqrt(b * b - a * c)) / a;
 }
 
-/* One smooth surface in a voxel: what the paper assumes. A ray misses the ball where its chord is shorter than a
- * step: of one voxel, at most sqrt(3) times that across. Chords c of a ball of radius r are as long or shorter for
- * (c / 2r)^2 of parallel rays. */
-TEST_LONG(steps_of_voxels_miss_no_more_of_a_ball_than_its_rim)
+/* One smooth surface in a voxel: what the paper assumes. A ray misses the ball where it enters and leaves it
+ * within a texel of one voxel, at most sqrt(3) times that across. Chords c of a ball of radius r are as long or
+ * shorter for (c / 2r)^2 of parallel rays. */
+TEST(the_paper_misses_no_more_of_a_ball_than_its_rim)
 {
     static const float ball[1][4] = {{0, 0, 0, 1}};
     const double rim = pow(sqrt(3.0) / VOXELS, 2);
@@ -109,29 +87,26 @@ TEST_LONG(steps_of_voxels_miss_no_more_of_a_ball_than_its_rim)
             rays[i].direction_t_max[k] = test_uniform(&seed, -1, 1) - rays[i].origin_t_min[k];
         }
     }
-    for (unsigned search = ABUFFER_SEARCH_VOXELS3; search <= ABUFFER_SEARCH_PARITY1; search++) {
-        struct test_edits edits = {.scene = test_scene_create()};
-        struct fixture fixture;
-        uint32_t met = 0, missed = 0, elsewhere = 0;
-        test_spheres(&edits, 1, ball, 1);
-        test_node(&edits, 1, 0, NODE_SPHERES, 1, NULL);
-        test_commit(&edits);
-        fixture_init_by(&fixture, edits.scene, search);
-        trace_rays(traverse_wave, &fixture, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
-        for (uint32_t i = 0; i < RAY_COUNT; i++) {
-            const double distance = ball_distance(&rays[i], 1), found = (double)hits[i].distance;
-            double size = 0;
-            for (int k = 0; k < 3; k++)
-                size = fmax(size, fabs((double)rays[i].direction_t_max[k]));
-            met += distance >= 0;
-            elsewhere += distance < 0 && found >= 0;
-            missed += distance >= 0 && !(fabs(found - distance) * size < 0.5 * (double)CELL);
-        }
-        print_message("search %u: of %u rays at the ball %u miss it, of others %u hit\n", search, met, missed,
-                      elsewhere);
-        assert_in_range(met, RAY_COUNT / 4, RAY_COUNT);
-        if (missed > rim * met || elsewhere > RAY_COUNT / 1000)
-            fail_msg("search %u: %u missed of %u, %u where nothing is", search, missed, met, elsewhere);
-        fixture_finish(&fixture);
+    struct test_edits edits = {.scene = test_scene_create()};
+    struct fixture fixture;
+    uint32_t met = 0, missed = 0, elsewhere = 0;
+    test_spheres(&edits, 1, ball, 1);
+    test_node(&edits, 1, 0, NODE_SPHERES, 1, NULL);
+    test_commit(&edits);
+    fixture_init_by(&fixture, edits.scene, TRACER_FORM_PAPER);
+    trace_rays(traverse_wave, &fixture, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        const double distance = ball_distance(&rays[i], 1), found = (double)hits[i].distance;
+        double size = 0;
+        for (int k = 0; k < 3; k++)
+            size = fmax(size, fabs((double)rays[i].direction_t_max[k]));
+        met += distance >= 0;
+        elsewhere += distance < 0 && found >= 0;
+        missed += distance >= 0 && !(fabs(found - distance) * size < 0.5 * (double)CELL);
     }
+    print_message("of %u rays at the ball %u miss it, of others %u hit\n", met, missed, elsewhere);
+    assert_in_range(met, RAY_COUNT / 4, RAY_COUNT);
+    if (missed > rim * met || elsewhere > RAY_COUNT / 1000)
+        fail_msg("%u missed of %u, %u where nothing is", missed, met, elsewhere);
+    fixture_finish(&fixture);
 }

@@ -181,7 +181,7 @@ TEST(a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time)
 TEST(a_tree_that_is_worn_out_is_built_anew)
 {
     struct fixture fixture;
-    fixture_init(&fixture, &(struct tracer_options){.bvh = {.rays = 1}}, 0);
+    fixture_init(&fixture, NULL, 0);
     const struct tracer_stats *stats = &fixture.tracer->stats;
     pose(&fixture, 8, 8);
     assert_in_range(stats->nodes_rebuilt, TRIANGLES / 4, 4 * TRIANGLES);
@@ -242,9 +242,9 @@ TEST(no_invocation_of_a_gpu_refits_one_element_after_the_other)
 
 TEST(answers_do_not_depend_on_earlier_poses)
 {
-    for (uint32_t packet = 0; packet <= 8; packet += 8) {
+    for (unsigned form = TRACER_FORM_FAST; form <= TRACER_FORM_PAPER; form++) {
         struct fixture straight, roundabout;
-        const struct tracer_options options = {.bvh = {.rays = packet}};
+        const struct tracer_options options = {.bvh.form = form};
         fixture_init(&straight, &options, 0.3f);
         struct hit *expected = trace(&straight, straight.tracer, true);
         fixture_init(&roundabout, &options, 0);
@@ -254,8 +254,8 @@ TEST(answers_do_not_depend_on_earlier_poses)
         struct hit *hits = trace(&roundabout, roundabout.tracer, true);
         for (uint32_t i = 0; i < RAY_COUNT; i++)
             if (memcmp(&expected[i], &hits[i], sizeof(*hits)) != 0)
-                fail_msg("ray %u, packets of %u: distance %.9g, primitive %u; %.9g, %u after other poses", i,
-                         packet, (double)expected[i].distance, expected[i].primitive, (double)hits[i].distance,
+                fail_msg("ray %u, form %u: distance %.9g, primitive %u; %.9g, %u after other poses", i, form,
+                         (double)expected[i].distance, expected[i].primitive, (double)hits[i].distance,
                          hits[i].primitive);
         free(expected);
         free(hits);

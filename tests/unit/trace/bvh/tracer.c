@@ -238,7 +238,7 @@ TEST(coherent_neighbours_are_traced_as_packets_and_a_wave_keeps_its_packet_size)
 {
     enum { CLOSE, APART, WAVES };
     static const float spreads[WAVES] = {0.002f, 0.4f};
-    const uint32_t packets[WAVES] = {device->facts.software ? 8 : 1, 1};
+    const uint32_t packets[WAVES] = {device->facts.packet_rays, 1};
     struct fixture fixture;
     struct error error = {0};
     struct gpu_buffer rays[WAVES] = {0}, hits[WAVES] = {0};
@@ -320,7 +320,7 @@ TEST(a_small_frame_has_the_answers_of_a_large_one)
 /* Rays go forward only, so no link keeps them for ever, and a node whose link is wrong is looked into. */
 TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
 {
-    const bool software = device->facts.software;
+    const struct gpu_facts facts = device->facts;
     struct fixture fixture;
     struct hit *hits[2];
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
@@ -332,6 +332,7 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
     for (uint32_t i = 0; i < RAY_COUNT; i++)
         rays[i] = make_ray(6, 6, 20, test_uniform(&seed, -0.4f, 0.4f), test_uniform(&seed, -0.4f, 0.4f), -1);
     device->facts.software = false; /* which leaves a loop by itself */
+    device->facts.packet_rays = 1;
     for (int i = 0; i < 2; i++) {
         hits[i] = malloc(RAY_COUNT * sizeof(struct hit));
         trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, RAY_COUNT, hits[i], NULL);
@@ -344,7 +345,7 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
         gpu_buffer_write(device, &store->elements, 0, elements, store->elements.size_bytes);
         free(elements);
     }
-    device->facts.software = software;
+    device->facts = facts;
     for (uint32_t i = 0; i < RAY_COUNT; i++)
         hit_count += hits[0][i].distance >= 0;
     assert_in_range(hit_count, RAY_COUNT / 16, RAY_COUNT);
@@ -355,17 +356,19 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
     fixture_finish(&fixture);
 }
 
-/* Traces bench.bvh_elements at a time, as GPUs do; 0: in one dispatch, as software GL does. */
+/* So many tests of a ray at a time, as GPUs do; 0: all in one dispatch, as software GL does. */
 static void *trace_as_hardware(struct scene *scene, const struct ray *rays, enum wave_kind kind,
-                               const struct tracer_options *options)
+                               const struct tracer_options *options, uint32_t ray_tests)
 {
-    const bool software = device->facts.software;
+    const struct gpu_facts facts = device->facts;
     struct fixture fixture;
     void *answers = malloc(RAY_COUNT * sizeof(struct hit));
     fixture_init_by(&fixture, TRACER_BVH, scene, options);
-    device->facts.software = options->bench.bvh_elements == 0;
+    device->facts.software = ray_tests == 0;
+    device->facts.packet_rays = 1;
+    device->facts.ray_tests_max = ray_tests;
     trace_rays(trace_by_tracer, &fixture, kind, rays, RAY_COUNT, answers, answers);
-    device->facts.software = software;
+    device->facts = facts;
     fixture_finish(&fixture);
     return answers;
 }
@@ -385,15 +388,14 @@ static struct ray *rays_for_packets(uint64_t seed)
     return rays;
 }
 
-/* Where there is something of everything: cutouts and tints, instances at one place, discs. In packets; the next
- * test has rays alone. */
+/* Where there is something of everything: cutouts and tints, instances at one place, discs. In packets, which the
+ * paper's form has; the next test has rays alone. */
 TEST(answers_do_not_depend_on_how_many_elements_a_dispatch_has)
 {
-    struct tracer_options options = {.bvh.rays = 8};
+    const struct tracer_options options = {.bvh.form = TRACER_FORM_PAPER};
     struct ray *rays = rays_for_packets(36);
-    void *expected = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &options);
-    options.bench.bvh_elements = 50;
-    void *got = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &options);
+    void *expected = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &options, 0);
+    void *got = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &options, 50);
     assert_memory_equal(got, expected, RAY_COUNT * sizeof(uint32_t));
     free(got);
     free(expected);
@@ -403,21 +405,21 @@ TEST(answers_do_not_depend_on_how_many_elements_a_dispatch_has)
 /* Rays that need many dispatches: a step ends between two of them, and others are traced before the next one. */
 TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
 {
-    const bool software = device->facts.software;
+    const struct gpu_facts facts = device->facts;
     struct ray *rays = rays_for_packets(37), *other_rays = rays_for_packets(38);
     struct hit *other_hits = malloc(RAY_COUNT * sizeof(*other_hits)), *got = malloc(RAY_COUNT * sizeof(*got));
-    struct tracer_options options = {.bvh.rays = 1};
     struct gpu_buffer ray_buffer = {0}, hit_buffer = {0};
     struct error error = {0};
     struct fixture fixture;
-    struct hit *expected = trace_as_hardware(scene_of_instances(), rays, WAVE_CLOSEST, &options);
-    options.bench.bvh_elements = 8;
-    fixture_init_by(&fixture, TRACER_BVH, scene_of_instances(), &options);
+    struct hit *expected = trace_as_hardware(scene_of_instances(), rays, WAVE_CLOSEST, NULL, 0);
+    fixture_init(&fixture, scene_of_instances());
     expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error), &error);
+    device->facts.software = false;
+    device->facts.packet_rays = 1;
+    device->facts.ray_tests_max = 8;
     struct trace_state *wave = begin_wave(&fixture, &ray_buffer, &hit_buffer);
     unsigned steps = 0;
     enum tracer_progress progress = TRACER_MORE;
-    device->facts.software = false;
     gpu_scene_bind(&fixture.gpu);
     while (progress == TRACER_MORE) {
         /* One of the smallest range and one without regard to it, in turns. */
@@ -425,7 +427,7 @@ TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
         if (steps % 8 == 0 && progress == TRACER_MORE)
             trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, other_rays, RAY_COUNT, other_hits, NULL);
     }
-    device->facts.software = software;
+    device->facts = facts;
     expect_ok(progress == TRACER_DONE, &error);
     assert_in_range(steps, 8, UINT32_MAX);
     assert_true(trace_state_device_bytes(wave) > 0);
@@ -442,7 +444,7 @@ TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
     free(got);
 }
 
-TEST(an_impossible_packet_size_is_refused)
+TEST(an_unknown_form_is_refused)
 {
-    expect_options_refused(TRACER_BVH, &(struct refused_options){"options.bvh_rays", {.bvh = {.rays = 5}}}, 1);
+    expect_options_refused(TRACER_BVH, &(struct refused_options){"options.bvh_form", {.bvh = {.form = 5}}}, 1);
 }

@@ -6,6 +6,7 @@
 #include "tests/unit/trace/axes_oracle.h"
 #include "tests/unit/trace/ldc/fixture.h"
 #include "tests/unit/trace/stack_scene.h"
+#include "trace/ldc/build_state.h"
 #include "tests/harness/test.h"
 
 #define RESOLUTION 64u
@@ -65,7 +66,7 @@ static uint32_t expect_like_oracle(struct fixture *fixture, unsigned which, cons
     struct oracle_cube cube = {.resolution = contents.cube.resolution, .cell_world = contents.cube.cell_world};
     memcpy(cube.lower_world, contents.cube.lower_world, sizeof(cube.lower_world));
     oracle_init(&oracle, &scene, &cube,
-                fixture->options.ldc.images == LDC_IMAGES_ONE ? ORACLE_ONE : ORACLE_LEANING, instances, count);
+                fixture->options.ldc.form == TRACER_FORM_PAPER ? ORACLE_ONE : ORACLE_LEANING, instances, count);
     for (uint32_t i = 0; i < 3 * oracle.resolution * oracle.resolution; i++) {
         const struct oracle_texel *expected = &oracle.texels[i];
         if (expected->open || !are_apart(expected))
@@ -119,11 +120,11 @@ TEST(each_texel_has_the_surfaces_under_its_middle)
     expect_scene_like_oracle(test_scene_deformed(), &defaults, test_motion_of_deformed);
 }
 
-/* The paper's cube: a surface is in the image that its normal leans to most, and in no other. */
-TEST_LONG(a_surface_is_in_one_image_if_that_is_asked_for)
+/* The paper's cube, peeled: a surface is in the image that its normal leans to most, and in no other. */
+TEST_LONG(a_surface_is_in_one_image_of_the_papers)
 {
     const uint32_t one =
-        expect_scene_like_oracle(test_scene_soup(), &(struct tracer_options){.ldc.images = LDC_IMAGES_ONE}, NULL);
+        expect_scene_like_oracle(test_scene_soup(), &(struct tracer_options){.ldc.form = TRACER_FORM_PAPER}, NULL);
     assert_true(one < expect_scene_like_oracle(test_scene_soup(), &defaults, NULL));
 }
 
@@ -134,12 +135,24 @@ static struct scene *many_layers(void)
     return stack_scene(120, SHUFFLED, true);
 }
 
-static void build_by(struct fixture *fixture, struct contents *contents, unsigned way, uint32_t on_device)
+/* Peeled is also what lists have no room for. */
+static void build_by(struct fixture *fixture, struct contents *contents, ldc_unit *way, bool on_device)
 {
-    fixture->options.ldc.build = way;
-    fixture->options.bench.ldc_on_device = on_device;
+    const bool builds_on_host = device->facts.builds_on_host;
+    struct error error = {0};
+    device->facts.builds_on_host = !on_device;
     place(fixture, LDC_CUBE_STATIC, RESOLUTION);
-    build(fixture, LDC_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
+    gpu_scene_bind(&fixture->gpu);
+    enum tracer_progress progress =
+        ldc_build_begin(fixture->builder, &fixture->store, LDC_CUBE_STATIC, &fixture->gpu, fixture->instances,
+                        fixture->gpu.instance_count, &fixture->options, &error);
+    for (int unit = 0; progress == TRACER_MORE; unit++) {
+        progress = ldc_build_go_on(fixture->builder, true, &error);
+        if (unit == 0) /* it has begun */
+            fixture->builder->task.next = way;
+    }
+    device->facts.builds_on_host = builds_on_host;
+    expect_ok(progress == TRACER_DONE, &error);
     contents_read(contents, &fixture->store, LDC_CUBE_STATIC);
     expect_consistent(contents);
 }
@@ -155,9 +168,9 @@ TEST_LONG(peels_and_lists_of_the_host_and_of_the_device_are_the_same_samples)
         for (uint32_t layers = 0; layers <= 3; layers += 3) {
             struct contents peeled, listed;
             fixture.options.limits.ldc_layers = layers;
-            build_by(&fixture, &peeled, LDC_BUILD_PEEL, 0);
-            for (uint32_t on_device = 0; on_device < 2; on_device++) {
-                build_by(&fixture, &listed, LDC_BUILD_LISTS, on_device);
+            build_by(&fixture, &peeled, ldc_peel, false);
+            for (int on_device = 0; on_device < 2; on_device++) {
+                build_by(&fixture, &listed, ldc_lists, on_device);
                 expect_same(&peeled, &listed);
                 contents_free(&listed);
             }

@@ -206,7 +206,7 @@ TEST_LONG(a_texel_that_is_drawn_more_often_than_it_was_counted_stays_within_its_
     struct fixture fixture;
     struct contents all, some;
     fixture_init(&fixture, stack_scene(LAYERS, SHUFFLED, false));
-    fixture.options.ldc.build = LDC_BUILD_PEEL;
+    fixture.options.ldc.form = TRACER_FORM_PAPER;
     build_and_read(&fixture, &all, RESOLUTION);
     place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
     gpu_scene_bind(&fixture.gpu);

@@ -83,18 +83,7 @@ TEST(options_out_of_range_are_refused_by_name)
     static const struct refused_options rows[] = {
         {"options.ldc_resolution", {.ldc = {.resolution = 15}}},
         {"options.ldc_resolution", {.ldc = {.resolution = 4097}}},
-        {"options.ldc_block", {.ldc = {.block = 1}}},
-        {"options.ldc_block", {.ldc = {.block = 12}}},
-        {"options.ldc_block", {.ldc = {.block = 64}}},
-        {"options.ldc_build", {.ldc = {.build = LDC_BUILD_LISTS + 1}}},
-        {"options.ldc_levels", {.ldc = {.levels = LDC_LEVELS_CELLS + 1}}},
-        {"options.ldc_images", {.ldc = {.images = LDC_IMAGES_ONE + 1}}},
-        {"options.ldc_levels", {.ldc = {.levels = LDC_LEVELS_CELLS, .tolerance = 0.5f}}},
-        {"options.ldc_tolerance", {.ldc = {.tolerance = -1.0f}}},
-        {"options.ldc_tolerance", {.ldc = {.tolerance = NAN}}},
-        {"options.ldc_tolerance", {.ldc = {.tolerance = INFINITY}}},
-        {"options.ldc_rays", {.ldc = {.rays = 2}}},
-        {"options.ldc_layers_together", {.bench = {.ldc_layers_together = 3}}},
+        {"options.ldc_form", {.ldc = {.form = TRACER_FORM_PAPER + 1}}},
         {"options.ldc_layers", {.limits = {.ldc_layers = 256}}},
     };
     expect_options_refused(TRACER_LDC, rows, sizeof(rows) / sizeof(rows[0]));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Traversal of layered depth cubes where the contract does not look: the most rounds that a ray takes, what the
- * device has no room for, what the host builds in place of shaders, and hits within a tolerance. */
+/* Traversal of layered depth cubes where the contract does not look: what the device has no room for,
+ * what the host builds in place of shaders, and the paper's hits within a tolerance. */
 #include "tests/unit/trace/ldc/fixture.h"
 #include "tests/unit/trace/stack_scene.h"
 
@@ -72,48 +72,31 @@ static struct hit hits[RAY_COUNT], expected[RAY_COUNT];
 
 ALL_TESTS(open_device, close_device)
 
-/* A dispatch must have time for them (trace_rays_a_dispatch). The sheets all pass the same cells. */
-TEST(no_ray_takes_more_rounds_than_the_structure_allows)
-{
-    enum { SHEETS = 40 };
-    const float apart = 0.02f * 2 / RESOLUTION;
-    struct tracer_options options = {.bench.ldc_count_steps = 1};
-    struct fixture fixture;
-    fixture_init(&fixture, sheets_scene(SHEETS, apart));
-    rays_between_sheets(rays, RAY_COUNT, SHEETS, apart);
-    for (options.ldc.levels = LDC_LEVELS_PYRAMID; options.ldc.levels <= LDC_LEVELS_CELLS; options.ldc.levels++) {
-        uint32_t tests_max = 0;
-        build_all(&fixture, &options);
-        trace(&fixture, rays, hits);
-        for (uint32_t i = 0; i < RAY_COUNT; i++) {
-            const uint64_t rounds = (uint64_t)hits[i].distance + hits[i].primitive;
-            if (rounds > ldc_rounds_of_a_ray(&fixture.store))
-                fail_msg("levels %u: ray %u takes %llu rounds", options.ldc.levels, i, (unsigned long long)rounds);
-            tests_max = hits[i].primitive > tests_max ? hits[i].primitive : tests_max;
-        }
-        assert_in_range(tests_max, SHEETS * RESOLUTION / 2, UINT32_MAX);
-    }
-    fixture_finish(&fixture);
-}
-
-TEST(where_cells_do_not_fit_a_pyramid_is_traversed)
+/* What blocks find is not verified: a plane may be half a cell off, and along silhouettes it is met where the
+ * surface is not, or the other way round. */
+TEST(where_cells_do_not_fit_blocks_are_traversed)
 {
     const uint64_t texels_max = device->facts.texture_buffer_texels_max;
     struct fixture fixture;
     fixture_init(&fixture, test_scene_spheres());
     random_rays(rays);
-    build_all(&fixture, &(struct tracer_options){.ldc.levels = LDC_LEVELS_PYRAMID});
+    build_all(&fixture, &(struct tracer_options){0});
     trace(&fixture, rays, expected);
     assert_in_range(hits_in(expected), RAY_COUNT / 8, RAY_COUNT);
-    fixture.options = (struct tracer_options){0}; /* of the same samples */
-    build_levels(&fixture);
     assert_false(fixture.store.no_cells);
     device->facts.texture_buffer_texels_max = 4ull * fixture.store.cubes[LDC_CUBE_STATIC].entry_count - 1;
     build_levels(&fixture);
     device->facts.texture_buffer_texels_max = texels_max;
     assert_true(fixture.store.no_cells);
     trace(&fixture, rays, hits);
-    assert_memory_equal(hits, expected, sizeof(hits));
+    const float cell = fixture.store.cubes[LDC_CUBE_STATIC].cell_world;
+    uint32_t apart = 0;
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        const float *d = rays[i].direction_t_max, length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        apart += fabsf(hits[i].distance - expected[i].distance) * length < cell ? 0 : 1;
+    }
+    print_message("%u of %u rays are apart\n", apart, RAY_COUNT);
+    assert_in_range(apart, 0, RAY_COUNT / 10);
     build_levels(&fixture);
     assert_false(fixture.store.no_cells);
     fixture_finish(&fixture);
@@ -121,12 +104,15 @@ TEST(where_cells_do_not_fit_a_pyramid_is_traversed)
 
 TEST_LONG(the_host_and_the_device_make_the_same_cells)
 {
+    const bool builds_on_host = device->facts.builds_on_host;
     struct scene *(*const scenes[])(void) = {test_scene_soup, test_scene_spheres};
     random_rays(rays);
     for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
         struct fixture fixture;
         fixture_init(&fixture, scenes[i]());
-        build_all(&fixture, &(struct tracer_options){.bench.ldc_on_device = 1});
+        device->facts.builds_on_host = false;
+        build_all(&fixture, &(struct tracer_options){0});
+        device->facts.builds_on_host = builds_on_host;
         const uint32_t entry_count = fixture.store.cubes[LDC_CUBE_STATIC].entry_count;
         trace(&fixture, rays, expected);
         assert_in_range(hits_in(expected), RAY_COUNT / 8, RAY_COUNT);
@@ -141,10 +127,10 @@ TEST_LONG(the_host_and_the_device_make_the_same_cells)
     }
 }
 
-/* The paper's test: a hit is where the ray comes as near to a sample's depth, in its texel. Rays straight down on
- * a slope meet samples' own depths; rays along the slope, half a cell above it, hit within a tolerance of a cell
- * and not within one of a tenth. */
-TEST_LONG(a_tolerance_takes_depths_for_planes)
+/* The paper's test: a hit is where the ray comes as near to a sample's depth as a cell is wide, in its texel. Rays
+ * straight down on a slope meet samples' own depths; of rays along the slope those hit that are half a cell above
+ * it, and not those that are two cells above. */
+TEST(the_paper_takes_depths_for_planes)
 {
     static const float corners[4][3] = {{-1, -1, 0}, {1, -1, 1}, {-1, 1, 0}, {1, 1, 1}};
     static const uint32_t indices[6] = {0, 1, 2, 2, 1, 3};
@@ -158,26 +144,21 @@ TEST_LONG(a_tolerance_takes_depths_for_planes)
     for (uint32_t i = 0; i < RAY_COUNT; i++)
         rays[i] = (struct ray){{test_uniform(&seed, -0.9f, 0.9f), test_uniform(&seed, -0.9f, 0.9f), 3, 0},
                                {0, 0, -1, 1e30f}};
-    const struct tracer_options nearly_nothing[] = {
-        {.ldc.tolerance = 0.0004f}, {.ldc = {.tolerance = 0.0004f, .levels = LDC_LEVELS_BLOCKS, .block = 8}}};
-    for (size_t form = 0; form < 2; form++) {
-        build_all(&fixture, &nearly_nothing[form]);
-        const struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
-        trace(&fixture, rays, hits);
-        for (uint32_t i = 0; i < RAY_COUNT; i++) {
-            const float texel = floorf((rays[i].origin_t_min[0] - cube->lower_world[0]) / cube->cell_world);
-            const float middle = cube->lower_world[0] + (texel + 0.5f) * cube->cell_world;
-            assert_float_equal(3 - hits[i].distance, 0.5f * (middle + 1), 1e-4f);
-        }
+    build_all(&fixture, &(struct tracer_options){.ldc.form = TRACER_FORM_PAPER});
+    const struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
+    const float cell = cube->cell_world;
+    trace(&fixture, rays, hits);
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        const float texel = floorf((rays[i].origin_t_min[0] - cube->lower_world[0]) / cell);
+        const float middle = cube->lower_world[0] + (texel + 0.5f) * cell;
+        assert_float_equal(3 - hits[i].distance, 0.5f * (middle + 1), 1e-4f);
     }
-    const float cell = fixture.store.cubes[LDC_CUBE_STATIC].cell_world;
-    for (uint32_t i = 0; i < RAY_COUNT; i++)
-        rays[i] =
-            (struct ray){{-0.9f, test_uniform(&seed, -0.9f, 0.9f), 0.05f + 0.5f * cell, 0}, {1, 0, 0.5f, 1e30f}};
-    for (int wide = 0; wide < 2; wide++) {
-        build_all(&fixture, &(struct tracer_options){.ldc.tolerance = cell * (wide ? 1.5f : 0.1f)});
+    for (int above = 0; above < 2; above++) {
+        for (uint32_t i = 0; i < RAY_COUNT; i++)
+            rays[i] = (struct ray){{-0.9f, test_uniform(&seed, -0.9f, 0.9f), 0.05f + (above ? 2 : 0.5f) * cell, 0},
+                                   {1, 0, 0.5f, 1e30f}};
         trace(&fixture, rays, hits);
-        assert_int_equal(hits_in(hits), wide ? RAY_COUNT : 0);
+        assert_int_equal(hits_in(hits), above ? 0 : RAY_COUNT);
     }
     fixture_finish(&fixture);
 }

@@ -49,11 +49,13 @@ TEST(parts_have_each_primitive_once_and_are_no_longer_than_allowed)
 
 static void *trace(struct gpu_scene *gpu, const struct ray *rays, enum wave_kind kind, uint32_t tests)
 {
+    const struct gpu_facts facts = device->facts;
     struct error error = {0};
-    const struct tracer_options options = {.bench.naive_tests = tests};
     const size_t each = kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit);
     struct gpu_buffer ray_buffer = {0}, answers = {0};
-    struct tracer *tracer = tracer_create(&tracer_naive_impl, device, &options, &error);
+    device->facts.software = facts.software && tests == 0;
+    device->facts.ray_tests_max = tests > 0 ? tests : facts.ray_tests_max;
+    struct tracer *tracer = tracer_create(&tracer_naive_impl, device, NULL, &error);
     expect_ok(tracer && tracer_update(tracer, gpu, &(struct tracer_update){0}, &error) &&
                   gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error) &&
                   gpu_buffer_reserve(device, &answers, RAY_COUNT * each, &error),
@@ -70,6 +72,7 @@ static void *trace(struct gpu_scene *gpu, const struct ray *rays, enum wave_kind
     gpu_buffer_finish(device, &ray_buffer);
     gpu_buffer_finish(device, &answers);
     tracer_destroy(tracer);
+    device->facts = facts;
     return read;
 }
 

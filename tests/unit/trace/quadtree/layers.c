@@ -459,7 +459,7 @@ static void count_halves(struct scene *scene, uint32_t counts[2])
     draw(&drawn);
     struct gpu_texture visible = drawn.seen.store.visible;
     drawn.seen.store.visible = drawn.store.visible;
-    layers_build(&drawn.seen, false);
+    layers_build(&drawn.seen);
     drawn.seen.store.visible = visible;
     counts[0] = counts[1] = 0;
     for (uint32_t i = 0; i < u.width * u.height; i++) {

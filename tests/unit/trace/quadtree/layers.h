@@ -347,7 +347,7 @@ static inline struct quadtree_uniforms uniforms_of(const struct layers_view *vie
 }
 
 /* Builds the nodes and reads them back. */
-static inline void layers_build(struct layers *layers, bool minmax)
+static inline void layers_build(struct layers *layers)
 {
     struct error error = {0};
     struct quadtree_store *store = &layers->store;
@@ -359,7 +359,7 @@ static inline void layers_build(struct layers *layers, bool minmax)
     enum tracer_progress progress;
     uint32_t units = 0;
     do {
-        progress = quadtree_nodes_go_on(&layers->build, store, &layers->gpu, minmax, &error);
+        progress = quadtree_nodes_go_on(&layers->build, store, &layers->gpu, &error);
         units++;
     } while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE && gpu_check(device, "nodes", &error), &error);
@@ -379,7 +379,7 @@ static inline void layers_init(struct layers *layers, struct scene *scene, const
     gpu_scene_init(&layers->gpu, device);
     expect_ok(gpu_scene_update(&layers->gpu, scene, NULL, &changes, NULL, &error), &error);
     see_all(layers);
-    layers_build(layers, false);
+    layers_build(layers);
 }
 
 /* Nothing of it is left on the device. */

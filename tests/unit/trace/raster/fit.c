@@ -106,11 +106,9 @@ static const char *row_of(unsigned tracer, const char *ldc_name)
     return tracer == TRACER_LDC ? ldc_name : strchr(ldc_name, '/') + 1;
 }
 
-static struct tracer_options options_at(uint32_t resolution, uint32_t samples_max)
+static struct tracer_options options_at(uint32_t resolution)
 {
-    return (struct tracer_options){.ldc = {.resolution = resolution},
-                                   .abuffer = {.resolution = resolution},
-                                   .bench = {.axes_samples = samples_max}};
+    return (struct tracer_options){.ldc = {.resolution = resolution}, .abuffer = {.resolution = resolution}};
 }
 
 static struct axes_layers count_layers(const struct fixture *fixture, float overlap, float steep,
@@ -149,7 +147,7 @@ ALL_TESTS(open_device, close_device)
 
 TEST(usual_scenes_have_the_resolution_that_was_asked_for)
 {
-    const struct tracer_options options = options_at(RESOLUTION, 0);
+    const struct tracer_options options = options_at(RESOLUTION);
     for (size_t i = 0; i < 2; i++)
         for (int which = 0; which < 2; which++) {
             struct fixture fixture;
@@ -164,7 +162,9 @@ TEST(usual_scenes_have_the_resolution_that_was_asked_for)
 
 TEST(deep_scenes_have_a_lower_one_and_a_warning)
 {
-    const struct tracer_options options = options_at(RESOLUTION, SAMPLES_MAX);
+    const struct tracer_options options = options_at(RESOLUTION);
+    const struct gpu_facts facts = device->facts;
+    device->facts.axes_samples_max = SAMPLES_MAX;
     for (size_t i = 0; i < 2; i++)
         for (int which = 0; which < 2; which++) {
             const double tolerance = which ? TOLERANCE : LATTICE_TOLERANCE;
@@ -180,6 +180,7 @@ TEST(deep_scenes_have_a_lower_one_and_a_warning)
             assert_true(samples > (1 - tolerance - 0.02) * SAMPLES_MAX);
             fixture_finish(&fixture);
         }
+    device->facts = facts;
 }
 
 static uint32_t chosen(const struct tracer_options *options, unsigned tracer, double layers, uint32_t asked)
@@ -197,7 +198,7 @@ TEST(a_resolution_that_was_asked_for_is_taken_whatever_the_picture)
 
 TEST(a_resolution_that_is_chosen_costs_what_goes_with_the_picture)
 {
-    const double times = device->facts.software ? 1 : AXES_HARDWARE_TIMES;
+    const double times = axes_times(device);
     for (uint32_t pixels = AXES_PICTURE_PIXELS_MIN; pixels <= 1u << 21; pixels *= 2) {
         const struct tracer_options options = {.picture_pixels = pixels};
         for (double layers = 1; layers < 20; layers *= 2) {
@@ -256,12 +257,12 @@ TEST(a_chosen_resolution_coarser_than_the_pictures_pixels_comes_with_a_warning)
 /* Before there is anything of it. */
 TEST(what_is_too_deep_at_any_resolution_is_refused_with_a_remedy)
 {
-    const struct tracer_options options = options_at(1024, 0);
+    const struct tracer_options options = options_at(1024);
     for (size_t i = 0; i < 2; i++) {
         struct fixture fixture;
         struct error error = {0};
         fixture_init_by(&fixture, sampled[i], test_scene_create(), &options); /* holds nothing yet */
-        add_shells(&fixture.edits, device->facts.software ? 2000 : 2000 * (uint32_t)AXES_HARDWARE_TIMES);
+        add_shells(&fixture.edits, 2000 * (uint32_t)axes_times(device));
         assert_false(try_update(&fixture, &error));
         assert_int_equal(error.kind, ERROR_LIMIT);
         assert_string_equal(error.field, fixture.tracer->impl->name);
@@ -274,7 +275,7 @@ TEST(what_is_too_deep_at_any_resolution_is_refused_with_a_remedy)
 /* 10 blocks of the images wide, it touches up to 12: that much less is counted in each. */
 TEST(a_stack_is_as_deep_as_it_has_plates)
 {
-    const struct tracer_options options = options_at(16, 0);
+    const struct tracer_options options = options_at(16);
     struct fixture fixture;
     struct test_edits edits = {.scene = test_scene_create()};
     add_stack(&edits, 300, 10.0f / 128);
@@ -289,7 +290,7 @@ TEST(a_stack_is_as_deep_as_it_has_plates)
 /* Of ldc, which would peel it for minutes, though its layers are few on average. */
 TEST(what_is_too_deep_in_one_place_is_refused_with_a_remedy)
 {
-    const struct tracer_options options = options_at(1024, 0);
+    const struct tracer_options options = options_at(1024);
     struct fixture fixture;
     struct error error = {0};
     fixture_init_by(&fixture, TRACER_LDC, test_scene_create(), &options); /* holds nothing yet */

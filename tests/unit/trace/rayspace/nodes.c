@@ -430,19 +430,18 @@ static void build_nodes(struct run *run, const struct fuzz *fuzz, enum way way)
 {
     struct error error = {0};
     struct rayspace_state *state = &run->state;
-    struct rayspace_settings *settings = &state->base.options.rayspace;
     const uint32_t no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK},
                    no_light_lost[4] = {0};
     state->base.wave.kind = way == TURNED_AND_SORTED ? WAVE_ANY : WAVE_CLOSEST;
-    settings->turn = way ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
-    settings->sort = way ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
+    state->turns = way ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
+    state->sorts = way ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
     gpu_buffer_fill(device, &state->answers, 0, RAYS * RAYSPACE_ANSWER_BYTES, way ? no_light_lost : no_hit);
     const struct rayspace_control control = {0};
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
     expect_ok(gpu_buffer_upload(device, &run->rays, fuzz->rays, sizeof(fuzz->rays), &error) &&
                   rayspace_order_reserve(state, device, &error) && rayspace_nodes_reserve(state, device, &error) &&
                   rayspace_order_rays(state, &run->fixture.gpu, &error) &&
-                  rayspace_nodes_build(state, &run->fixture.gpu, false, &error),
+                  rayspace_nodes_build(state, &run->fixture.gpu, &error),
               &error);
     uint32_t order[RAYS];
     gpu_buffer_read(device, &state->order, 0, order, sizeof(order));

@@ -26,9 +26,19 @@ static void pair_init_by(struct pair *pair, struct scene *(*create)(void), const
     fixture_init_by(&pair->rayspace, RAYSPACE_NUMBER, create(), options);
 }
 
-static void pair_init(struct pair *pair, struct scene *(*create)(void), uint32_t batch)
+static void pair_init(struct pair *pair, struct scene *(*create)(void))
 {
-    pair_init_by(pair, create, &(struct tracer_options){.rayspace.batch = batch});
+    pair_init_by(pair, create, NULL);
+}
+
+/* Before the first wave. */
+static struct rayspace_state *begin_state(struct fixture *fixture)
+{
+    struct error error = {0};
+    struct tracer *tracer = fixture->tracer;
+    tracer->state = trace_state_create(tracer->impl, device, &tracer->options, &error);
+    expect_ok(tracer->state != NULL, &error);
+    return (struct rayspace_state *)tracer->state;
 }
 
 static void pair_finish(struct pair *pair)
@@ -102,13 +112,16 @@ static struct rayspace_control control_of(const struct fixture *fixture)
 
 TEST(answers_are_those_of_brute_force_to_the_bit_in_small_batches)
 {
-    const uint32_t batch = 61;
+    const uint32_t room = 256;
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     struct pair pair;
     random_rays(rays, RAY_COUNT, 3);
-    pair_init(&pair, test_scene_soup, batch);
+    pair_init_by(&pair, test_scene_soup, &(struct tracer_options){.rayspace.mode = RAYSPACE_MODE_FLAT});
+    struct rayspace_state *own = begin_state(&pair.rayspace);
+    own->capacity_fits = room;
     expect_same_answers(&pair, rays, RAY_COUNT, "in small batches");
-    assert_in_range(control_of(&pair.rayspace).limit, 1, batch);
+    assert_in_range(own->batch_max, 1, room);
+    assert_in_range(((const struct rayspace *)pair.rayspace.tracer)->rank_count, room + 1, UINT32_MAX);
     pair_finish(&pair);
     free(rays);
 }
@@ -169,7 +182,7 @@ TEST(rays_do_not_descend_beyond_a_disc)
                                {test_uniform(&seed, -0.1f, 0.1f), test_uniform(&seed, -0.1f, 0.1f), -1, 1e30f}};
     for (unsigned i = 0; i < 3; i++) {
         struct pair pair;
-        pair_init(&pair, scenes[i].create, 0);
+        pair_init(&pair, scenes[i].create);
         trace_rays(trace_by_tracer, &pair.naive, WAVE_CLOSEST, rays, RAY_COUNT, expected, NULL);
         trace_rays(trace_by_tracer, &pair.rayspace, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
         assert_memory_equal(hits, expected, RAY_COUNT * sizeof(*hits));
@@ -230,7 +243,8 @@ TEST(a_wave_that_is_queued_whole_has_its_answers_or_stops_its_slice)
     for (int little = 0; little < 2;
          little++) { /* a round's passes may take too few pairs: then something is left */
         struct pair pair;
-        pair_init(&pair, test_scene_soup, little ? 96 : 0);
+        pair_init(&pair, test_scene_soup);
+        begin_state(&pair.rayspace)->capacity_fits = little ? 384 : 0;
         trace_rays(trace_by_tracer, &pair.naive, WAVE_CLOSEST, rays, RAY_COUNT, expected, NULL);
         assert_int_equal(is_traced_ahead(&pair, rays, RAY_COUNT, expected), !little);
         pair_finish(&pair);
@@ -263,10 +277,10 @@ static struct scene *scene_of_large_triangles(void)
 TEST(a_pass_that_overflows_is_halved_and_no_answer_is_lost)
 {
     const uint32_t count = 2 * RAY_COUNT, room = RAY_COUNT / 2;
-    const struct tracer_options options = {.bench.rayspace_pairs = room};
     struct pair pair;
     struct ray *rays = malloc(count * sizeof(*rays));
-    pair_init_by(&pair, scene_of_large_triangles, &options);
+    pair_init(&pair, scene_of_large_triangles);
+    begin_state(&pair.rayspace)->capacity_fits = room;
     random_rays(rays, count, 5);
     expect_same_answers(&pair, rays, count, "large triangles");
     const struct rayspace_control control = control_of(&pair.rayspace);
@@ -314,9 +328,11 @@ TEST(waves_of_each_kind_are_told_apart_until_the_reset)
     struct hit hits[512];
     uint32_t visibility[512];
     random_rays(rays, 512, 17);
-    const struct tracer_options options = {.rayspace = {.turn = RAYSPACE_CHANCE_ON, .sort = RAYSPACE_CHANCE_OFF}};
     struct fixture fixture;
-    fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), &options);
+    fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), NULL);
+    struct rayspace_state *own = begin_state(&fixture);
+    own->turns = RAYSPACE_CHANCE_ON;
+    own->sorts = RAYSPACE_CHANCE_OFF;
     trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, 512, hits, NULL);
     const struct rayspace_control closest = control_of(&fixture);
     trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 512, NULL, visibility);
@@ -349,12 +365,14 @@ TEST(waves_of_each_kind_are_told_apart_until_the_reset)
 
 TEST(a_wave_that_was_sorted_or_halved_says_so)
 {
-    const struct tracer_options options = {.rayspace.sort = RAYSPACE_CHANCE_ON, .bench.rayspace_pairs = 256};
     struct ray rays[512];
     struct hit hits[512];
     struct fixture fixture;
     random_rays(rays, 512, 19);
-    fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), &options);
+    fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), NULL);
+    struct rayspace_state *own = begin_state(&fixture);
+    own->sorts = RAYSPACE_CHANCE_ON;
+    own->capacity_fits = 256;
     trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, 512, hits, NULL);
     const struct structure_rows rows = rows_of(&fixture);
     assert_int_equal(structure_row(&rows, "primary/sorted").number, 1);
@@ -373,7 +391,7 @@ TEST(stacks_are_smaller_where_memory_is_short)
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     struct pair pair;
     random_rays(rays, RAY_COUNT, 5);
-    pair_init(&pair, test_scene_soup, 0);
+    pair_init(&pair, test_scene_soup);
     struct answers expected = ask(&pair.naive, rays, RAY_COUNT);
     /* Three stacks and the leaves take 4 MiB; rays, hits and nodes less than 1 MiB. */
     device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)2 << 20);

@@ -69,12 +69,11 @@ static void input_finish(struct input *input)
 }
 
 /* The forms that elements are stored in. */
-static const struct bvh_form packed = {.bounds = BVH_BOUNDS_BOX, .threads = 2};
-static const struct bvh_form whole = {.bounds = BVH_BOUNDS_BOX, .whole = true, .threads = 2};
-static const struct bvh_form of_spheres = {.bounds = BVH_BOUNDS_SPHERE, .threads = 2};
-static const struct bvh_form plain = {.bounds = BVH_BOUNDS_SPHERE, .plain = true, .threads = 2};
-static const struct bvh_form plain_boxes = {.bounds = BVH_BOUNDS_BOX, .plain = true, .threads = 2};
-static const struct bvh_form *const forms[] = {&packed, &whole, &of_spheres, &plain, &plain_boxes};
+static const struct bvh_form packed = {.threads = 2};
+static const struct bvh_form whole = {.whole = true, .threads = 2};
+static const struct bvh_form one_order = {.one_order = true, .threads = 2};
+static const struct bvh_form of_spheres = {.spheres = true, .one_order = true, .threads = 2};
+static const struct bvh_form *const forms[] = {&packed, &whole, &one_order, &of_spheres};
 
 static struct bvh_tree build(const struct input *input, const struct bvh_form *settings)
 {
@@ -225,7 +224,7 @@ static bool bound_contains(const struct input *input, const struct decoded *boun
 static void expect_bounds_contain(const struct input *input, const struct bvh_tree *tree, const struct view *view,
                                   uint32_t octant)
 {
-    bool is_sphere = view->settings->bounds == BVH_BOUNDS_SPHERE;
+    bool is_sphere = view->settings->spheres;
     for (uint32_t e = 0; e < view->count; e++) {
         const struct decoded bound = decode(view, octant, e);
         for (uint32_t below = e; below < bound.end; below++) {
@@ -580,8 +579,8 @@ TEST(each_form_takes_the_bytes_it_promises)
 {
     assert_int_equal(bvh_element_bytes(&packed), BVH_OCTANTS * sizeof(struct bvh_packed_element));
     assert_int_equal(bvh_element_bytes(&whole), BVH_OCTANTS * sizeof(struct bvh_element));
-    assert_int_equal(bvh_element_bytes(&of_spheres), BVH_OCTANTS * sizeof(struct bvh_element));
-    assert_int_equal(bvh_element_bytes(&plain), sizeof(struct bvh_element)); /* one order for all directions */
+    assert_int_equal(bvh_element_bytes(&one_order), sizeof(struct bvh_packed_element));
+    assert_int_equal(bvh_element_bytes(&of_spheres), sizeof(struct bvh_element));
 }
 
 TEST(a_shape_without_primitives_is_refused)
@@ -657,7 +656,7 @@ static uint32_t place_of(const struct bvh_top *top, uint32_t octant, uint32_t el
 static bool top_element_contains(const struct view *view, const struct decoded *element,
                                  const struct bvh_world_box *box)
 {
-    if (view->settings->bounds == BVH_BOUNDS_BOX)
+    if (!view->settings->spheres)
         return box_contains_padded(element, box->lower, box->upper);
     return sphere_contains(element, box->lower, 0) && sphere_contains(element, box->upper, 0);
 }
