@@ -291,12 +291,13 @@ struct cli_job {
     const char *framed;                         /* node that it shows, name or number; NULL: all */
     bool float_pixels, half_pixels, dwaa, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
         is_orbit;
-    bool has_samples, auto_samples; /* --samples auto */
-    bool without_studio;            /* --studio off */
-    bool has_denoise, filters;      /* filters: 8-bit pictures are denoised where nothing is said */
-    uint32_t usual_samples;         /* where nothing is said and the integrator has no number of its own; 0: 1 */
-    char depth_field[24];           /* the option that set the depth, for messages; empty: none */
-    unsigned file_quality;          /* of JPEG, WebP and video files; 0: default */
+    const char *colour_space, *display_view, *ocio; /* NULL: none */
+    bool has_samples, auto_samples;                 /* --samples auto */
+    bool without_studio;                            /* --studio off */
+    bool has_denoise, filters; /* filters: 8-bit pictures are denoised where nothing is said */
+    uint32_t usual_samples;    /* where nothing is said and the integrator has no number of its own; 0: 1 */
+    char depth_field[24];      /* the option that set the depth, for messages; empty: none */
+    unsigned file_quality;     /* of JPEG, WebP and video files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
     double eye_rest[3], look_at_rest[3]; /* what the key's floats lose of --eye and --look-at */

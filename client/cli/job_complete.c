@@ -103,6 +103,33 @@ static bool complete_layers(struct cli_job *job)
     return true;
 }
 
+/* A picture of 8 bits is made of linear light by the program that writes it. */
+static bool complete_colours(struct cli_job *job)
+{
+    const char *option = job->colour_space ? "--colour-space" : "--display-view", *configured = getenv("OCIO");
+    if (!job->colour_space && !job->display_view)
+        return true;
+    if (!job->ocio && configured && configured[0] != '\0')
+        job->ocio = configured;
+    for (size_t i = 0; i < job->output_count; i++) {
+        const enum cli_image image = job->outputs[i].image;
+        if (job->colour_space && image != CLI_IMAGE_EXR) {
+            cli_usage(job, option, "%s files do not have it", cli_image_name(image));
+            return fl_error_remedy(&job->error, "write an .exr file, or choose a view by --display-view");
+        }
+        if (job->display_view && (is_linear(image) || cli_image_is_video(image))) {
+            cli_usage(job, option, "%s files do not have it", cli_image_name(image));
+            return fl_error_remedy(&job->error, "write pictures of 8 bits, such as .png");
+        }
+    }
+    if (job->display_view && !job->ocio) {
+        cli_usage(job, option, "there is no configuration that has views");
+        return fl_error_remedy(&job->error, "name one by --ocio FILE or $OCIO");
+    }
+    job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    return true;
+}
+
 /* All outputs are made of the same frames. */
 static bool complete_pixels(struct cli_job *job)
 {
@@ -127,7 +154,7 @@ static bool complete_pixels(struct cli_job *job)
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     else if (has[CLI_IMAGE_EXR])
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
-    return complete_layers(job);
+    return complete_colours(job) && complete_layers(job);
 }
 
 /* One that is none of a picture is that of a model, which files do not need. */
@@ -315,15 +342,20 @@ bool cli_find_camera(struct message_render *render, const char *camera, const ch
     return true;
 }
 
+/* Whether its pictures are for eyes, and not linear light for programs. */
+static bool is_shown(const struct cli_job *job)
+{
+    return job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8 || job->display_view;
+}
+
 void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene)
 {
     const bool shows = render->integrator == PROTOCOL_INTEGRATOR_WHITTED ||
                        render->integrator == PROTOCOL_INTEGRATOR_DISTRIBUTED ||
                        render->integrator == PROTOCOL_INTEGRATOR_PATH;
-    if (job->filters && !job->without_studio && !job->scene && shows &&
-        render->format == PROTOCOL_PIXEL_FORMAT_RGBA8 && render->background == PROTOCOL_BACKGROUND_ENVIRONMENT &&
-        render->camera_path != PROTOCOL_CAMERA_NODE && render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS &&
-        !fl_scene_is_lit(scene))
+    if (job->filters && !job->without_studio && !job->scene && shows && is_shown(job) &&
+        render->background == PROTOCOL_BACKGROUND_ENVIRONMENT && render->camera_path != PROTOCOL_CAMERA_NODE &&
+        render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS && !fl_scene_is_lit(scene))
         render->ground = 1;
 }
 
@@ -468,8 +500,7 @@ static bool complete_crop(struct cli_job *job)
 /* Files in linear light are for programs that have filters of their own. */
 static void complete_denoise(struct cli_job *job)
 {
-    const bool is_shown = job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8;
-    if (!job->has_denoise && job->filters && is_shown && job->options.crop_width == 0)
+    if (!job->has_denoise && job->filters && is_shown(job) && job->options.crop_width == 0)
         job->options.denoise = PROTOCOL_DENOISE_AUTO;
 }
 

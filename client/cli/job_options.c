@@ -45,6 +45,9 @@ enum key {
     KEY_HALF,
     KEY_FLOAT,
     KEY_EXR_COMPRESSION,
+    KEY_COLOUR_SPACE,
+    KEY_DISPLAY_VIEW,
+    KEY_OCIO,
     KEY_TIMINGS,
     KEY_TRACE_FILE,
     KEY_PROGRESS,
@@ -80,6 +83,14 @@ static const struct argp_option special[] = {
     {"exr-compression", KEY_EXR_COMPRESSION, "zip|dwaa", 0,
      "EXR without loss (default), or smaller: colours lose what is hardly seen, other layers nothing",
      CLI_GROUP_OUTPUT},
+    {"colour-space", KEY_COLOUR_SPACE, "NAME", 0,
+     "Colours of an EXR file: ACEScg, ACES2065-1, Linear Rec.2020, Linear P3-D65, or a space of --ocio (default: "
+     "linear Rec.709)",
+     CLI_GROUP_OUTPUT},
+    {"display-view", KEY_DISPLAY_VIEW, "[DISPLAY/]VIEW", 0,
+     "Make pictures of 8 bits by this view of --ocio, such as AgX or an ACES one, in place of --tone-map",
+     CLI_GROUP_OUTPUT},
+    {"ocio", KEY_OCIO, "FILE", 0, "Configuration of OpenColorIO (default: $OCIO)", CLI_GROUP_OUTPUT},
     {"metadata", KEY_METADATA, "stable|full", 0,
      "What files say of themselves: what is the same for the same request (default), or times and paths, too",
      CLI_GROUP_OUTPUT},
@@ -436,6 +447,15 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return job->dwaa || strcmp(value, "zip") == 0
                    ? 0
                    : cli_usage(job, field, "'%s' is not known (known: zip, dwaa)", value);
+    case KEY_COLOUR_SPACE:
+        job->colour_space = value;
+        return 0;
+    case KEY_DISPLAY_VIEW:
+        job->display_view = value;
+        return 0;
+    case KEY_OCIO:
+        job->ocio = value;
+        return 0;
     case KEY_CLIP:
         if (job->clip_count == CLI_CLIPS_MAX)
             return cli_usage(job, field, "more than %d clips cannot be played at once", CLI_CLIPS_MAX);
@@ -581,7 +601,8 @@ static bool is_among(const struct argp_option *option, const char *const *names)
 /* Without those that are left out, and those of image files that people keep. */
 static void keep(struct argp_option *kept, const char *const *left_out)
 {
-    static const char *const of_files[] = {"half", "float", "exr-compression", NULL};
+    static const char *const of_files[] = {"half", "float", "exr-compression", "colour-space", "display-view",
+                                           "ocio", NULL};
     size_t count = 0;
     for (const struct argp_option *option = all_options(); option->name || option->doc; option++) {
         if (!is_among(option, left_out) && !is_among(option, of_files))

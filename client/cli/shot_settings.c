@@ -27,6 +27,8 @@ static const struct setting {
     {"format", "format", WORD, "\"exr\""},
     {"half", "half", FLAG, "true"},
     {"float", "float", FLAG, "true"},
+    {"colour_space", "colour-space", WORD, "\"ACEScg\""},
+    {"display_view", "display-view", WORD, "\"AgX\""},
     {"exr_compression", "exr-compression", WORD, "\"dwaa\""},
     {"stereo", "stereo", REAL, "0.065"},
     {"stereo_layout", "stereo-layout", WORD, "\"side\""},

@@ -15,6 +15,22 @@ struct fl_exporter {
     char path[160]; /* of the request, or its end */
 };
 
+/* The program's first answer. */
+static bool has_colours(struct fl_exporter *exporter, const struct fl_exporter_options *options,
+                        struct fl_error *error)
+{
+    struct message message;
+    if (!options->colour_space && !options->display_view)
+        return true;
+    if (!fl_helper_receive(&exporter->helper, &message, error))
+        return false;
+    if (message.type != MESSAGE_ERROR)
+        return true;
+    fl_error_from_message(error, &message.error);
+    error->code = FL_ERROR_ARGUMENT;
+    return false;
+}
+
 struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error)
 {
     struct fl_exporter *exporter = calloc(1, sizeof(*exporter));
@@ -29,7 +45,7 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     snprintf(window, sizeof(window), "%u,%u,%u,%u", options->window.x, options->window.y, options->window.width,
              options->window.height);
     snprintf(rate, sizeof(rate), "%.9g", (double)options->frames_per_second);
-    const char *arguments[13] = {/* ends with NULL */ "--folder", options->folder};
+    const char *arguments[19] = {/* ends with NULL */ "--folder", options->folder};
     size_t count = 2;
     if (options->frames_per_second > 0) {
         arguments[count++] = "--fps";
@@ -41,6 +57,14 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     }
     if (options->full_metadata)
         arguments[count++] = "--full-metadata";
+    const char *const colours[][2] = {{"--ocio", options->ocio},
+                                      {"--colour-space", options->colour_space},
+                                      {"--display-view", options->display_view}};
+    for (size_t i = 0; i < sizeof(colours) / sizeof(colours[0]); i++)
+        if (colours[i][1]) {
+            arguments[count++] = colours[i][0];
+            arguments[count++] = colours[i][1];
+        }
     if (options->dwaa)
         arguments[count++] = "--dwaa";
     if (options->draws_text)
@@ -49,7 +73,7 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
         arguments[count++] = "--format";
         arguments[count++] = options->format;
     }
-    if (!fl_helper_start(&exporter->helper, arguments, error)) {
+    if (!fl_helper_start(&exporter->helper, arguments, error) || !has_colours(exporter, options, error)) {
         fl_exporter_destroy(exporter);
         return NULL;
     }

@@ -628,6 +628,11 @@ struct fl_exporter_options {
     bool full_metadata; /* date, times of stages and revision too: then no two files are the same */
     bool draws_text;    /* pictures come with text */
     bool dwaa; /* EXR: colours are compressed with loss (DWAA), all else by zip as a part of its own; else zip */
+    /* What linear Rec. 709, as frames of the format rgba32f have it, becomes; all NULL: what it is. */
+    const char
+        *colour_space; /* EXR: ACEScg, ACES2065-1, Linear Rec.2020, Linear P3-D65 or one of the configuration */
+    const char *display_view; /* pictures of 8 bits: "VIEW" or "DISPLAY/VIEW" of the configuration */
+    const char *ocio;         /* the configuration of OpenColorIO, a file */
     struct {
         uint32_t x, y, width, height;
     } window; /* frames are the part from (x, y) on of pictures of width x height, as EXR files say; all 0: all of
@@ -653,8 +658,8 @@ struct fl_export_options {
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);
 /* Names of nodes and materials for Cryptomatte in EXR files, until others come: those of the scene; those that
- * share one have the names of what they hang below before it, "car/wheel", and where that is not enough or there is
- * no name their identifiers, "wheel#12". Files without such layers do not need them. */
+ * share one have the names of what they hang below before it, "car/wheel", and where that is not enough or there
+ * is no name their identifiers, "wheel#12". Files without such layers do not need them. */
 FL_API bool fl_exporter_names(struct fl_exporter *exporter, struct fl_scene *scene, struct fl_error *error);
 /* Hands the frame over and returns; the file is complete, or has failed, by the next call of this or of
  * fl_exporter_wait, which report the failure of the one before. The frame may be destroyed at once. */

@@ -146,7 +146,9 @@ Imf::Header make_header(const struct image &image, const std::string &date, enum
     const bool loses = image.dwaa && part != exr_part::data;
     header.compression() = loses ? Imf::DWAA_COMPRESSION : Imf::ZIP_COMPRESSION;
     header.channels() = channels_of_part(image, part);
-    Imf::addChromaticities(header, Imf::Chromaticities()); // of Rec. 709 with the white D65
+    if (const float *xy = image.chromaticities)
+        Imf::addChromaticities(
+            header, Imf::Chromaticities({xy[0], xy[1]}, {xy[2], xy[3]}, {xy[4], xy[5]}, {xy[6], xy[7]}));
     header.insert("Software", Imf::StringAttribute("farlight " FARLIGHT_VERSION));
     if (!date.empty())
         Imf::addCapDate(header, date);

@@ -78,15 +78,19 @@ struct raster as_bytes(const struct raster &raster, std::vector<uint8_t> &bytes)
 
 // What every PNG file of ours says, then `texts`.
 bool write_png(const struct raster &raster, const std::vector<std::pair<std::string, std::string>> &texts,
-               const std::tm *date, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
+               const std::tm *date, bool other_display, uint8_t **file, size_t *file_bytes, char *reason,
+               size_t reason_bytes)
 {
-    std::vector<png_text> all = {{"oiio:ColorSpace", "sRGB"}, {"Software", "farlight " FARLIGHT_VERSION}};
+    std::vector<png_text> all = {{"Software", "farlight " FARLIGHT_VERSION}};
+    if (!other_display)
+        all.insert(all.begin(), {"oiio:ColorSpace", "sRGB"});
     std::vector<uint8_t> bytes;
     for (const auto &each : texts)
         all.push_back({each.first.c_str(), each.second.c_str()});
     const struct png png = {raster.width,
                             raster.height,
                             raster.channels,
+                            other_display,
                             static_cast<const uint8_t *>(as_bytes(raster, bytes).pixels),
                             all.data(),
                             all.size(),
@@ -161,7 +165,8 @@ bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, 
     for (const metadata_entry &each : entries)
         if (!each.text.empty())
             texts.emplace_back("farlight/" + each.name, each.text);
-    return write_png(raster, texts, image.full_metadata ? &date : nullptr, file, file_bytes, reason, reason_bytes);
+    return write_png(raster, texts, image.full_metadata ? &date : nullptr, image.display_view, file, file_bytes,
+                     reason, reason_bytes);
 }
 
 // Runs what may throw.
@@ -205,7 +210,7 @@ bool image_encode_plain(enum image_format format, const struct raster *raster, c
         [=] {
             if (format == IMAGE_JPEG)
                 return write_jpeg(*raster, 95, description, "", file, file_bytes, reason, reason_bytes);
-            return write_png(*raster, {{"Description", description}}, nullptr, file, file_bytes, reason,
+            return write_png(*raster, {{"Description", description}}, nullptr, false, file, file_bytes, reason,
                              reason_bytes);
         },
         reason, reason_bytes);

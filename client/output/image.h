@@ -44,6 +44,8 @@ struct image {
     const char *model;                       /* for the metadata; may be empty */
     const struct mattes *mattes;             /* EXR: names for the layers of Cryptomatte; NULL: none */
     const float *origin;                     /* for the metadata: subtracted from all places; NULL or 0: nothing */
+    const char *colour_space, *display_view; /* what the pixels have been converted to; NULL: nothing */
+    const float *chromaticities;             /* EXR: x and y of red, green, blue, white; NULL: unknown */
     const struct message_frame_begin *begin; /* encoding raw */
     const struct message_frame_end *end;
     const uint8_t *pixels;

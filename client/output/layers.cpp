@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <vector>
 
 namespace
@@ -194,6 +195,12 @@ std::string layer_names(unsigned layers)
             names +=
                 (names.empty() ? "" : ",") + std::string(protocol_layer_text(static_cast<protocol_layer>(layer)));
     return names;
+}
+
+bool is_colour_layer(enum protocol_layer layer)
+{
+    return std::any_of(std::begin(known), std::end(known),
+                       [=](const layer_channel &each) { return each.layer == layer && is_colour(each); });
 }
 
 Imf::ChannelList channels_of_part(const struct image &image, enum exr_part part)

@@ -15,6 +15,9 @@ struct image_window window_of(const struct image &image);
 // "beauty,depth"
 std::string layer_names(unsigned layers);
 
+// Whether it is light or a colour, and not a number of another kind.
+bool is_colour_layer(enum protocol_layer layer);
+
 // DWAA loses something of what it takes for colours, and goes by the ends of names: Y of a position would be one.
 enum class exr_part { whole, colours, data };
 

@@ -21,6 +21,13 @@ struct library_image {
     const char *date;        /* "YYYY:MM:DD hh:mm:ss"; may be empty */
 };
 
+struct library_colour {
+    const char *config; /* file of an OpenColorIO configuration */
+    const char *space;  /* NULL: the view, "VIEW" of the default display or "DISPLAY/VIEW" */
+    const char *view;
+    float aces_from_rec709[9]; /* row by row, of linear values: the space that configurations have in common */
+};
+
 /* What the module needs of the program, for files are the program's. */
 struct library_host {
     bool (*read)(int fd, size_t max_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
@@ -43,6 +50,10 @@ struct image_library {
      * installed. */
     bool (*draw)(const struct raster *raster, const struct message_export_text *wanted, char *reason,
                  size_t reason_bytes);
+    /* Reads the configuration. False: `reason` says why, and what there is. */
+    bool (*colour_open)(const struct library_colour *wanted, char *reason, size_t reason_bytes);
+    /* After that: RGBA of linear Rec. 709, straight, to the space or the view, in place. */
+    void (*colour_apply)(float *pixels, size_t count);
 };
 extern const struct image_library image_library __attribute__((visibility("default")));
 

@@ -10,9 +10,11 @@
 #include "protocol/version.h"
 
 #include <argp.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -31,7 +33,10 @@ enum {
     KEY_FULL_METADATA,
     KEY_TEXT,
     KEY_WINDOW,
-    KEY_DWAA
+    KEY_DWAA,
+    KEY_OCIO,
+    KEY_COLOUR_SPACE,
+    KEY_DISPLAY_VIEW
 };
 
 #define READ_MAX 2u
@@ -83,6 +88,15 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_DWAA:
         options->serve.dwaa = true;
         return 0;
+    case KEY_OCIO:
+        options->serve.colour.config = value;
+        return 0;
+    case KEY_COLOUR_SPACE:
+        options->serve.colour.space = value;
+        return 0;
+    case KEY_DISPLAY_VIEW:
+        options->serve.colour.view = value;
+        return 0;
     case KEY_TEXT:
         options->draws_text = true;
         return 0;
@@ -120,7 +134,20 @@ static bool draws_text(const struct options *options)
 
 static bool needs_library(const struct options *options)
 {
-    return draws_text(options) || (options->folder && image_needs_library(options->format));
+    return draws_text(options) || colour_needs_library(&options->serve.colour) ||
+           (options->folder && image_needs_library(options->format));
+}
+
+/* The folder of the configuration, which has its tables, too; the caller frees it. Names the file as it is there.
+ */
+static char *configuration_folder(struct options *options)
+{
+    static char path[PATH_MAX];
+    struct colour_wanted *wanted = &options->serve.colour;
+    if (!wanted->config || !colour_needs_library(wanted) || !realpath(wanted->config, path))
+        return NULL;
+    wanted->config = path;
+    return strndup(path, (size_t)(strrchr(path, '/') - path + 1));
 }
 
 /* The module's libraries start threads, so it is loaded within the sandbox. */
@@ -128,8 +155,9 @@ static bool enter_sandbox(struct options *options)
 {
     const char *const write_folders[] = {options->folder};
     char *modules = needs_library(options) ? library_folder() : NULL;
+    char *configuration = configuration_folder(options);
     const bool draws = draws_text(options);
-    const char *const read_folders[] = {modules, draws ? COMPARE_FONT_FOLDER : NULL,
+    const char *const read_folders[] = {modules, configuration, draws ? COMPARE_FONT_FOLDER : NULL,
                                         draws ? COMPARE_LOCAL_FONT_FOLDER : NULL};
     const bool writes = options->folder != NULL;
     const struct sandbox_options sandbox = {.read_folders = read_folders,
@@ -144,6 +172,7 @@ static bool enter_sandbox(struct options *options)
     tzset(); /* for dates; within the sandbox it could not read the time zone */
     const bool entered = sandbox_enter(&sandbox, reason, sizeof(reason));
     free(modules);
+    free(configuration);
     if (!entered) {
         fprintf(stderr, "farlight-export: %s\n", reason);
         return false;
@@ -167,6 +196,9 @@ int main(int argc, char **argv)
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
         {"window", KEY_WINDOW, "X,Y,W,H", 0, "Pictures are the part from X, Y on of W x H pixels", 0},
         {"dwaa", KEY_DWAA, NULL, 0, "Compress colours of EXR files with loss", 0},
+        {"ocio", KEY_OCIO, "FILE", 0, "Configuration of OpenColorIO", 0},
+        {"colour-space", KEY_COLOUR_SPACE, "NAME", 0, "Convert the colours of EXR files to this space", 0},
+        {"display-view", KEY_DISPLAY_VIEW, "VIEW", 0, "Make pictures of 8 bits by this view of a display", 0},
         {"full-metadata", KEY_FULL_METADATA, NULL, 0,
          "Store what differs from run to run, too: date, times of stages, revision", 0},
         {0}};

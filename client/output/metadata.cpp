@@ -87,6 +87,10 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     std::snprintf(digest, sizeof(digest), "%016" PRIx64, begin.digest);
     std::vector<metadata_entry> entries;
     add_text(entries, "model", image.model);
+    if (image.colour_space)
+        add_text(entries, "colour_space", image.colour_space);
+    if (image.display_view)
+        add_text(entries, "display_view", image.display_view);
     if (image.origin && (image.origin[0] != 0 || image.origin[1] != 0 || image.origin[2] != 0)) {
         char origin[64];
         std::snprintf(origin, sizeof(origin), "%.9g,%.9g,%.9g", static_cast<double>(image.origin[0]),

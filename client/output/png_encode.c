@@ -59,7 +59,8 @@ static void set_header(png_structp writer, png_infop info, const struct png *png
     png_set_IHDR(writer, info, png->width, png->height, 8,
                  png->channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_set_sRGB_gAMA_and_cHRM(writer, info, PNG_sRGB_INTENT_ABSOLUTE);
+    if (!png->other_display)
+        png_set_sRGB_gAMA_and_cHRM(writer, info, PNG_sRGB_INTENT_ABSOLUTE);
     if (png->date) {
         png_time time;
         png_convert_from_struct_tm(&time, png->date);

@@ -19,6 +19,7 @@ struct png_text {
 struct png {
     uint32_t width, height;
     unsigned channels;     /* 3, or 4 with straight alpha */
+    bool other_display;    /* colours are of a display that may not be sRGB */
     const uint8_t *pixels; /* sRGB, rows from the top, without gaps */
     const struct png_text *texts;
     size_t text_count;

@@ -118,6 +118,9 @@ static void write_image(struct exporter *exporter, const struct message_frame_en
                                 .window = exporter->options->window,
                                 .model = request->model,
                                 .mattes = exporter->mattes,
+                                .colour_space = exporter->options->colour.space,
+                                .display_view = exporter->options->colour.view,
+                                .chromaticities = colour_chromaticities(),
                                 .origin = request->origin,
                                 .begin = &request->incoming.begin,
                                 .end = end,
@@ -146,7 +149,10 @@ static bool end_frame(struct exporter *exporter, const struct message_frame_end 
     struct request *request = &exporter->request;
     if (!incoming_is_whole(&request->incoming))
         return false;
-    if (request->reason[0] == '\0' && draw_texts(request))
+    if (request->reason[0] == '\0' &&
+        colour_convert(&request->incoming.begin, request->incoming.pixels, request->reason,
+                       sizeof(request->reason)) &&
+        draw_texts(request))
         write_image(exporter, end);
     const bool answered = answer(exporter);
     incoming_finish(&request->incoming);
@@ -213,13 +219,27 @@ static bool handle(void *user, uint32_t number, const struct message *message)
     }
 }
 
+/* False: the other side has closed. */
+static bool answer_for_colours(const struct exporter *exporter)
+{
+    char reason[TEXT_MAX] = "";
+    const struct colour_wanted *wanted = &exporter->options->colour;
+    if (!colour_is_wanted(wanted))
+        return true;
+    if (colour_prepare(wanted, reason, sizeof(reason)))
+        return channel_send(&exporter->channel, 0, &(struct message){.type = MESSAGE_OK});
+    return channel_send_failure(
+        &exporter->channel, 0,
+        &(struct channel_failure){.field = wanted->view ? "display_view" : "colour_space", .reason = reason});
+}
+
 bool serve(const struct serve_options *options)
 {
     struct exporter exporter = {.options = options};
     exporter.channel =
         (struct channel){.fd = options->fd, .program = "farlight-export", .handle = handle, .user = &exporter};
     /* An unfinished picture is dropped at the end: nothing of it is on the disk. */
-    const bool good = channel_run(&exporter.channel);
+    const bool good = answer_for_colours(&exporter) && channel_run(&exporter.channel);
     incoming_finish(&exporter.request.incoming);
     free(exporter.request.texts);
     mattes_destroy(exporter.mattes);

@@ -3,6 +3,7 @@
 #ifndef FARLIGHT_CLIENT_OUTPUT_SERVE_H
 #define FARLIGHT_CLIENT_OUTPUT_SERVE_H
 
+#include "colour.h"
 #include "compare.h"
 #include "image.h"
 
@@ -13,7 +14,8 @@ struct serve_options {
     int fd;                  /* connected stream socket */
     float frames_per_second; /* for the metadata of images; 0: none */
     bool full_metadata, dwaa;
-    struct image_window window;       /* of EXR files */
+    struct colour_wanted colour; /* with it, the first answer says whether there is that, before any request */
+    struct image_window window;  /* of EXR files */
     const struct compare_file *files; /* that may be compared: a message opens nothing */
     size_t file_count;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "output/library.h"
 #include "caption.hpp"
+#include "colour.hpp"
 #include "compare.hpp"
 #include "tiff.hpp"
 #include "protocol/version.h"
@@ -144,4 +145,5 @@ bool prepare(bool draws, char *reason, size_t reason_bytes)
 
 } // namespace
 
-const struct image_library image_library = {prepare, encode, compare_with_library, caption_draw_into};
+const struct image_library image_library = {
+    prepare, encode, compare_with_library, caption_draw_into, colour_open_configuration, colour_apply_to};
