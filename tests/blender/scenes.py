@@ -191,3 +191,55 @@ def diffuse(colour):
     node.inputs["Color"].default_value = colour
     tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     return made
+
+
+def mixture(kind, *parts, share=None):
+    """Mix or Add Shader of (node, {input: value}). share: a number, or the name of the node that is the factor."""
+    made = bpy.data.materials.new("mixture")
+    made.use_nodes = True
+    tree = made.node_tree
+    joined = tree.nodes.new(f"ShaderNode{kind}Shader")
+    if isinstance(share, str):
+        tree.links.new(tree.nodes.new(f"ShaderNode{share}").outputs[0], joined.inputs["Fac"])
+    elif share is not None:
+        joined.inputs["Fac"].default_value = share
+    for (name, values), socket in zip(parts, [one for one in joined.inputs if one.type == "SHADER"]):
+        node = tree.nodes.new(f"ShaderNode{name}")
+        if name in {"BsdfPrincipled", "BsdfGlossy"}:
+            node.distribution = "MULTI_GGX"  # with the light that facets give each other, as in farlight
+        for key, value in values.items():
+            node.inputs[key].default_value = value
+        tree.links.new(node.outputs[0], socket)
+    tree.links.new(joined.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    return made
+
+
+def procedural(kind, output="Color", of=None, to="Color", **inputs):
+    """Feeds an input of the shader, of Lambert's without one, from a procedural texture; its node and the material."""
+    made = of or diffuse((1, 1, 1, 1))
+    node = made.node_tree.nodes.new(f"ShaderNodeTex{kind}")
+    for key, value in inputs.items():
+        node.inputs[key].default_value = value
+    made.node_tree.links.new(node.outputs[output], shader(made).inputs[to])
+    return made
+
+
+def without_surface(kind, **inputs):
+    """A material that is a volume alone."""
+    made = bpy.data.materials.new("volume")
+    made.use_nodes = True
+    tree = made.node_tree
+    tree.nodes.remove(tree.nodes["Principled BSDF"])
+    node = tree.nodes.new(f"ShaderNodeVolume{kind}")
+    for key, value in inputs.items():
+        node.inputs[key].default_value = value
+    tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Volume"])
+    return made
+
+
+def cube(name, of, place=(0, 0, 1), size=1.5):
+    bpy.ops.mesh.primitive_cube_add(size=size, location=place)
+    made = bpy.context.object
+    made.name = name
+    made.data.materials.append(of)
+    return made

@@ -24,10 +24,10 @@ import numpy as np  # pylint: disable=wrong-import-position
 import farlight  # pylint: disable=wrong-import-position
 from farlight import fields  # pylint: disable=wrong-import-position
 import farlight_blender  # pylint: disable=wrong-import-position
-from farlight_blender import engine, mirror, session  # pylint: disable=wrong-import-position
+from farlight_blender import bake, engine, mirror, session  # pylint: disable=wrong-import-position
 import scenes  # pylint: disable=wrong-import-position
-from scenes import (add_light, ball, blocks, diffuse, empty, grid, hairs, image, load, material, put,  # pylint: disable=wrong-import-position
-                    render, textured)
+from scenes import (add_light, ball, blocks, cube, diffuse, empty, grid, hairs, image, load, material, mixture,  # pylint: disable=wrong-import-position
+                    procedural, put, render, textured, without_surface)
 
 GROUND = (0.8, 0.5, 0.3, 1)
 DARK = 0.05  # parts that are darker are compared as if they were of this light
@@ -264,15 +264,124 @@ class Things(Case):
         add_light("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
         self.assert_like_cycles(0.015, 0.1)  # the mirrored sun lies between two textures' halves, 6 % of its part
 
+    def told(self):
+        """What is said of the picture."""
+        with unittest.mock.patch.object(engine.FarlightEngine, "_warn") as told:
+            self.picture = render()
+        return [one.args[0] for one in told.call_args_list]
+
     def test_what_is_not_known_is_told(self):
         empty((0.5, 0.5, 0.5))
         odd = material("odd")
         tree = odd.node_tree
-        tree.links.new(tree.nodes.new("ShaderNodeTexVoronoi").outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
+        node = tree.nodes.new("ShaderNodeWireframe")
+        tree.links.new(node.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
         grid("ground", 8, odd)
-        with unittest.mock.patch.object(engine.FarlightEngine, "_warn") as told:
-            render()
-        told.assert_called_once_with("odd: Base Color comes from Voronoi Texture, which is not known: its own value is used")
+        self.assertIn("odd: Base Color comes from Wireframe, which is not known: its own value is used", self.told())
+        self.assertIn("odd: Base Color comes from Wireframe, which is not known: its own value is used", self.told(), "again")
+
+    def test_procedural_textures_are_baked_and_are_those_of_cycles(self):
+        self.from_above()
+        ramped = procedural("Noise", "Fac", Scale=3)
+        tree = ramped.node_tree
+        ramp, noise = tree.nodes.new("ShaderNodeValToRGB"), tree.nodes["Noise Texture"]
+        for element, place, colour in zip(ramp.color_ramp.elements, (0.4, 0.6), ((0.8, 0.1, 0, 1), (0, 0.2, 0.7, 1))):
+            element.position, element.color = place, colour
+        tree.links.new(noise.outputs["Fac"], ramp.inputs["Fac"])
+        tree.links.new(ramp.outputs["Color"], scenes.shader(ramped).inputs["Color"])
+        for place, made in enumerate((ramped, procedural("Voronoi", Scale=3), procedural("Checker", Scale=4, Color1=(0.9, 0.1, 0.1, 1)),
+                                      procedural("Gradient"), procedural("Wave", Scale=1, Distortion=2), procedural("Noise", Scale=2))):
+            made.name = f"made {place}"
+            grid(f"square {place}", 1.9, made, (2 * (place % 3) - 2, 2 * (place // 3) - 1, 0))
+        add_light("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
+        self.assert_like_cycles(0.01, 0.05)
+        with unittest.mock.patch.object(bake.Surface, "picture") as baked:
+            self.assertEqual(self.told(), [f"made {place}: what its nodes say is baked into pictures of 1024 x 1024 texels" for place in range(6)])
+        baked.assert_not_called()  # nothing has changed
+
+    def test_a_checker_is_baked_for_each_mesh_that_has_it(self):
+        empty((0.5, 0.5, 0.5))
+        tiles = procedural("Checker", Scale=8, Color1=(0.9, 0.9, 0.9, 1), Color2=(0.1, 0.1, 0.1, 1))
+        grid("ground", 12, tiles)
+        cube("cube", tiles, (1.5, 0, 0.8))
+        self.assert_like_cycles(0.01, 0.1)  # squares of three pixels: texels at the edges of a face are wider than the filter
+
+    def test_a_mesh_without_a_uv_map_has_the_mean_of_a_procedural_texture(self):
+        self.from_above()
+        bare = grid("bare", 4, procedural("Checker", Scale=8, Color1=(0.8, 0.2, 0, 1), Color2=(0, 0.4, 0.6, 1)))
+        bare.data.uv_layers.remove(bare.data.uv_layers[0])
+        add_light("SUN", math.pi, angle=0)
+        self.assertIn("diffuse: a mesh without a UV map has the mean of what its nodes say", self.told())
+        np.testing.assert_allclose(self.picture[36, 48, :3], (0.4, 0.3, 0.3), atol=0.02)  # three deviations of 4096 samples
+
+    def test_bumps_of_noise(self):
+        self.from_above()
+        bumpy = material("bumpy", Specular=0.0, Roughness=1.0)
+        tree = bumpy.node_tree
+        noise, bump = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeBump")
+        noise.inputs["Scale"].default_value, bump.inputs["Distance"].default_value = 3, 0.3
+        tree.links.new(noise.outputs["Fac"], bump.inputs["Height"])
+        tree.links.new(bump.outputs["Normal"], scenes.shader(bumpy).inputs["Normal"])
+        grid("ground", 5, bumpy)
+        add_light("SUN", 3, turn=(0.6, 0, 0), angle=0)
+        self.assert_like_cycles(0.015, 0.05)  # fully rough plastic: 1 %
+
+    def row(self, *materials):
+        scene = self.balls()
+        scene.camera.location, scene.camera.rotation_euler, scene.camera.data.lens = (0, -13, 3.5), (1.37, 0, 0), 60
+        for place, made in enumerate(materials):
+            ball(f"ball {place}", made(), (2.2 * (place - 1), 0, 1), 1)  # made here, as an empty scene has no materials
+        self.panel()
+
+    RED, BLUE, GREEN = (0.8, 0.1, 0.05, 1), (0.05, 0.1, 0.8, 1), (0.2, 0.6, 0.2, 1)
+
+    def test_mixed_shaders(self):
+        red, white = ("BsdfDiffuse", {"Color": self.RED}), ("BsdfGlossy", {"Color": (1, 1, 1, 1), "Roughness": 0.3})
+        metal = ("BsdfPrincipled", {"Base Color": self.BLUE, "Roughness": 0.4, "Metallic": 1.0})
+        for case in ((("Mix", red, white, 0.2), ("Mix", ("BsdfPrincipled", {"Base Color": self.RED, "Roughness": 0.4}), metal, 0.5),
+                      ("Mix", ("BsdfTransparent", {}), ("BsdfDiffuse", {"Color": self.BLUE}), 0.6)),
+                     (("Add", ("Emission", {"Color": self.GREEN, "Strength": 0.5}), red, None), ("Mix", red, white, "Fresnel"),
+                      ("Mix", red, ("BsdfTranslucent", {"Color": self.BLUE}), 0.5))):
+            with self.subTest(case):
+                self.row(*(lambda one=one: mixture(one[0], *one[1:3], share=one[3]) for one in case))
+                # Transparent's specks, of 64 samples, are 4 % of a part.
+                self.assert_like_cycles(0.015, 0.08)
+
+    def test_a_mask_mixes_two_materials(self):
+        self.from_above()
+        made = mixture("Mix", ("BsdfDiffuse", {"Color": self.RED}), ("BsdfDiffuse", {"Color": self.BLUE}))
+        procedural("Checker", "Fac", made, "Fac", Scale=4)
+        cut = mixture("Mix", ("BsdfTransparent", {}), ("BsdfDiffuse", {"Color": self.GREEN}))
+        procedural("Checker", "Fac", cut, "Fac", Scale=4)
+        grid("mixed", 3, made, (-1.6, 0, 0))
+        grid("cut", 3, cut, (1.6, 0, 0))
+        add_light("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_what_cannot_be_mixed_is_told(self):
+        empty((0.5, 0.5, 0.5))
+        grid("ground", 8, mixture("Mix", ("BsdfDiffuse", {"Color": self.RED}), ("BsdfToon", {}), share=0.5))
+        ball("ball", mixture("Add", ("BsdfPrincipled", {}), ("BsdfGlass", {})))
+        self.assertEqual(sorted(self.told()), ["mixture.001: Add Shader adds Principled and Glass: Principled alone is shown",
+                                               "mixture: the node Toon BSDF is not known, and is left out of Mix Shader"])
+
+    def test_sheen_is_as_strong_as_in_cycles(self):
+        self.row(*(lambda one=one: material("cloth", Base_Color=one, Specular=0.0, Roughness=1.0, Sheen=1.0, Sheen_Tint=0.0)
+                   for one in ((0.1, 0.1, 0.3, 1), (0.5, 0.1, 0.1, 1), (0.02, 0.02, 0.02, 1))))
+        # Cycles' sends back most of what comes from behind the surface's horizon, fibres less: 0.2 of a dark ball's rim.
+        self.assert_like_cycles(0.03, 0.25)
+
+    def test_a_volume_alone_has_no_surface(self):
+        empty((0.6, 0.6, 0.6))
+        grid("ground", 20, diffuse(GROUND))
+        bare = render()
+        fog = cube("fog", without_surface("Scatter"))
+        self.assertEqual(self.told(), ["volume: its volume is not drawn: render it with Cycles"])
+        np.testing.assert_array_equal(self.picture, bare)
+        bpy.data.objects.remove(fog)
+        cube("blue air", without_surface("Absorption", Color=(0.2, 0.6, 0.9, 1), Density=1))
+        # What is seen through the ground's shadow is off by the thickness that shadow rays take.
+        self.assert_like_cycles(0.05, 0.3)
 
     def test_what_is_not_drawn_is_told_once(self):
         empty((0.5, 0.5, 0.5))
@@ -718,8 +827,8 @@ class Elsewhere(Case):
 
     def test_an_ssh_that_fails_is_named_with_its_reason_and_what_to_try(self):
         usual = "unix:/run/farlight/farlight.sock"
-        for server, at, words in (("ssh:nowhere", usual, "ssh ended with status 255: ssh: Could not resolve hostname nowhere: Name or service "),
-                                  ("ssh:refusing", usual, "ssh ended with status 255: ssh: connect to host refusing port 22: Connection ref"),
+        for server, at, words in (("ssh:nowhere", usual, "ssh ended with status 255: Could not resolve hostname nowhere: Name or service "),
+                                  ("ssh:refusing", usual, "ssh ended with status 255: connect to host refusing port 22: Connection ref"),
                                   ("ssh:bare", usual, "ssh ended with status 127: bash: line 1: farlight: command not found; "),
                                   ("ssh:there:/no/socket", "unix:/no/socket", "ssh ended with status 75: farlight: unix:/no/socket: cannot reach "
                                    "a daemon: No such file or directory")):

@@ -2,6 +2,7 @@
 """Blender's images as arrays, rows from the top."""
 from __future__ import annotations
 
+import hashlib
 from typing import Any, Optional
 
 import bpy
@@ -33,6 +34,11 @@ def to_linear(values: Any) -> Any:
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
+def from_linear(values: Any) -> Any:
+    """To sRGB."""
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055)
+
+
 def linear(image: bpy.types.Image) -> Optional[Any]:
     """Height x width x 3 linear floats."""
     values = pixels(image)
@@ -52,3 +58,10 @@ def channel(image: bpy.types.Image, name: str) -> Optional[Any]:
     if name in {"Red", "Green", "Blue"}:
         return colours[..., ("Red", "Green", "Blue").index(name)]
     return colours @ np.array((0.2126, 0.7152, 0.0722), np.float32)
+
+
+def digest(image: bpy.types.Image) -> bytes:
+    """The same for the same picture."""
+    values = pixels(image)
+    told = repr((image.name_full, image.colorspace_settings.name)).encode()
+    return hashlib.blake2b(told if values is None else told + np.ascontiguousarray(values).tobytes(), digest_size=16).digest()

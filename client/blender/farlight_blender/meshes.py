@@ -11,6 +11,7 @@ import numpy as np
 from farlight.scene import Object, Scene
 from farlight.messages import BlobRef, ObjectKind
 
+from .bake import Surface
 from .materials import Material, Reader
 from .motion import Motion
 
@@ -73,9 +74,11 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Op
     """What Scene.add_mesh() takes, and "moves". bent: keys of the shutter x corners x 6, positions and normals."""
     mesh.calc_loop_triangles()
     triangles = read(mesh.loop_triangles, "loops", 3, np.int32)
+    slots = np.clip(read(mesh.loop_triangles, "material_index", 1, np.int32), 0, len(uses) - 1)
+    is_drawn = ~np.array([use.is_nothing for use in uses])[slots]
+    triangles, slots = triangles[is_drawn], slots[is_drawn]
     if not len(triangles):
         return None
-    slots = np.clip(read(mesh.loop_triangles, "material_index", 1, np.int32), 0, len(uses) - 1)
     order = np.argsort(slots, kind="stable")  # few runs of materials
     numbers = np.array([use.number for use in uses], np.uint32)
     corners = _corners(mesh, uses, steady)
@@ -151,10 +154,12 @@ class Shared:
         return bent
 
     def _make(self, thing: bpy.types.Object, key: Hashable) -> tuple[Optional[Object], bool]:
-        uses = [self._reader.material(slot.material) for slot in thing.material_slots] or [self._reader.material(None)]
         number = self._mirror.number(ObjectKind.MESH, key)
         mesh = thing.data if thing.type == "MESH" else thing.to_mesh()
         try:
+            surface = Surface(mesh, key) if mesh else None
+            uses = [self._reader.material(slot.material, surface, place) for place, slot in enumerate(thing.material_slots)]
+            uses = uses or [self._reader.material(None)]
             bent = self._bent(thing, key, mesh) if mesh else None
             arrays = _arrays(mesh, uses, functools.partial(self._mirror.steady, number), bent) if mesh else None
         finally:

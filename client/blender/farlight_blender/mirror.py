@@ -108,6 +108,8 @@ class Mirror:
         self._last: dict[ObjectKind, int] = {}
         self._seen: set[tuple[ObjectKind, Hashable]] = set()
         self._motion: Optional[motion.Motion] = None
+        self._remembered: dict[Hashable, tuple[Hashable, Any]] = {}
+        self._asked: set[Hashable] = set()
 
     # ---- for the modules that read Blender's data
 
@@ -130,6 +132,13 @@ class Mirror:
             return before
         self._steady[mesh, name] = values
         return values
+
+    def remembered(self, key: Hashable, told: Hashable, make: Callable[[], Any]) -> Any:
+        """What takes long to make, anew where what is told of it differs. Gone after an update that did not ask."""
+        self._asked.add(key)
+        if key not in self._remembered or self._remembered[key][0] != told:
+            self._remembered[key] = told, make()
+        return self._remembered[key][1]
 
     def note(self, text: str) -> None:
         """Says once what the picture lacks."""
@@ -158,6 +167,7 @@ class Mirror:
         """Makes the scene what Blender's is. seen_by: a camera; its node is returned. moves: what does while the shutter is open."""
         self._motion = moves
         self._seen.clear()
+        self._asked.clear()
         self.notes.clear()
         self.scene.set(SetNode(node=self._root().number, kind=NodeKind.GROUP, name="Blender",
                                parent_from_node=[float(one) for one in WORLD_FROM_BLENDER[:3].ravel()]))
@@ -202,6 +212,7 @@ class Mirror:
                 self.place(_hairs_key(key, name), hairs, place, thing.name, bends=bends)
 
     def _sweep(self) -> None:
+        self._remembered = {key: made for key, made in self._remembered.items() if key in self._asked}
         gone = [one for one in self._numbers if one not in self._seen]
         for kind, key in sorted(gone, key=lambda one: SWEPT.get(one[0], len(SWEPT))):
             number = self._numbers.pop((kind, key))

@@ -17,20 +17,20 @@ def source(socket: Optional[bpy.types.NodeSocket]) -> Optional[bpy.types.NodeSoc
     return None
 
 
+def _shader(tree: bpy.types.NodeTree, name: str) -> Optional[bpy.types.Node]:
+    output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
+    start = source(output.inputs[name]) if output is not None else None
+    return start.node if start else None
+
+
 def surface(tree: bpy.types.NodeTree) -> Optional[bpy.types.Node]:
     """The shader of the active output."""
-    for target in ("CYCLES", "ALL"):
-        output = tree.get_output_node(target)
-        if output is not None:
-            start = source(output.inputs["Surface"])
-            return start.node if start else None
-    return None
+    return _shader(tree, "Surface")
 
 
-def has_volume(tree: bpy.types.NodeTree) -> bool:
-    """Whether the active output has a volume."""
-    output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
-    return output is not None and source(output.inputs["Volume"]) is not None
+def volume(tree: bpy.types.NodeTree) -> Optional[bpy.types.Node]:
+    """The volume of the active output."""
+    return _shader(tree, "Volume")
 
 
 def number(socket: Optional[bpy.types.NodeSocket], missing: float = 0.0) -> float:

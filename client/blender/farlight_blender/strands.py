@@ -255,8 +255,11 @@ class Shared:
         arrays = tubes(made) if made else None
         if arrays is None:
             return None, False
+        look = self._material(thing, slot)
+        if look.is_nothing:
+            return None, False
         more = with_targets(self._mirror.scene, arrays)
-        material = Object(ObjectKind.MATERIAL, self._material(thing, slot).number)
+        material = Object(ObjectKind.MATERIAL, look.number)
         return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], material=material, place=False, **arrays,
                                            **more), bool(more)
 

@@ -34,7 +34,7 @@ def update(mirror: Mirror, scene: bpy.types.Scene) -> None:
     if world is None:
         mirror.scene.set_environment((0, 0, 0))
         return
-    if world.use_nodes and world.node_tree and nodes.has_volume(world.node_tree):
+    if world.use_nodes and world.node_tree and nodes.volume(world.node_tree):
         mirror.note("the world's volume is not drawn")
     background = nodes.surface(world.node_tree) if world.use_nodes and world.node_tree else None
     if background is None or background.type != "BACKGROUND":
