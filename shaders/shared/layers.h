@@ -36,9 +36,9 @@
 #define LIGHT_EMITTED 3.0f
 #define LIGHT_BEHIND 4.0f
 
-/* Storage buffer: a plane for each layer of the frame but the beauty and those of Cryptomatte, in their order; in it
- * a vec4 for each sample of the slice. With layers of light another: what the first surface did with the light of the
- * sample's path, rgb the share that it mirrored, w 1: it let it through. */
+/* Storage buffer: a plane for each layer of the frame but the beauty and those of Cryptomatte, in their order; in
+ * it a vec4 for each sample of the slice. With layers of light another: what the first surface did with the light
+ * of the sample's path, rgb the share that it mirrored, w 1: it let it through. */
 #define BIND_LAYER_SUMS BIND_PASS_0
 
 /* Storage buffer: what covers each sample of the slice, for Cryptomatte: a plane for each wave of rays that go

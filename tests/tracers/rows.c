@@ -30,18 +30,28 @@ static const struct tracer_row rows[] = {
     {                                                                                                             \
         .name = "ldc" form, .number = 3, .is_form = sizeof(form) > 1, .refuses_motion = STILL, __VA_ARGS__        \
     }
-    LDC("", .options.ldc.resolution = 256, .sampled = {256, 0.25, 0.004, BORDERS}),
+    LDC("", .options.ldc.resolution = 256,
+        .sampled = {.resolution = 256, .cells = 0.25, .wrong_max = 0.004, .reason = BORDERS}),
     LDC(", as in the paper", .options.ldc = {.resolution = 256, .form = TRACER_FORM_PAPER},
-        .sampled = {256, 2.5, 0.03, BORDERS, .coarse = "what comes within a cell of a sample's depth has hit it"}),
+        .sampled = {.resolution = 256,
+                    .cells = 2.5,
+                    .wrong_max = 0.03,
+                    .reason = BORDERS,
+                    .coarse = "what comes within a cell of a sample's depth has hit it"}),
 #define ABUFFER(form, ...)                                                                                        \
     {                                                                                                             \
         .name = "abuffer" form, .number = 4, .is_form = sizeof(form) > 1, .refuses_motion = STILL, __VA_ARGS__    \
     }
-    ABUFFER("", .options.abuffer.resolution = 256, .sampled = {256, 0.25, 0.01, BORDERS}),
+    ABUFFER("", .options.abuffer.resolution = 256,
+            .sampled = {.resolution = 256, .cells = 0.25, .wrong_max = 0.01, .reason = BORDERS}),
     ABUFFER(", in voxels of 16 cells", .options.abuffer = {.resolution = 256, .voxels = 16},
-            .sampled = {256, 0.25, 0.01, BORDERS}),
+            .sampled = {.resolution = 256, .cells = 0.25, .wrong_max = 0.01, .reason = BORDERS}),
     ABUFFER(", as in the paper", .options.abuffer = {.resolution = 256, .form = TRACER_FORM_PAPER},
-            .sampled = {256, 0.25, 0.01, BORDERS, .own_way = "whether it is inside is asked a step away"}),
+            .sampled = {.resolution = 256,
+                        .cells = 0.25,
+                        .wrong_max = 0.01,
+                        .reason = BORDERS,
+                        .own_way = "whether it is inside is asked a step away"}),
 #define RAYSPACE(form, ...)                                                                                       \
     {                                                                                                             \
         .name = "rayspace" form, .number = 5, .is_form = sizeof(form) > 1, .options = { __VA_ARGS__ }             \
