@@ -52,13 +52,15 @@ bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 no
     s = min(max(to_sample.z / d.z, max(near.x, near.y)), min(far.x, far.y));
     beside = 0.0;
     bool intersects = abs(s * d.z - to_sample.z) <= LDC_TOLERANCE_CELLS;
+    // A ray that begins as near to a sample's plane leaves that surface.
+    bool is_own = height * height < LDC_TOLERANCE_CELLS * LDC_TOLERANCE_CELLS * dot(normal, normal);
 #else
     s = height / side;
     vec2 from_middle = abs(s * d.xy - to_sample.xy);
     beside = max(from_middle.x, from_middle.y) - 0.5;
     bool intersects = true;
-#endif
     float own = side > 0.0 ? LDC_OWN_BEHIND * LDC_OWN_BEHIND : LDC_OWN_BEFORE * LDC_OWN_BEFORE;
     bool is_own = s < LDC_OWN_WAY && height * height < own * dot(normal, normal);
+#endif
     return intersects && !is_own;
 }

@@ -37,7 +37,7 @@ WITHOUT_DEVICE = (r"test_import(_\w+)?", r"unit/(base|client|edit|encode|fuzz|he
 # ten times as long: pictures against closed forms, forms of a tracer that differ in shaders, commands whose pictures are compared.
 NOT_SANITIZED = (
     r"accuracy/(?!render_frame|tracer_owners|wave_comparison).*",
-    r"contract/.*(ray alone|packets of|rays? a call)", r"contract/bvh in the plain form", r"contract/(ldc|abuffer|rayspace,|quadtree).*",
+    r"contract/(ldc|abuffer|rayspace,|quadtree).*",
     r"unit/trace/(abuffer|ldc)/traversal", r"unit/trace/quadtree/layers",
     r"test_(animate|bench|check_device|compare.*|guide|import_animation|layers|models|pictures|poses|shot|siege|tracer_commands|view)")
 
