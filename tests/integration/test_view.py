@@ -345,7 +345,7 @@ class MadeHere(Viewer):
         states = self.replay(events, "--views", "auto", size=size)
         first, rested = states.pop("first"), states.pop("rested")
         for name, state in states.items():
-            self.assertLessEqual(state["local"].get("unseen", 0), 0.1, name)
+            self.assertLessEqual(state["local"].get("unseen", 0), 0.1 + 1e-6, name)  # a float
         self.assertFalse(rested["local"]["shown"])
         info = json.loads(self.expect(farlight("info", "--json", bundled_scenes() / "teapot.glb"), 0).stdout)
         middle = [(lower + upper) / 2 for lower, upper in zip(info["bounds"]["lower"], info["bounds"]["upper"])]

@@ -154,9 +154,10 @@ TEST(the_paper_takes_depths_for_planes)
         assert_float_equal(3 - hits[i].distance, 0.5f * (middle + 1), 1e-4f);
     }
     for (int above = 0; above < 2; above++) {
+        const float falls = (4 - (above ? 2 : 0.5f)) * cell / 1.8f;
         for (uint32_t i = 0; i < RAY_COUNT; i++)
-            rays[i] = (struct ray){{-0.9f, test_uniform(&seed, -0.9f, 0.9f), 0.05f + (above ? 2 : 0.5f) * cell, 0},
-                                   {1, 0, 0.5f, 1e30f}};
+            rays[i] = (struct ray){{-0.9f, test_uniform(&seed, -0.9f, 0.9f), 0.05f + 4 * cell, 0},
+                                   {1, 0, 0.5f - falls, 1e30f}};
         trace(&fixture, rays, hits);
         assert_int_equal(hits_in(hits), above ? 0 : RAY_COUNT);
     }
