@@ -100,6 +100,12 @@ struct gpu_device {
     bool lost; /* the context; nothing works any more, see gpu_note_loss */
 };
 
+/* Whether the host may build a structure in place of passes: it maps buffers, whose memory is software GL's. */
+static inline bool gpu_host_builds(const struct gpu_device *device)
+{
+    return device->facts.software && device->facts.builds_on_host;
+}
+
 struct gpu_options {
     int index;                    /* of gpu_device_list; -1: first hardware, else software */
     bool software;                /* insist on software */

@@ -25,7 +25,7 @@ struct host_runs {
 
 bool abuffer_host_is_used(const struct abuffer_task *task)
 {
-    return task->builder->device->facts.builds_on_host;
+    return gpu_host_builds(task->builder->device);
 }
 
 /* ---- one list ---- */

@@ -24,7 +24,7 @@ struct host_pack {
 
 bool ldc_host_is_used(const struct ldc_task *task)
 {
-    return task->builder->device->facts.builds_on_host && task->slots > 0;
+    return gpu_host_builds(task->builder->device) && task->slots > 0;
 }
 
 /* As ldc/run.glsl has it. */

@@ -251,7 +251,7 @@ void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned 
         .grid = grid,
         .next = begin,
         .counts.lower_nodes = {grid, grid, grid, 0},
-        .by_host = store->device->facts.builds_on_host,
+        .by_host = gpu_host_builds(store->device),
     };
     cube->first_entry = cube->entry_count = 0;
     for (unsigned i = 0; i < which; i++)

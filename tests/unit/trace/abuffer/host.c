@@ -14,7 +14,7 @@ static void build_by(struct fixture *fixture, struct contents *contents, bool on
     struct error error = {0};
     enum tracer_progress progress;
     const bool builds_on_host = device->facts.builds_on_host;
-    device->facts.builds_on_host = !on_device;
+    device->facts.builds_on_host = builds_on_host && !on_device;
     place(fixture, RESOLUTION, VOXELS);
     expect_ok(abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
                                   fixture->instance_count, &fixture->options, &error),

@@ -140,7 +140,7 @@ static void build_by(struct fixture *fixture, struct contents *contents, ldc_uni
 {
     const bool builds_on_host = device->facts.builds_on_host;
     struct error error = {0};
-    device->facts.builds_on_host = !on_device;
+    device->facts.builds_on_host = builds_on_host && !on_device;
     place(fixture, LDC_CUBE_STATIC, RESOLUTION);
     gpu_scene_bind(&fixture->gpu);
     enum tracer_progress progress =
