@@ -35,7 +35,7 @@ struct cli_sinks {
 bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error);
 /* Starts the programs that write. */
 bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error);
-/* Of the scene that frames from now on show, where files have them. */
+/* Writes the names of the scene's objects and materials, where files have them, to the frames that follow. */
 bool cli_sinks_names(struct cli_sinks *sinks, struct fl_scene *scene, struct fl_error *error);
 /* Whether the frame's picture already exists, complete and of the wanted size, in every sink. */
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame);

@@ -628,7 +628,8 @@ struct fl_exporter_options {
     bool full_metadata; /* date, times of stages and revision too: then no two files are the same */
     bool draws_text;    /* pictures come with text */
     bool dwaa; /* EXR: colours are compressed with loss (DWAA), all else by zip as a part of its own; else zip */
-    /* What linear Rec. 709, as frames of the format rgba32f have it, becomes; all NULL: what it is. */
+    /* The colours that are written. Frames of the format rgba32f are linear Rec. 709; all NULL: so are the files.
+     */
     const char
         *colour_space; /* EXR: ACEScg, ACES2065-1, Linear Rec.2020, Linear P3-D65 or one of the configuration */
     const char *display_view; /* pictures of 8 bits: "VIEW" or "DISPLAY/VIEW" of the configuration */

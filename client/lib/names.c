@@ -81,14 +81,14 @@ static size_t end_of_same(const struct named *named, size_t count, size_t from)
     return end;
 }
 
-/* All that share one have their identifiers behind it, so that a name does not depend on what else there is. */
+/* Objects that share a name get their identifiers behind it, each of them: so a name stays as others come. */
 static bool number_all(struct named *named, size_t count, struct fl_error *error)
 {
     char text[PATH_BYTES + 16];
     qsort(named, count, sizeof(*named), by_name);
     for (size_t i = 0, end; i < count; i = end) {
         end = end_of_same(named, count, i);
-        for (size_t k = end - 1; end - i > 1 && k + 1 > i; k--) {
+        for (size_t k = i; end - i > 1 && k < end; k++) {
             snprintf(text, sizeof(text), "%s#%u", *named[k].name, named[k].object->id);
             if (!set_name(named[k].name, text, error))
                 return false;

@@ -115,7 +115,7 @@ matrix from_rec709(const named_space &to)
     return multiply(inverse(xyz_from(to)), multiply(adaptation(rec709, to), xyz_from(rec709)));
 }
 
-// What is done to all frames of this run.
+// The conversion of all frames of this run.
 struct {
     bool converts, shows; // shows: pictures of 8 bits
     bool is_linear;       // by the matrix, which is that of the configuration's transform, too

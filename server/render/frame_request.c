@@ -152,11 +152,15 @@ static bool check_light_layers(const struct frame_request *request, struct error
 
 static bool check_layers(const struct frame_request *request, struct error *error)
 {
-    if (request->layers & ~LAYER_BITS_ALL)
-        return error_set(error, ERROR_UNSUPPORTED, "layers", "there is no layer number %d",
-                         __builtin_ctz(request->layers & ~LAYER_BITS_ALL));
-    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != PIXEL_FORMAT_RGBA32F)
-        return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
+    if (request->layers & ~LAYER_BITS_ALL) {
+        error_set(error, ERROR_UNSUPPORTED, "layers", "there is no layer number %d",
+                  __builtin_ctz(request->layers & ~LAYER_BITS_ALL));
+        return error_remedy(error, "leave it out, or ask a newer daemon");
+    }
+    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != PIXEL_FORMAT_RGBA32F) {
+        error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
+        return error_remedy(error, "ask for rgba32f, or leave out layers");
+    }
     if (request->layers & LAYER_BITS_LIGHT && !check_light_layers(request, error))
         return false;
     if (request->attachments >= 1u << ATTACHMENT_COUNT)

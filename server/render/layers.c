@@ -86,7 +86,7 @@ void layers_begin_slice(struct layers *layers, const struct render_context *cont
     layers->plane_samples = context->slice.slot_count << context->uniforms.sample_shift;
 }
 
-/* Of the sums. */
+/* The layer's plane in the sums. */
 static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
 {
     return (uint32_t)__builtin_popcount(layers->wanted & ~LAYER_BITS_CRYPTO & (layer_bit - 1));
@@ -308,7 +308,7 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
     return gather_ao(layers, context, count, error);
 }
 
-/* Of a kind, whose planes are those that `bits` has; the others hold nothing else. */
+/* Adds what covers the slice to the ranks of one kind, objects or materials: its planes are those in `bits`. */
 static bool rank_covers(struct layers *layers, struct picture *picture, struct render_context *context,
                         uint32_t bits, struct error *error)
 {

@@ -21,7 +21,7 @@ struct layers {
     uint32_t plane_samples; /* likewise: its samples, so many in each plane of the sums */
 };
 
-/* Of another pass: the layers that it wants. `is_shaded`: it shades what its rays hit. */
+/* Finds the layers that another pass wants. `is_shaded`: it shades what its rays hit. */
 void layers_begin(struct layers *layers, struct render_context *context, bool is_shaded);
 /* Whether they need the waves that the beauty does. */
 bool layers_are_shaded(const struct layers *layers);

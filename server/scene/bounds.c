@@ -157,7 +157,7 @@ struct reach {
     size_t count;
     uint64_t left; /* of the budget for deformed meshes */
     bool found;
-    /* Of the instance at hand. */
+    /* The instance at hand: its place, and the directions in its own space. */
     const float *world_from_object;
     struct direction own[SCENE_SUPPORTS_MAX];
 };

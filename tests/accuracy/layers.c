@@ -453,23 +453,14 @@ TEST(places_agree_with_depths_through_a_lens)
     frame_result_finish(&result);
 }
 
-static void expect_refused(struct fixture *fixture, const char *text)
-{
-    struct error error = {0};
-    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
-    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
-    assert_string_equal(error.field, "layers");
-    assert_non_null(strstr(error.text, text));
-}
-
 TEST(layers_that_there_are_not_or_no_pixel_holds_are_refused)
 {
     struct fixture *fixture = *state;
     fixture->request.layers = BIT(28);
-    expect_refused(fixture, "number 28");
+    fixture_expect_no_layers(fixture, "number 28");
     fixture->request.layers = BIT(LAYER_DEPTH);
     fixture->request.format = PIXEL_FORMAT_RGBA16F;
-    expect_refused(fixture, "rgba32f");
+    fixture_expect_no_layers(fixture, "rgba32f");
     fixture->request.layers = BIT(LAYER_BEAUTY);
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.size_bytes, 32 * 32 * 8);

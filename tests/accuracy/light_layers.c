@@ -171,16 +171,6 @@ TEST(light_is_in_the_layer_of_its_first_surface)
 
 /* ---- what has no such layers ---- */
 
-static void expect_refused(struct fixture *fixture, const char *text)
-{
-    struct error error = {0};
-    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
-    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
-    assert_string_equal(error.field, "layers");
-    assert_non_null(strstr(error.text, text));
-    assert_true(error.remedy[0] != '\0');
-}
-
 TEST(light_that_does_not_add_up_has_no_layers)
 {
     struct fixture *fixture = *state;
@@ -191,9 +181,9 @@ TEST(light_that_does_not_add_up_has_no_layers)
     fixture_commit(fixture);
     fixture->request.layers = ALL;
     fixture->request.integrator = INTEGRATOR_WHITTED;
-    expect_refused(fixture, "the integrator whitted");
+    fixture_expect_no_layers(fixture, "the integrator whitted");
     fixture->request.integrator = INTEGRATOR_PATH;
-    expect_refused(fixture, "a display's values");
+    fixture_expect_no_layers(fixture, "a display's values");
     fixture->request.view_source = VIEW_SOURCE_LAYERS;
-    expect_refused(fixture, "depth layers");
+    fixture_expect_no_layers(fixture, "depth layers");
 }

@@ -252,6 +252,17 @@ static inline struct frame_result fixture_render(struct fixture *fixture)
     return fixture_render_motion(fixture, NULL);
 }
 
+/* The request asks for layers that the frame cannot have. The error's text holds `text`. */
+static inline void fixture_expect_no_layers(struct fixture *fixture, const char *text)
+{
+    struct error error = {0};
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+    assert_string_equal(error.field, "layers");
+    assert_non_null(strstr(error.text, text));
+    assert_true(error.remedy[0] != '\0');
+}
+
 static inline const float *fixture_pixel(const struct frame_result *result, uint32_t x, uint32_t y)
 {
     return (const float *)(const void *)result->pixels + ((size_t)y * result->width + x) * 4;
