@@ -139,7 +139,8 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown, "
-     "crypto-object and crypto-material (Cryptomatte, with names); light: the parts that add up to the beauty",
+     "crypto-object and crypto-material (Cryptomatte, with names), motion (vectors to the next frame and the one "
+     "before); light: the parts that add up to the beauty",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",

@@ -81,6 +81,38 @@ static bool check_time(uint32_t frame, double time_s, struct error *error)
     return error_remedy(error, "use more frames a second, or smaller frame numbers");
 }
 
+/* A camera that there is none of at that time stands still. */
+static void look_beside(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
+                        double time_s, struct animation_bounds *bounds, struct frame_camera *camera)
+{
+    struct animation_view view;
+    struct error none = {0};
+    if (animation_view(job, scene, pose, time_s, bounds, &view, &none))
+        *camera = view.camera;
+}
+
+/* Where things and the camera are a frame earlier and a frame later. The first frame has one before it, too, and
+ * the last one after it: where motions go on, vectors do. */
+static bool add_neighbours(struct shot *shot, const struct engine_job *job, const struct scene *scene,
+                           double time_s, struct animation_bounds *bounds, struct error *error)
+{
+    struct frame_request *request = &shot->request;
+    struct scene_motion *motion = &shot->motion;
+    const double step_s = 1.0 / (double)job->frames_per_second, times_s[2] = {time_s - step_s, time_s + step_s};
+    if (!(request->layers & 1u << LAYER_MOTION))
+        return true;
+    if (job->clip_count &&
+        !scene_motion_add_neighbours(motion, scene, job->clips, job->clip_count, times_s, error))
+        return false;
+    request->has_neighbours = true;
+    request->clips_time_s = job->clip_count ? time_s : 0.0;
+    request->camera_earlier = request->camera_later = request->camera;
+    look_beside(job, scene, job->clip_count ? &motion->earlier : NULL, times_s[0], bounds,
+                &request->camera_earlier);
+    look_beside(job, scene, job->clip_count ? &motion->later : NULL, times_s[1], bounds, &request->camera_later);
+    return true;
+}
+
 /* A frame that is rendered. */
 static bool make_alone(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
                        struct animation_bounds *bounds, struct error *error)
@@ -97,6 +129,10 @@ static bool make_alone(struct shot *shot, const struct engine_job *job, const st
         return false;
     }
     shot->request.camera = view.camera;
+    if (!add_neighbours(shot, job, scene, time_s, bounds, error)) {
+        shot_finish(shot);
+        return false;
+    }
     set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
     set_source(&shot->request);
     shot->request.starts_anew &= frame == job->first_frame;

@@ -70,7 +70,11 @@ struct frame_request {
     float noise;
     uint64_t seed;
     struct frame_camera camera;
-    unsigned tracer; /* protocol's number */
+    /* The camera a frame earlier and a frame later, for LAYER_MOTION; without them it stands still. */
+    bool has_neighbours;
+    struct frame_camera camera_earlier, camera_later;
+    double clips_time_s; /* when that is; 0: nothing plays */
+    unsigned tracer;     /* protocol's number */
     struct tracer_options tracer_options;
     enum integrator_kind integrator;
     enum primary_kind primary;

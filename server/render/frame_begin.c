@@ -274,6 +274,23 @@ static uint32_t rays_a_path(const struct frame_renderer *renderer)
     return once ? 1 : CHOICES_WAVE_PER_SLICE;
 }
 
+static bool has_motion_layer(const struct frame_renderer *renderer)
+{
+    return frame_request_layers(&renderer->request) & LAYER_BIT_MOTION;
+}
+
+/* Stored samples do not know what they are part of. */
+static bool check_moves(const struct frame_renderer *renderer, struct error *error)
+{
+    const struct tracer_impl *impl = renderer->tracer->impl;
+    if (!has_motion_layer(renderer) || !renderer->work->layers.moves.has_any || renderer->rasterise ||
+        !impl->sampled)
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "layers", "the samples that %s holds do not say what moves them",
+              impl->name);
+    return error_remedy(error, "rasterise first hits, take another tracer, or leave out motion");
+}
+
 /* What it needs is known before any of it is reserved. */
 static bool size_frame(struct frame_renderer *renderer, struct error *error)
 {
@@ -281,6 +298,8 @@ static bool size_frame(struct frame_renderer *renderer, struct error *error)
     if (!picture_begin(renderer->target, context, renderer->samples_before, error))
         return false;
     renderer->rasterise = !renderer->key_tracer && choices_rasterise(context);
+    if (!check_moves(renderer, error))
+        return false;
     renderer->strip_rows = picture_strip_rows(renderer->target, STRIP_PIXELS_MAX);
     renderer->sample_shift_max = sample_shift_max(renderer);
     uint32_t rays = slice_rays(renderer);
@@ -617,6 +636,13 @@ static bool bring_scene(struct frame_renderer *renderer, bool *done, struct erro
     return end_reserving(renderer, brought, &failed, error);
 }
 
+/* The motion is not kept: it is read at once. */
+static bool find_moves(struct frame_renderer *renderer, struct error *error)
+{
+    return !has_motion_layer(renderer) ||
+           moves_find(&renderer->work->layers.moves, &renderer->shared->copy, renderer->motion, error);
+}
+
 bool frame_update(struct frame_renderer *renderer, struct error *error)
 {
     bool done = false;
@@ -626,7 +652,8 @@ bool frame_update(struct frame_renderer *renderer, struct error *error)
         announce_first(renderer);
         return true;
     }
-    if (!update_scene(renderer, renderer->scene, renderer->motion, error) || !take_tracers(renderer, error))
+    if (!update_scene(renderer, renderer->scene, renderer->motion, error) || !take_tracers(renderer, error) ||
+        !find_moves(renderer, error))
         return false;
     renderer->phase = PHASE_BUILD;
     return begin_tracers(renderer, error);

@@ -134,6 +134,15 @@ uint64_t frame_request_bytes(const struct frame_request *request)
     return bytes;
 }
 
+/* Their surfaces are those of the key view. */
+static bool check_rendered(const struct frame_request *request, const char *what, struct error *error)
+{
+    if (request->view_source != VIEW_SOURCE_LAYERS)
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "layers", "pictures that are made of depth layers have no %s", what);
+    return error_remedy(error, "render all views and frames as they are, or leave out %s", what);
+}
+
 static bool check_light_layers(const struct frame_request *request, struct error *error)
 {
     if (!integrator_by_number(request->integrator)->scatters) { /* else a sample has several paths, or no light */
@@ -142,12 +151,7 @@ static bool check_light_layers(const struct frame_request *request, struct error
                   integrator_by_number(request->integrator)->name);
         return error_remedy(error, "choose distributed or path, or leave out layers of light");
     }
-    if (request->view_source == VIEW_SOURCE_LAYERS) {
-        error_set(error, ERROR_UNSUPPORTED, "layers",
-                  "pictures that are made of depth layers have no parts of light");
-        return error_remedy(error, "render views as they are, or leave out layers of light");
-    }
-    return true;
+    return check_rendered(request, "layers of light", error);
 }
 
 static bool check_layers(const struct frame_request *request, struct error *error)
@@ -162,6 +166,8 @@ static bool check_layers(const struct frame_request *request, struct error *erro
         return error_remedy(error, "ask for rgba32f, or leave out layers");
     }
     if (request->layers & LAYER_BITS_LIGHT && !check_light_layers(request, error))
+        return false;
+    if (request->layers & LAYER_BIT_MOTION && !check_rendered(request, "motion", error))
         return false;
     if (request->attachments >= 1u << ATTACHMENT_COUNT)
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "there is no such set of attachments: %#x",
@@ -273,6 +279,14 @@ static bool same_views(const struct frame_request *a, const struct frame_request
            (!a->has_key || same_camera(&a->key_camera, &b->key_camera));
 }
 
+static bool same_neighbours(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->has_neighbours == b->has_neighbours &&
+           (!a->has_neighbours ||
+            (a->clips_time_s == b->clips_time_s && same_camera(&a->camera_earlier, &b->camera_earlier) &&
+             same_camera(&a->camera_later, &b->camera_later)));
+}
+
 static bool same_tracer(const struct frame_request *a, const struct frame_request *b)
 {
     return a->tracer == b->tracer && tracer_options_same(&a->tracer_options, &b->tracer_options) &&
@@ -315,6 +329,6 @@ bool frame_request_adds_to(const struct frame_request *a, const struct frame_req
     return a->accumulate && b->accumulate && !b->starts_anew && a->width == b->width && a->height == b->height &&
            memcmp(&a->crop, &b->crop, sizeof(a->crop)) == 0 && same_views(a, b) &&
            frame_request_same_radiance(a, b) && a->aperture == b->aperture && a->focus == b->focus &&
-           a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
+           a->filter == b->filter && same_camera(&a->camera, &b->camera) && same_neighbours(a, b) &&
            frame_request_planes(a) == frame_request_planes(b) && a->denoise == b->denoise && a->noise == b->noise;
 }

@@ -16,8 +16,9 @@ _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 <<
                    LAYER_BIT_ID == 1 << LAYER_ID && LAYER_BIT_UNKNOWN == 1 << LAYER_UNKNOWN &&
                    LAYER_BITS_CRYPTO_OBJECT == 7 << LAYER_CRYPTO_OBJECT0 &&
                    LAYER_BITS_CRYPTO_MATERIAL == 7 << LAYER_CRYPTO_MATERIAL0 &&
-                   LAYER_BITS_ALL >> LAYER_COUNT == 0 && LAYER_BITS_ALL >> (LAYER_COUNT - 1) == 1 &&
-                   LAYER_BIT_STICKING == 1u << LAYER_STICKING && LAYER_COUNT <= LAYER_STICKING,
+                   LAYER_BIT_MOTION == 1 << LAYER_MOTION && LAYER_BITS_ALL >> LAYER_COUNT == 0 &&
+                   LAYER_BITS_ALL >> (LAYER_COUNT - 1) == 1 && LAYER_BIT_STICKING == 1u << LAYER_STICKING &&
+                   LAYER_COUNT <= LAYER_STICKING,
                "shaders know the layers by other numbers");
 _Static_assert(LAYER_BIT_DIFFUSE_DIRECT == 1u << LAYER_DIFFUSE_DIRECT &&
                    LAYER_BIT_DIFFUSE_INDIRECT == 1u << LAYER_DIFFUSE_INDIRECT &&
@@ -29,7 +30,7 @@ _Static_assert(LAYER_BIT_DIFFUSE_DIRECT == 1u << LAYER_DIFFUSE_DIRECT &&
 
 bool layers_of_first_sample(enum layer layer)
 {
-    return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID;
+    return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID || layer == LAYER_MOTION;
 }
 
 bool layers_are_of_light(enum layer layer)
@@ -198,6 +199,32 @@ static bool begin_covers(struct layers *layers, struct render_context *context, 
     return program && gpu_check(context->device, "what covers samples", error);
 }
 
+/* Whether the current slice has anything to add: for some layers, samples after the first are zero. */
+static bool adds(const struct render_context *context, enum layer layer)
+{
+    return context->uniforms.sample_index == 0 || !layers_of_first_sample(layer);
+}
+
+static bool note_motion(struct layers *layers, struct render_context *context, struct error *error)
+{
+    if (!(layers->noting & LAYER_BIT_MOTION) || !adds(context, LAYER_MOTION))
+        return true;
+    const struct gpu_define defines[] = {{context->scene->has_motion ? "HAS_MOTION" : NULL, "1"}, {0}};
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = context_use_with(context, "render/layers_motion.comp", defines, error);
+    if (program) {
+        context_bind_hits(context);
+        gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
+        moves_bind(&layers->moves, &context->request, program);
+        gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
+        gpu_uniform_uint(program, "ray_count", context->ray_count);
+        gpu_uniform_uint(program, "first_sum", plane_of(layers, LAYER_BIT_MOTION) * layers->plane_samples);
+        gpu_dispatch(context->device, program, context->ray_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "motion", error);
+}
+
 static bool make_ao_rays(struct layers *layers, struct render_context *context, uint32_t count,
                          struct error *error)
 {
@@ -267,16 +294,10 @@ bool layers_mark_unknown(struct layers *layers, struct render_context *context, 
     return program && gpu_check(context->device, "unknown rays", error);
 }
 
-/* Whether the current slice has anything to add: for some layers, samples after the first are zero. */
-static bool adds(const struct render_context *context, enum layer layer)
-{
-    return context->uniforms.sample_index == 0 || !layers_of_first_sample(layer);
-}
-
 static bool any_adds(const struct layers *layers, const struct render_context *context)
 {
     for (enum layer layer = LAYER_ALBEDO; layer <= LAYER_STICKING; layer++)
-        if (layers->noting & ~LAYER_BITS_CRYPTO & 1u << layer && adds(context, layer))
+        if (layers->noting & ~(LAYER_BITS_CRYPTO | LAYER_BIT_MOTION) & 1u << layer && adds(context, layer))
             return true;
     return false;
 }
@@ -288,7 +309,7 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
         layers->noted = true;
         *done = all == 0;
         return (!any_adds(layers, context) || note_hits(layers, context, error)) &&
-               begin_covers(layers, context, error) &&
+               begin_covers(layers, context, error) && note_motion(layers, context, error) &&
                (!(layers->noting & LAYER_BIT_STICKING) || note_sticking(layers, context, error));
     }
     if (layers->asking == 0) {
@@ -364,14 +385,15 @@ bool layers_accumulate(struct layers *layers, struct picture *picture, struct re
 
 uint64_t layers_device_bytes(const struct layers *layers)
 {
-    return layers->sums.capacity_bytes + layers->covers.capacity_bytes + layers->ao_rays.capacity_bytes +
-           layers->ao_times.capacity_bytes + layers->ao_visibility.capacity_bytes;
+    return layers->sums.capacity_bytes + layers->covers.capacity_bytes + moves_device_bytes(&layers->moves) +
+           layers->ao_rays.capacity_bytes + layers->ao_times.capacity_bytes + layers->ao_visibility.capacity_bytes;
 }
 
 void layers_finish(struct layers *layers, struct gpu_device *device)
 {
     gpu_buffer_finish(device, &layers->sums);
     gpu_buffer_finish(device, &layers->covers);
+    moves_finish(&layers->moves, device);
     gpu_buffer_finish(device, &layers->ao_rays);
     gpu_buffer_finish(device, &layers->ao_times);
     gpu_buffer_finish(device, &layers->ao_visibility);

@@ -6,12 +6,14 @@
 #define FARLIGHT_RENDER_LAYERS_H
 
 #include "render/context.h"
+#include "render/moves.h"
 #include "render/picture.h"
 
 struct layers {
     uint32_t wanted;        /* bits, without LAYER_BEAUTY; 0: nothing is done, and no memory is held */
     struct gpu_buffer sums; /* shared/layers.h */
     struct gpu_buffer covers;
+    struct moves moves;
     bool covers_by_shading; /* not by first hits: other surfaces show through some */
     struct gpu_buffer ao_rays, ao_times, ao_visibility;
     uint32_t noting;        /* of the current slice: those that hits are noted in */

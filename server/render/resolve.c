@@ -39,9 +39,10 @@ static const char *shows_display_values(const struct render_context *context, en
     return context->display_values && is_colour ? "DISPLAY_VALUES" : NULL;
 }
 
-static const char *has_pairs(enum layer layer)
+/* The define of a program for sums that are no colours with a coverage; NULL: they are. */
+static const char *form_of(enum layer layer)
 {
-    return LAYER_BITS_CRYPTO >> layer & 1 ? "PAIRS" : NULL;
+    return LAYER_BITS_CRYPTO >> layer & 1 ? "PAIRS" : layer == LAYER_MOTION ? "PLAIN" : NULL;
 }
 
 /* Of a program of display.glsl; with the curve where it makes display values. */
@@ -50,7 +51,7 @@ static void display_defines(const struct render_context *context, enum layer lay
                             struct gpu_define defines[DISPLAY_DEFINES])
 {
     static const char *const numbers[] = {[TONE_NEUTRAL] = "0u", [TONE_ACES] = "1u", [TONE_NONE] = "2u"};
-    const char *names[] = {shows_display_values(context, layer), counts_tiles(context, layer), has_pairs(layer)};
+    const char *names[] = {shows_display_values(context, layer), counts_tiles(context, layer), form_of(layer)};
     size_t n = 0;
     if (displays && !names[0])
         defines[n++] = (struct gpu_define){"TONE_MAP", numbers[context->request.tone_map]};

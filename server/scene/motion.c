@@ -16,6 +16,8 @@ void scene_motion_finish(struct scene_motion *motion)
 {
     for (uint32_t i = 0; i < motion->pose_count; i++)
         scene_pose_finish(&motion->poses[i]);
+    scene_pose_finish(&motion->earlier);
+    scene_pose_finish(&motion->later);
     free(motion->poses);
     *motion = (struct scene_motion){0};
 }
@@ -266,4 +268,13 @@ bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scen
     if (!fine)
         scene_motion_finish(motion);
     return fine;
+}
+
+bool scene_motion_add_neighbours(struct scene_motion *motion, const struct scene *scene,
+                                 const struct clip_use *uses, uint32_t use_count, const double times_s[2],
+                                 struct error *error)
+{
+    motion->has_neighbours = scene_pose_evaluate(&motion->earlier, scene, uses, use_count, times_s[0], error) &&
+                             scene_pose_evaluate(&motion->later, scene, uses, use_count, times_s[1], error);
+    return motion->has_neighbours;
 }

@@ -54,6 +54,8 @@ void scene_pose_finish(struct scene_pose *pose);
 struct scene_motion {
     struct scene_pose *poses;
     uint32_t pose_count; /* 1 .. MOTION_POSES_MAX */
+    bool has_neighbours;
+    struct scene_pose earlier, later; /* with neighbours: those of a frame earlier and a frame later */
 };
 void scene_motion_finish(struct scene_motion *motion);
 
@@ -74,6 +76,10 @@ bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, con
 #define MOTION_TURN_MAX 0.1745 /* radians, 10 degrees: a chord is 0.4 % of the radius inside its arc */
 bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene, const struct clip_use *uses,
                            uint32_t use_count, double open_s, double shutter_s, struct error *error);
+/* Adds the poses at two other times. Errors as above. */
+bool scene_motion_add_neighbours(struct scene_motion *motion, const struct scene *scene,
+                                 const struct clip_use *uses, uint32_t use_count, const double times_s[2],
+                                 struct error *error);
 /* Length of a clip in seconds: its last key. 0: no clip, or no channel. */
 double scene_clip_duration_s(const struct scene *scene, uint32_t clip);
 

@@ -3,6 +3,7 @@
 // Defines:
 //   HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h)
 //   PAIRS            sums are an identifier and a share, twice (shared/layers.h)
+//   PLAIN            sums are four numbers of the first sample, shown as they are
 //   DISPLAY_VALUES   what is summed is display values of no curve
 //   TONE_MAP         the curve, a number of common/tonemap.glsl; else there is none
 #include "shared/path.h"
@@ -43,6 +44,9 @@ vec4 mean_of_sum(vec4 sum, uvec2 pixel)
     uint stopped_at = texelFetch(tile_samples, int(first_tile + slot_of_pixel(pixel) / TILE_SLOTS)).x;
     if (stopped_at != 0u)
         by = vec2(exposure, 1.0) * (1.0 / float(stopped_at));
+#endif
+#ifdef PLAIN
+    return sum;
 #endif
 #ifdef PAIRS
     return vec4(sum.r, min(sum.g * by.y, 1.0), sum.b, min(sum.a * by.y, 1.0));

@@ -17,6 +17,7 @@
 #define LAYER_BITS_CRYPTO_OBJECT 0x0700u
 #define LAYER_BITS_CRYPTO_MATERIAL 0x3800u
 #define LAYER_BITS_CRYPTO (LAYER_BITS_CRYPTO_OBJECT | LAYER_BITS_CRYPTO_MATERIAL)
+#define LAYER_BIT_MOTION 0x4000u
 #define LAYER_BIT_DIFFUSE_DIRECT (1u << 16)
 #define LAYER_BIT_DIFFUSE_INDIRECT (1u << 17)
 #define LAYER_BIT_SPECULAR_DIRECT (1u << 18)
@@ -25,7 +26,7 @@
 #define LAYER_BIT_EMISSION (1u << 21)
 #define LAYER_BIT_BACKGROUND (1u << 22)
 #define LAYER_BITS_LIGHT (0x7fu << 16) /* parts of the beauty: render/light_layers.glsl */
-#define LAYER_BITS_ALL (LAYER_BITS_SEEN | LAYER_BITS_CRYPTO | LAYER_BITS_LIGHT)
+#define LAYER_BITS_ALL (LAYER_BITS_SEEN | LAYER_BITS_CRYPTO | LAYER_BIT_MOTION | LAYER_BITS_LIGHT)
 /* Of an attachment, which no layer beside the beauty goes with: no LAYER. */
 #define LAYER_BIT_STICKING (1u << 28)
 
@@ -47,5 +48,18 @@
 #define BIND_COVERS BIND_PASS_4
 #define COVERS_MAX 8u   /* waves; behind so many blended surfaces little is left */
 #define CRYPTO_PLANES 3 /* of a kind, with two identifiers each */
+
+/* Where an instance is a frame earlier and a frame later; a storage buffer, in the order of the instances. The
+ * vertices of its geometry, where that deforms, lie in another: three floats each, those of the frame before it,
+ * then those of the next one. */
+struct move {
+    vec4 earlier[3]; /* rows of world_from_object */
+    vec4 later[3];
+    uint first_vertex; /* its number there, plus 1; 0: the geometry does not deform */
+    uint pad0, pad1, pad2;
+};
+SHARED_SIZE(move, 112)
+#define BIND_MOVES BIND_PASS_1
+#define BIND_MOVED_VERTICES BIND_PASS_2
 
 #endif

@@ -10,8 +10,7 @@
 /* Poses that place nodes, in the order in which they are given: by ascending identifier. */
 static inline void test_motion_init(struct scene_motion *motion, uint32_t pose_count)
 {
-    motion->poses = calloc(pose_count, sizeof(*motion->poses));
-    motion->pose_count = pose_count;
+    *motion = (struct scene_motion){.poses = calloc(pose_count, sizeof(*motion->poses)), .pose_count = pose_count};
 }
 
 static inline void test_pose_node(struct scene_pose *pose, uint32_t node, const float parent_from_node[12])

@@ -97,6 +97,7 @@ class Layer(Word):
     CRYPTO_MATERIAL0 = 11  # likewise, of materials
     CRYPTO_MATERIAL1 = 12  # likewise
     CRYPTO_MATERIAL2 = 13  # likewise
+    MOTION = 14
     DIFFUSE_DIRECT = 16
     DIFFUSE_INDIRECT = 17  # the same, of light that other surfaces have sent there
     SPECULAR_DIRECT = 18
