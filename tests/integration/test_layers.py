@@ -8,7 +8,7 @@ from farlight_test import Daemon, OneDaemon, bundled_scenes, exr_attributes, exr
 
 EYE, LOOK_AT = (0.3, 1.1, 3.1), (0.0, 0.9, 0.0)
 VIEW = ["--size", "48x40", "--eye", ",".join(map(str, EYE)), "--look-at", ",".join(map(str, LOOK_AT)), "--fov", "50"]
-ALL = "beauty,albedo,normal,depth,position,ao,id,unknown,crypto-object,crypto-material"
+ALL = "beauty,albedo,normal,depth,position,ao,id,unknown,crypto-object,crypto-material,motion"
 UINT, HALF, FLOAT = 0, 1, 2
 ZIP, DWAA = 3, 8  # OpenEXR's numbers of compressions
 CHANNELS = {
@@ -22,6 +22,7 @@ CHANNELS = {
     "unknown": {"unknown.Y": HALF},
     "crypto-object": {f"CryptoObject{n:02}.{one}": FLOAT for n in range(3) for one in ("red", "green", "blue", "alpha")},
     "crypto-material": {f"CryptoMaterial{n:02}.{one}": FLOAT for n in range(3) for one in ("red", "green", "blue", "alpha")},
+    "motion": {f"{way}.{axis}": FLOAT for way in ("forward", "backward") for axis in "uv"},
 }
 
 
@@ -135,7 +136,7 @@ class Layers(OneDaemon):
         digests = set()
         for encoding in ("raw", "zstd", "predicted"):
             frame, = frames_of(self.render("--layers", ALL, "--encoding", encoding)[1])
-            self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 14))
+            self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 15))
             self.assertEqual(frame["wire_bytes"] < frame["pixels_bytes"], encoding != "raw")
             digests.add(frame["digest"])
         self.assertEqual(len(digests), 1)

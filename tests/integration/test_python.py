@@ -425,6 +425,29 @@ esac
             with self.assertRaises(farlight.InvalidValue):
                 farlight.Camera.intrinsics(wrong, 64, 48, pose)
 
+    def test_motion_leads_to_where_a_place_is_seen_in_the_next_frame_and_was_in_the_one_before(self):
+        """Places by the layer position, cameras by the frames: floats of some metres, times some ten pixels a metre."""
+        scene, _ = triangle()
+        keys = [farlight.Camera((x, 0.5, 6), (x / 2, 0, 0), time_s=time_s) for x, time_s in ((0, 0), (1, 0.5), (1.5, 1))]
+        frames = list(self.connect().frames(scene, keys, layers=("position", "motion"), width=64, height=48, samples=1, last_frame=2,
+                                            frames_per_second=4))
+        middle = frames[1]
+        self.assertEqual((middle.motion.shape, middle.motion.dtype), ((48, 64, 4), np.float32))
+        self.assertFalse(frames[0].motion[..., 2:].any(), "the camera stands still before its first key")
+        seen = middle.layer("position")[..., 3] > 0
+        self.assertGreater(seen.sum(), 500)
+        places = np.concatenate((middle.position, np.ones((48, 64, 1))), axis=-1)[seen]
+
+        def pixels(frame):
+            x, y, z = (np.linalg.inv(frame.world_from_view) @ places.T)[:3]
+            u, v, w = frame.K @ [x, -y, -z]
+            return np.stack((u / w, v / w), axis=-1)
+
+        for other, motion in ((frames[2], middle.motion[..., :2]), (frames[0], middle.motion[..., 2:])):
+            flow = (motion * (1, -1))[seen]
+            self.assertGreater(abs(flow).max(), 1)
+            np.testing.assert_allclose(flow, pixels(other) - pixels(middle), atol=1e-3)
+
     def test_a_notebook_shows_a_frame(self):
         client, (scene, _) = self.connect(), triangle()
         picture = client.render(scene, STRAIGHT, width=8, height=8, samples=1)

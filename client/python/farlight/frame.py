@@ -124,6 +124,14 @@ class Frame:
         numbers: Array = self.layer(Layer.ID)[..., :2].astype(np.uint32)
         return numbers
 
+    @property
+    def motion(self) -> Array:
+        """Height x width x 4: from where the first surface is seen to where it is seen a frame later, x and y, then to where it
+        was seen a frame earlier, x and y; pixels, x to the right and y up. What OpenCV and data sets call the optical flow has
+        y down: `frame.motion[..., :2] * (1, -1)`. Only the camera's path and clips count: a scene that is edited between two
+        frames, or another camera of the next render(), is not known beforehand."""
+        return self.layer(Layer.MOTION)
+
     def mask(self, thing: Object) -> Array:
         """Height x width: where the first surface is of that node or material."""
         if not isinstance(thing, Object) or thing.kind not in (ObjectKind.NODE, ObjectKind.MATERIAL):
