@@ -159,8 +159,44 @@ TEST(a_camera_at_a_node_moves_with_it)
         float x = shot.request.camera.world_from_view[3];
         float expected = fminf(100.0f * 64 * (float)(frame - 10) / 10, 100);
         assert_true(fabsf(x - expected) < 1e-3f);
+        assert_false(shot.request.has_neighbours || shot.motion.has_neighbours);
         shot_finish(&shot);
     }
+    scene_destroy(scene);
+}
+
+/* A frame of the rate away, whatever the step, and where that is before the first or behind the last one, too. */
+TEST(motion_vectors_have_the_cameras_and_poses_of_the_frames_beside)
+{
+    struct scene *scene = turning_scene(90);
+    struct clip_use use = {.clip = 1, .speed = 1, .start_s = -0.05f};
+    struct engine_job job = job_of(CAMERA_NODE, &use, 1);
+    job.frames_per_second = 100;
+    job.first_frame = job.last_frame = 5;
+    job.frame_step = 3;
+    job.frame.layers = 1u << LAYER_MOTION;
+    struct shot shot = shot_at(&job, scene, 0), before, after;
+    job.time_origin_frame = 1;
+    before = shot_at(&job, scene, 0);
+    job.time_origin_frame = 0;
+    after = shot_at(&job, scene, 1);
+    assert_true(shot.request.has_neighbours && shot.motion.has_neighbours);
+    assert_memory_equal(&shot.request.camera_earlier, &before.request.camera, sizeof(before.request.camera));
+    assert_memory_equal(&shot.request.camera_later, &after.request.camera, sizeof(after.request.camera));
+    assert_memory_equal(shot.motion.earlier.nodes, before.motion.poses[0].nodes,
+                        sizeof(*before.motion.poses[0].nodes));
+    assert_memory_equal(shot.motion.later.nodes, after.motion.poses[0].nodes,
+                        sizeof(*after.motion.poses[0].nodes));
+    assert_true(memcmp(before.motion.poses[0].nodes, after.motion.poses[0].nodes, sizeof(struct pose_node)) != 0);
+    shot_finish(&shot);
+    shot_finish(&before);
+    shot_finish(&after);
+    job = job_of(CAMERA_KEYS, NULL, 0); /* nothing plays, and the camera has one key */
+    job.frame.layers = 1u << LAYER_MOTION;
+    shot = shot_at(&job, scene, 0);
+    assert_memory_equal(&shot.request.camera_later, &shot.request.camera, sizeof(shot.request.camera));
+    assert_false(shot.motion.has_neighbours);
+    shot_finish(&shot);
     scene_destroy(scene);
 }
 
