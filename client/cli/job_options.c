@@ -166,7 +166,8 @@ static const struct argp_option special[] = {
      "N x M views, up to 64 each way, from a grid of eyes; needs --baseline", CLI_GROUP_OUTPUT},
     {"baseline", KEY_VIEWS + 3, "METRES", 0, "Distance of neighbouring eyes of --light-field", CLI_GROUP_OUTPUT},
     {"views", KEY_VIEWS + 4, "rays|quadtree", 0,
-     "Render every view, or make all of them from one and its depth layers, by the tracer quadtree (default)",
+     "Render every view, or make all of them from one and its depth layers, by the tracer quadtree (default "
+     "but with --denoise and layers of motion or light)",
      CLI_GROUP_OUTPUT},
     {"lens", KEY_VIEWS + 5, "rays|quadtree", 0,
      "What rays through the lens of --aperture meet: the scene (default), or depth layers of a sharp picture",

@@ -127,8 +127,9 @@ static bool complete_eyes(struct cli_job *job)
     return true;
 }
 
-/* Where it is not said, views and frames are made of layers, and a lens is not. Layers are not filtered: views of
- * a picture that is to be are rendered as they are. */
+/* Where it is not said, views and frames are made of layers, and a lens is not. Such pictures are not filtered and
+ * have no motion and no parts of light, the layers from PROTOCOL_LAYER_MOTION on: where one of these is wanted,
+ * views are rendered as they are. */
 static bool complete_source(struct cli_job *job)
 {
     const struct cli_views *views = &job->views;
@@ -136,6 +137,7 @@ static bool complete_source(struct cli_job *job)
     const bool has_views = views->has_stereo || views->has_light_field || wanted->upsample > 1;
     const bool has_lens = wanted->aperture > 0 || job->lens_changes;
     const bool is_filtered = wanted->denoise == PROTOCOL_DENOISE_ON;
+    const bool is_rendered = is_filtered || wanted->layers >> PROTOCOL_LAYER_MOTION != 0;
     if (views->has_views && !has_views)
         return refuse(job, "--views", "the picture has a single view",
                       "add --stereo 0.065; a picture may have --light-field 5x5, an animation --upsample 4");
@@ -149,7 +151,7 @@ static bool complete_source(struct cli_job *job)
     else if (views->has_lens)
         wanted->view_source = views->lens;
     else
-        wanted->view_source = has_views && (!is_filtered || wanted->upsample > 1) ? PROTOCOL_VIEW_SOURCE_LAYERS
+        wanted->view_source = has_views && (!is_rendered || wanted->upsample > 1) ? PROTOCOL_VIEW_SOURCE_LAYERS
                                                                                   : PROTOCOL_VIEW_SOURCE_RAYS;
     if (wanted->view_source == PROTOCOL_VIEW_SOURCE_RAYS && wanted->upsample > 1)
         return refuse(job, "--upsample", "frames between those that are rendered are not made of rays",
