@@ -128,7 +128,9 @@ class Motion(OneDaemon):
 
     def test_views_are_rendered_for_it_and_those_of_depth_layers_have_none(self):
         path = self.folder / "pair.exr"
-        self.expect(farlight("render", self.model, "-o", path, "--stereo", "0.065", "--layers", "motion", *VIEW, "--clip", "go"), 0)
+        for layer in ("light", "motion"):
+            self.expect(farlight("render", self.model, "-o", path, "--stereo", "0.065", "--layers", layer, *VIEW, "--clip", "go",
+                                 "--integrator", "distributed"), 0)
         self.assertEqual(sorted(exr_channels(path)), CHANNELS)
         result = farlight("animate", self.model, "-o", self.folder / "%d.exr", "--frames", "1-4", "--upsample", "2", "--layers", "motion", *VIEW)
         self.assertIn("leave out motion", self.expect(result, 1).stderr)
