@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // From the strip to the sums of a band: the picture's, moved by as much as filtering has moved the light.
 //
-// What the filter has left out because it was much brighter than its surroundings stays where each half of the samples has
-// half of it, as the halves of few samples differ by as much, or a pixel beside it is as bright: a highlight. What one half
-// has alone is a speck, which is worth next to nothing where it was found (DeCoro, Weyrich, Rusinkiewicz. Density-based
-// Outlier Rejection in Monte Carlo Rendering. 2010, by neighbours and halves in place of all samples); in mirrors and glass it is
-// as often a light that is smaller there than a pixel, which few samples find.
+// What the filter has left out because it was much brighter than its surroundings stays where a pixel beside it is as bright by
+// both halves of its samples: a highlight. All else is brighter or darker than all around it only as far as each part of its
+// samples says so. What one part has alone is a speck, which is worth next to nothing where it was found (DeCoro, Weyrich,
+// Rusinkiewicz. Density-based Outlier Rejection in Monte Carlo Rendering. 2010, by neighbours and parts in place of all samples).
 //
 // Defines: HAS_REPROJECTED what pictures before have brought has moved it, too.
 
@@ -27,30 +26,57 @@ layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { uvec4 f
 layout(std430, binding = BIND_DENOISE_ALBEDO) readonly buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer band_block { vec4 denoised[]; };
 
-// Of what was left out, `left`, the part that is a speck. Of one sample nothing is known.
-vec3 speck_of(vec3 left, vec3 mean, vec3 albedo, uint slot, float count)
-{
-    float first_count = float(first_half_of(uint(count))), second_count = count - first_count;
-    vec3 first = light_of_half(first_half[slot]) * albedo, second = (count * mean - first_count * first) / max(second_count, 1.0);
-    vec3 lesser = luminance(first) < luminance(second) ? first : second;
-    float shown = luminance(lesser) - luminance(mean - left), all = luminance(left);
-    return second_count > 0.0 && all > 0.0 ? left * (1.0 - clamp(2.0 * shown / all, 0.0, 1.0)) : vec3(0.0);
-}
+struct surroundings {
+    vec3 mean;
+    float least, most; // luminance; but for the outermost, as two specks may lie side by side
+    float shown;       // the most luminance that both halves of a pixel have
+};
 
-// 1: no pixel beside it is about as bright, by both halves, as one half may have a speck there.
-float is_alone(ivec2 pixel, vec3 filtered)
+surroundings surroundings_of(ivec2 pixel)
 {
     ivec2 lower, upper;
     bounds_of(pixel, lower, upper);
-    float most = 0.0;
+    surroundings around = surroundings(vec3(0.0), 1e30, 0.0, 0.0);
+    vec2 outermost = vec2(1e30, 0.0);
+    float count = 0.0;
     for (int i = 0; i < 9; i++) {
-        ivec2 next = clamp(pixel + ivec2(i % 3 - 1, i / 3 - 1), lower, upper - 1);
-        halves h = halves_of_words(texelFetch(first_light, place_of(next)));
-        float shown = min(luminance(h.a), luminance(h.b));
-        most = max(most, next == pixel ? 0.0 : shown);
+        ivec2 next = pixel + ivec2(i % 3 - 1, i / 3 - 1);
+        if (next == pixel || !within(next, lower, upper))
+            continue;
+        vec3 colour = mean_of(halves_of_words(texelFetch(light, place_of(next))));
+        halves first = halves_of_words(texelFetch(first_light, place_of(next)));
+        float beside = luminance(colour);
+        around.mean += colour;
+        around.least = min(around.least, max(outermost.x, beside));
+        around.most = max(around.most, min(outermost.y, beside));
+        around.shown = max(around.shown, min(luminance(first.a), luminance(first.b)));
+        outermost = vec2(min(outermost.x, beside), max(outermost.y, beside));
+        count += 1.0;
     }
-    float share = most / max(luminance(filtered), 1e-30);
-    return 1.0 - clamp((share - DENOISE_ALONE) / DENOISE_ALONE, 0.0, 1.0);
+    around.mean /= max(count, 1.0);
+    return around;
+}
+
+// The least and the most luminance that a part of the samples has: a half, or of many a quarter.
+vec2 range_of_parts(vec3 mean, uint slot, float count)
+{
+    float first_count = float(first_half_of(uint(count)));
+    vec3 first = light_of_half(first_half[slot]), second = (count * mean - first_count * first) / (count - first_count);
+    vec3 apart = first_count > 2.0 ? difference_of_half(first_half[slot]) : vec3(0.0);
+    vec3 parts = vec3(luminance(first - apart), luminance(first + apart), luminance(second));
+    return vec2(min_component(parts), max_component(parts));
+}
+
+// The light of a pixel without specks, which go to the mean around it. `filtered`: what the filter did not leave out. A part
+// that is half as far off as all are believes them, as parts differ by as much.
+vec3 without_specks(vec3 own, vec3 filtered, vec2 parts, surroundings around)
+{
+    float own_luminance = luminance(own);
+    float alone = 1.0 - clamp((around.shown / max(luminance(filtered), 1e-30) - DENOISE_ALONE) / DENOISE_ALONE, 0.0, 1.0);
+    float over = own_luminance - max(around.most, 2.0 * parts.x - around.most);
+    float under = min(around.least, 2.0 * parts.y - around.least) - own_luminance;
+    float off = max(max(alone * over, under), 0.0);
+    return mix(own, around.mean, clamp(off / max(abs(own_luminance - luminance(around.mean)), 1e-30), 0.0, 1.0));
 }
 
 void main()
@@ -70,9 +96,10 @@ void main()
     uvec2 words = texelFetch(kept, place).xy;
     moved += vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x) - sum.rgb / (count * albedo);
 #else
-    vec3 mean = sum.rgb / count;
-    float believed = DENOISE_SPECK_DOUBT * (1.0 - DENOISE_MIRROR_DOUBT * own.share) * is_alone(pixel, filtered);
-    moved -= believed * speck_of(mean - filtered * albedo, mean, albedo, slot, count) / albedo;
+    if (count > 1.0) { // of one sample nothing is known
+        vec3 mean = sum.rgb / (count * albedo);
+        moved = without_specks(mean + moved, filtered, range_of_parts(mean, slot, count), surroundings_of(pixel)) - mean;
+    }
 #endif
     denoised[slot] = vec4(own.nearness > 0.0 ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
 }

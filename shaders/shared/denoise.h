@@ -40,7 +40,7 @@
 /* The noise of the halves is believed up to twice the power that neighbours show: sparse noise shows in few of
  * them. */
 #define DENOISE_NEIGHBOURS_TRUST 2.0f
-/* Of the noise of many samples of mirrors and glass, and of their specks, so much is not believed. */
+/* Of the noise of many samples of mirrors and glass so much is not believed. */
 #define DENOISE_MIRROR_DOUBT 0.5f
 /* What is brighter than so many times what is around it, or than so much of white, is left out of the filter. */
 #define DENOISE_CAP 4.0f
@@ -49,9 +49,6 @@
 #define DENOISE_UNLIKE 0.0625f
 /* What is that much brighter is a speck where pixels beside it have less than this share of what is left of it. */
 #define DENOISE_ALONE 0.5f
-/* So much of a speck is left out: it may be a light that few samples find, and partway is wrong least either way.
- */
-#define DENOISE_SPECK_DOUBT 0.75f
 /* Light counts as like another that differs by this many standard deviations; in mirrors and glass by as much less
  * as DENOISE_MIRROR_EDGES says. */
 #define DENOISE_LIGHT_SCALE 2.0f
