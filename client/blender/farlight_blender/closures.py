@@ -158,6 +158,9 @@ class Closures:
             except shading.Unknown as unknown:
                 self._note(f"{name} comes from {unknown}, which is not known: its own value is used")
                 return constant(fixed).at(points)
+        if shading.is_constant(socket):
+            first = at(shading.nowhere())[0]
+            return constant(tuple(float(one) for one in first) if np.ndim(first) else float(first))
         return Value(at, socket=socket)
 
     # ---- shaders

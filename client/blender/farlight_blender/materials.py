@@ -282,7 +282,7 @@ class Reader:
         if start is None or not isinstance(value.scale, float):
             return None
         name = start.name
-        image = start
+        image: Optional[nodes.Socket] = start
         if start.node.type in {"SEPRGB", "SEPARATE_COLOR"}:
             name = {"R": "Red", "G": "Green", "B": "Blue"}.get(name, name)
             image = nodes.source(start.node.inputs[0])

@@ -41,10 +41,9 @@ def value(socket: bpy.types.NodeSocket, points: Points) -> Any:
         if socket.type == "VALUE":
             return np.full(len(points), socket.default_value, np.float32)
         return np.tile(np.array(socket.default_value[:3], np.float32), (len(points), 1))
-    key = start.node.as_pointer(), start.identifier
-    if key not in points.made:
-        points.made[key] = _node(start.node, start, points)
-    return _as(points.made[key], start.type, socket.type)
+    if start not in points.made:
+        points.made[start] = _node(start.node, start, points)
+    return _as(points.made[start], start.type, socket.type)
 
 
 def _as(values: Any, made: str, wanted: str) -> Any:
@@ -404,6 +403,24 @@ READ: dict[str, Callable[[bpy.types.Node, bpy.types.NodeSocket, Points], Any]] =
     "COMBINE_COLOR": _combine, "COMBRGB": _combine, "COMBXYZ": _combine, "VERTEX_COLOR": _attribute, "ATTRIBUTE": _attribute, "MATH": _fraction,
     "VECT_MATH": _vector, "MAP_RANGE": _range, "CLAMP": _clamp, "VALUE": _own, "RGB": _own,
     "RGBTOBW": lambda node, output, points: value(node.inputs[0], points) @ GREY}
+
+
+def is_constant(socket: nodes.Socket) -> bool:
+    """Whether what feeds an input is the same everywhere: nodes compute it from numbers alone."""
+    start = nodes.source(socket)
+    if start is None:
+        return True
+    kind = start.node.type
+    return kind in READ and not kind.startswith("TEX_") and kind not in PLACES and all(is_constant(one) for one in start.node.inputs)
+
+
+def nowhere() -> Points:
+    """One point, for what is the same everywhere."""
+    zeros = np.zeros((1, 3), np.float32)
+    return Points(None, zeros, zeros, zeros, lambda name: None)
+
+
+PLACES = {"UVMAP", "VERTEX_COLOR", "ATTRIBUTE"}
 
 
 # ---- the view
