@@ -306,6 +306,11 @@ class Things(Case):
         cube("cube", tiles, (1.5, 0, 0.8))
         self.assert_like_cycles(0.01, 0.1)  # squares of three pixels: texels at the edges of a face are wider than the filter
 
+    def test_a_checker_on_a_ball_has_the_colours_where_cycles_has_them(self):
+        empty((0.5, 0.5, 0.5))
+        ball("ball", procedural("Checker", Scale=3, Color1=(0.9, 0.1, 0.1, 1), Color2=(0.1, 0.1, 0.9, 1)), radius=1.8)
+        self.assert_like_cycles(0.01, 0.05)
+
     def test_a_mesh_without_a_uv_map_has_the_mean_of_a_procedural_texture(self):
         self.from_above()
         bare = grid("bare", 4, procedural("Checker", Scale=8, Color1=(0.8, 0.2, 0, 1), Color2=(0, 0.4, 0.6, 1)))

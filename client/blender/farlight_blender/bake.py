@@ -139,7 +139,7 @@ class Surface:
             return None if found is None else inside(found)
         low, high = arrays["place"].min(axis=0), arrays["place"].max(axis=0)
         place = inside(arrays["place"])
-        generated = np.where(high > low, (place - low) / np.where(high > low, high - low, 1), 0.50001)
+        generated = np.where(high > low, (place - low) / np.where(high > low, high - low, 1), 0.5)
         return Points(inside(arrays["uv"]) if "uv" in arrays else None, generated.astype(np.float32), place,
                       inside(arrays["normal"]), colours)
 
