@@ -175,7 +175,13 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
         .format = cli_image_name(sink->output.image),
         .window = {wanted->crop_x, wanted->crop_y, wanted->crop_width > 0 ? wanted->width : 0, wanted->height}};
     sink->exporter = fl_exporter_start(&options, error);
-    return sink->exporter != NULL;
+    if (sink->exporter)
+        return true;
+    const char *const named[][2] = {{"colour_space", "--colour-space"}, {"display_view", "--display-view"}};
+    for (size_t i = 0; i < 2; i++)
+        if (strcmp(error->field, named[i][0]) == 0)
+            snprintf(error->field, sizeof(error->field), "%s", named[i][1]);
+    return false;
 }
 
 bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error)

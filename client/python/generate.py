@@ -3,7 +3,8 @@
 """Writes farlight/messages.py from the tables of protocol/, or says whether it is current.
 
 Usage: generate.py [--check]. The C preprocessor reads the tables, as it does for the C side. A record or a message
-becomes a dataclass with the defaults of the table, an enumeration an IntEnum.
+becomes a dataclass with the defaults of the table, an enumeration an IntEnum. A method of the package that takes fields of a
+message as keywords, and says so by @takes(messages.NAME_keywords), has a signature there with all of them.
 """
 import ast
 import keyword
@@ -35,6 +36,18 @@ ROWS = {
     "ENUMERATION": "PREFIX, name, doc", "VALUE": "PREFIX, NAME, number, text, doc", "LIMIT": "type, name, doc",
 }
 STRINGS = {"doc", "unit", "text", "numbers"}
+
+# Signatures: the message whose fields are keywords, and those that are none, as the method sets them itself or refuses them.
+JOB = {"scene", "kind", "channel", "credit", "attachments", "parts", "margin", "hidden_layers"}
+SIGNATURES = {
+    "job": ("render", JOB), "view": ("render", JOB), "material": ("set_material", ()),
+    "texture": ("set_texture", {"width", "height", "format", "arrays"}),
+    "mesh": ("set_mesh", {"vertex_count", "triangle_count", "arrays", "ranges"}),
+    "spheres": ("set_spheres", {"sphere_count", "arrays", "ranges"}),
+    "disc": ("set_disc", {"centre_world", "normal_world"}), "light": ("set_light", ()), "camera": ("set_camera", {"fov_y"}),
+    "node": ("set_node", {"kind", "object", "parent_from_node"}), "environment": ("set_environment", {"width", "height", "arrays"}),
+}
+FOR_ARRAYS = {"Sequence[float]": "Numbers", "Sequence[ClipUse]": "Sequence[ClipUse | Object]"}  # as methods take them
 
 
 def read(table, names):
@@ -91,6 +104,11 @@ class Field:
         self.annotation, self.default = annotation, default
         self.descriptor = "_f." + descriptor.format(name=f'"{self.name}"')
 
+    def keyword(self):
+        """The type that a method takes: words are checked, too."""
+        word = self.annotation.removesuffix(" | str")
+        return f"{word} | {word}Word" if word != self.annotation else FOR_ARRAYS.get(word, word)
+
     def int(self, type_, field, low, high, default=None, _unit=None):
         low, high = number(low), number(high)
         self.make(field, f'whole({{name}}, "{LETTERS[type_]}", {low}, {high})', "int", low if default is None else default)
@@ -140,22 +158,68 @@ class Field:
 
 
 def enumerations():
-    lines = []
+    lines, words = [], {}
     for row in read("words.def", ("ENUMERATION", "VALUE")):
         if row[0] == "ENUMERATION":
             lines += ["", "", f"class {camel(row[2])}(Word):", docstring(row[3] or row[2].replace("_", " ")), ""]
+            listed = words[camel(row[2])] = []
         else:
             lines.append(f"    {row[2]} = {row[3]}" + (f"  # {row[5]}" if row[5] and len(row[5]) < 90 else ""))
+            listed.append(row[2].lower().replace("_", "-"))
+    lines += ["", ""]
+    for name, listed in words.items():
+        told = ", ".join(f'"{word}"' for word in listed)
+        lines += textwrap.wrap(f"{name}Word = Literal[{told}]", WIDTH, subsequent_indent="    ", break_on_hyphens=False)
     return lines
 
 
-def structs():
+def message_rows():
+    """Each record or message: its row, and its fields."""
     groups = []
     for row in read("messages.def", [name for name in ROWS if name not in ("ENUMERATION", "VALUE", "LIMIT")]):
         if row[0] in ("RECORD", "MESSAGE"):
             groups.append((row, []))
         else:
             groups[-1][1].append(Field(row))
+    return groups
+
+
+def heads():
+    """Of the methods with @takes(messages.NAME_keywords): their own arguments, by NAME."""
+    found = {}
+    for path in sorted((HERE / "farlight").glob("*.py")):
+        if path == TARGET:
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for decorator in getattr(node, "decorator_list", ()):
+                match = re.fullmatch(r"takes\(messages\.(\w+)_keywords\)", ast.unparse(decorator))
+                if match is None:
+                    continue
+                node.args.args[0].annotation, node.args.kwarg = ast.Name("Any"), None
+                if found.setdefault(match[1], ast.dump(node.args)) != ast.dump(node.args):
+                    sys.exit(f"{path.name}: {node.name} has other arguments than another method with {match[0]}")
+                found[match[1] + " arguments"] = node.args
+    return {name: found[f"{name} arguments"] for name in SIGNATURES}
+
+
+def signatures(groups):
+    fields = {(row[1] if row[0] == "RECORD" else row[2]): fields for row, fields in groups}
+    lines = ["", "", "# What methods take: their own arguments, and fields of a message as keywords. Never called."]
+    for name, head in heads().items():
+        message, left_out = SIGNATURES[name]
+        own = {argument.arg for argument in head.args + head.kwonlyargs}
+        said = ast.unparse(head) + ("" if head.kwonlyargs else ", *")
+        lines += ["", "", f"def {name}_keywords("]
+        lines += textwrap.wrap(f"{said},", WIDTH, initial_indent="    ", subsequent_indent="    ")
+        for field in fields[message]:
+            default = "_f.NEXT" if message == f"set_{field.name}" else field.default  # the object's own number
+            if field.name not in own.union(left_out):
+                lines.append(f"    {field.name}: {field.keyword()} = {default},")
+        lines += [") -> None:", f'    """Keywords that {camel(message)} explains."""']
+    return lines
+
+
+def structs(groups):
     lines = []
     for row, fields in groups:
         lines += ["", "", "@dataclass"]
@@ -185,9 +249,13 @@ def generate():
             '"""Every message of the protocol. Written by generate.py from the tables of protocol/: change those instead.',
             "", "Enumerations accept their words, too: Render(tracer=\"ldc\").", '"""',
             "from __future__ import annotations", "",
-            "from collections.abc import Sequence", "from dataclasses import dataclass", "from typing import ClassVar", "",
-            "from . import fields as _f", "from .fields import Bytes, Field, Message, Record, Word"]
-    return "\n".join(head + enumerations() + structs() + limits()) + "\n"
+            "from collections.abc import Sequence", "from dataclasses import dataclass",
+            "from typing import TYPE_CHECKING, Any, ClassVar, Literal", "",
+            "from . import fields as _f", "from .fields import Bytes, Field, Message, Record, Word", "", "if TYPE_CHECKING:",
+            "    from .arrays import Numbers", "    from .camera import CameraOf", "    from .frame import LayersOf",
+            "    from .objects import Object", "    from .scene import MaterialsOf, Scene, Textures"]
+    groups = message_rows()
+    return "\n".join(head + enumerations() + structs(groups) + limits() + signatures(groups)) + "\n"
 
 
 def main():

@@ -38,7 +38,10 @@ void panel_value(const struct field_desc *setting, const struct tracer_settings 
     float real;
     if (setting->kind == FIELD_REAL) {
         memcpy(&real, place, sizeof(real));
-        snprintf(text, text_bytes, "%g", (double)real);
+        if (real == 0 && setting->zero_is_default)
+            field_default_text(setting, text, text_bytes);
+        else
+            snprintf(text, text_bytes, "%g", (double)real);
         return;
     }
     const uint64_t number = field_load_int(setting, place);
@@ -87,6 +90,8 @@ static bool change_real(const struct field_desc *setting, void *place, int step)
 {
     float before, value;
     memcpy(&before, place, sizeof(before));
+    if (before == 0 && setting->zero_is_default)
+        before = setting->default_real;
     value = before < REAL_SMALLEST ? (step > 0 ? REAL_SMALLEST : setting->real_min)
                                    : before * (step > 0 ? 2.0f : 0.5f);
     value = value < REAL_SMALLEST ? setting->real_min : value;

@@ -224,6 +224,24 @@ def procedural(kind, output="Color", of=None, to="Color", **inputs):
     return made
 
 
+def group(name, inputs, outputs):
+    """A tree of a group: its sockets by their names, of types such as Color; and the nodes of both ends."""
+    tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    for sockets, given in ((tree.inputs, inputs), (tree.outputs, outputs)):
+        for key, kind in given.items():
+            sockets.new(f"NodeSocket{kind}", key)
+    return tree, tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+
+
+def use_group(tree, of, **values):
+    """A node of a group in another tree."""
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = of
+    for key, value in values.items():
+        node.inputs[key].default_value = value
+    return node
+
+
 def without_surface(kind, **inputs):
     """A material that is a volume alone."""
     made = bpy.data.materials.new("volume")

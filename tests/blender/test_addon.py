@@ -306,6 +306,11 @@ class Things(Case):
         cube("cube", tiles, (1.5, 0, 0.8))
         self.assert_like_cycles(0.01, 0.1)  # squares of three pixels: texels at the edges of a face are wider than the filter
 
+    def test_a_checker_on_a_ball_has_the_colours_where_cycles_has_them(self):
+        empty((0.5, 0.5, 0.5))
+        ball("ball", procedural("Checker", Scale=3, Color1=(0.9, 0.1, 0.1, 1), Color2=(0.1, 0.1, 0.9, 1)), radius=1.8)
+        self.assert_like_cycles(0.01, 0.05)
+
     def test_a_mesh_without_a_uv_map_has_the_mean_of_a_procedural_texture(self):
         self.from_above()
         bare = grid("bare", 4, procedural("Checker", Scale=8, Color1=(0.8, 0.2, 0, 1), Color2=(0, 0.4, 0.6, 1)))
@@ -364,6 +369,100 @@ class Things(Case):
         ball("ball", mixture("Add", ("BsdfPrincipled", {}), ("BsdfGlass", {})))
         self.assertEqual(sorted(self.told()), ["mixture.001: Add Shader adds Principled and Glass: Principled alone is shown",
                                                "mixture: the node Toon BSDF is not known, and is left out of Mix Shader"])
+
+    def paint(self):
+        """A group that is Lambert's, of a colour that it darkens."""
+        tree, start, end = scenes.group("paint", {"Colour": "Color", "Share": "Float"}, {"Shader": "Shader"})
+        lambert, darker = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeMixRGB")
+        darker.blend_type, darker.inputs["Color2"].default_value = "MULTIPLY", (0.5, 0.5, 0.5, 1)
+        tree.links.new(start.outputs["Colour"], darker.inputs["Color1"])
+        tree.links.new(start.outputs["Share"], darker.inputs["Fac"])
+        tree.links.new(darker.outputs[0], lambert.inputs["Color"])
+        tree.links.new(lambert.outputs[0], end.inputs["Shader"])
+        return tree
+
+    def two_coats(self, paint):
+        """A group of two nodes of another one, mixed by a number from without that crosses a reroute."""
+        tree, start, end = scenes.group("coats", {"Share": "Float", "Colour": "Color"}, {"Shader": "Shader"})
+        mix, bend = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("NodeReroute")
+        first = scenes.use_group(tree, paint, Share=0.0)
+        tree.links.new(start.outputs["Colour"], first.inputs["Colour"])
+        tree.links.new(first.outputs[0], mix.inputs[1])
+        tree.links.new(scenes.use_group(tree, paint, Colour=self.GREEN, Share=1.0).outputs[0], mix.inputs[2])
+        tree.links.new(start.outputs["Share"], bend.inputs[0])
+        tree.links.new(bend.outputs[0], mix.inputs["Fac"])
+        tree.links.new(mix.outputs[0], end.inputs["Shader"])
+        return tree
+
+    def grouped(self, tree, **values):
+        made = diffuse((1, 1, 1, 1))
+        node = scenes.use_group(made.node_tree, tree, **values)
+        made.node_tree.links.new(node.outputs[0], made.node_tree.nodes["Material Output"].inputs["Surface"])
+        return made
+
+    def test_shaders_in_groups_and_in_groups_within_them(self):
+        self.row(lambda: self.grouped(self.paint(), Colour=self.RED, Share=0.5),
+                 lambda: self.grouped(bpy.data.node_groups["paint"], Colour=self.BLUE, Share=0.0),
+                 lambda: self.grouped(self.two_coats(bpy.data.node_groups["paint"]), Colour=self.BLUE, Share=0.4))
+        self.assert_like_cycles(0.01, 0.05)
+        self.assertEqual(self.told(), [])
+
+    def tiles(self):
+        """A group whose number is a texture's scale."""
+        tree, start, end = scenes.group("tiles", {"Scale": "Float", "Colour": "Color"}, {"Fac": "Float", "Colour": "Color"})
+        checker = tree.nodes.new("ShaderNodeTexChecker")
+        for name, to in (("Scale", "Scale"), ("Colour", "Color1")):
+            tree.links.new(start.outputs[name], checker.inputs[to])
+        for name, to in (("Fac", "Fac"), ("Color", "Colour")):
+            tree.links.new(checker.outputs[name], end.inputs[to])
+        return tree
+
+    def test_textures_in_a_group_are_baked_with_the_values_that_each_of_its_nodes_has(self):
+        self.from_above()
+        tree, made = self.tiles(), mixture("Mix", ("BsdfDiffuse", {}), ("BsdfDiffuse", {"Color": self.BLUE}))
+        links, mix = made.node_tree.links, scenes.shader(made)
+        wide, narrow = (scenes.use_group(made.node_tree, tree, Scale=scale, Colour=self.RED) for scale in (2, 4))
+        links.new(wide.outputs["Colour"], mix.inputs[1].links[0].from_node.inputs["Color"])
+        links.new(narrow.outputs["Fac"], mix.inputs["Fac"])
+        grid("ground", 4, made)
+        add_light("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
+        self.assert_like_cycles(0.01, 0.05)
+        narrow.inputs["Scale"].default_value = 8  # of one node of the group
+        self.assert_like_cycles(0.01, 0.05)
+        tree.nodes["Checker Texture"].inputs["Color2"].default_value = self.GREEN  # within the group
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_muted_nodes_and_links_hand_on_what_they_do_in_cycles(self):
+        def muted_mix():
+            made = diffuse(self.RED)
+            mix = made.node_tree.nodes.new("ShaderNodeMixRGB")
+            mix.mute, mix.inputs["Color1"].default_value = True, self.GREEN
+            made.node_tree.links.new(mix.outputs[0], scenes.shader(made).inputs["Color"])
+            colour = made.node_tree.nodes.new("ShaderNodeRGB")
+            colour.outputs[0].default_value = self.BLUE
+            made.node_tree.links.new(colour.outputs[0], mix.inputs["Color1"])
+            return made
+
+        def muted_link():
+            made = procedural("Noise", of=diffuse(self.RED))
+            made.node_tree.links[-1].is_muted = True
+            return made
+
+        def muted_group():
+            made = diffuse((1, 1, 1, 1))
+            node = scenes.use_group(made.node_tree, self.tiles(), Colour=self.GREEN)
+            node.mute = True
+            made.node_tree.links.new(node.outputs["Colour"], scenes.shader(made).inputs["Color"])
+            return made
+
+        def loose_reroute():
+            made = diffuse(self.RED)
+            made.node_tree.links.new(made.node_tree.nodes.new("NodeReroute").outputs[0], scenes.shader(made).inputs["Color"])
+            return made
+        for row in ((muted_mix, muted_link, muted_group), (loose_reroute,)):
+            with self.subTest(row):
+                self.row(*row)
+                self.assert_like_cycles(0.01, 0.05)
 
     def test_sheen_is_as_strong_as_in_cycles(self):
         self.row(*(lambda one=one: material("cloth", Base_Color=one, Specular=0.0, Roughness=1.0, Sheen=1.0, Sheen_Tint=0.0)

@@ -16,6 +16,7 @@ import farlight_test
 from farlight_test import Case, Daemon, bundled_scenes, farlight
 
 NODE = pathlib.Path(__file__).parents[2] / "conf/farm/farlight-node"
+GPU_VARIABLES = ("FARLIGHT_GPU", "SLURM_STEP_GPUS", "SLURM_JOB_GPUS", "SLURM_LOCALID", "CUDA_VISIBLE_DEVICES")
 SMALL = ["--size", "24x16", "--samples", "1", "--orbit"]
 
 
@@ -89,10 +90,11 @@ class Progress(Case):
         self.assertIn("bar, lines and openjd", self.expect(animate(*output, "--progress", "loud"), 2).stderr)
 
 
-class OpenJobDescription(unittest.TestCase):
+class OpenJobDescription(Case):
     """The template, by the fields of the published schema and the names of its format strings."""
 
     def setUp(self):
+        super().setUp()
         try:
             import jsonschema  # pylint: disable=import-outside-toplevel
             import yaml  # pylint: disable=import-outside-toplevel
@@ -116,6 +118,20 @@ class OpenJobDescription(unittest.TestCase):
         render, verify = self.template["steps"]
         self.assertEqual(render["hostRequirements"]["amounts"], [{"name": "amount.worker.gpu", "min": 1}])
         self.assertNotIn("amounts", verify["hostRequirements"])
+
+    def test_the_daemon_of_a_session_has_the_gpu_that_was_given(self):
+        script = self.folder / "enter"
+        script.write_text(self.template["steps"][0]["stepEnvironments"][0]["script"]["embeddedFiles"][0]["data"])
+        fake = self.folder / "farlightd"
+        fake.write_text("#!/bin/sh\n[ \"$1\" = --list-devices ] && printf '%s  A40  (vendor, OpenGL 4.6)\\n' 0 1\nexit 3\n")
+        fake.chmod(0o755)
+        plain = {name: value for name, value in os.environ.items() if name not in GPU_VARIABLES}
+        for given, gpu in (({}, "auto"), ({"CUDA_VISIBLE_DEVICES": "1"}, "1"), ({"FARLIGHT_GPU": "software"}, "software")):
+            with self.subTest(given):
+                environment = {**plain, "PATH": f"{self.folder}:{NODE.parent}:{farlight_test.BIN}:{os.environ['PATH']}", **given}
+                result = subprocess.run(["bash", script, self.folder], env=environment, capture_output=True, text=True, check=False)
+                self.assertEqual(result.returncode, 75, result.stderr)
+                self.assertIn(f"openjd_fail: farlightd --listen unix:{self.folder}/farlight.sock --device {gpu} ended with status 3", result.stdout)
 
     def test_format_strings_name_what_there_is(self):
         parameters = {one["name"] for one in self.template["parameterDefinitions"]}
@@ -184,7 +200,7 @@ class OneDaemonForManyTasks(Case):
                 fake.write_text(f"#!/bin/sh\n[ \"$1\" != --list-devices ] || {{ cat <<'E'\n{shown}\nE\nexit; }}\nexit 3\n")
                 fake.chmod(0o755)
                 variables = {"FARLIGHT_GPU": "", **given}
-                for name in ("SLURM_STEP_GPUS", "SLURM_JOB_GPUS", "SLURM_LOCALID", "CUDA_VISIBLE_DEVICES"):
+                for name in GPU_VARIABLES:
                     os.environ.pop(name, None)
                 self.assertIn(f" --device {gpu} ended", self.expect(self.node("true", **variables), 75).stderr)
 

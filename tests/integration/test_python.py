@@ -448,6 +448,28 @@ esac
             self.assertGreater(abs(flow).max(), 1)
             np.testing.assert_allclose(flow, pixels(other) - pixels(middle), atol=1e-3)
 
+    def test_a_name_makes_the_mask_of_all_that_it_stands_for(self):
+        """A car of two wheels beside a ball, from the scene that made them, and attached to."""
+        scene = farlight.Scene("garage", "kept")
+        rubber = scene.add_material(name="rubber")
+        ball = scene.add_spheres([(0, 0, 0)], 1, material=rubber)
+        car = scene.add_node(name="car")
+        wheels = [scene.add_node(ball, farlight.translate(x), parent=car, name="wheel") for x in (-3, 0)]
+        other = scene.add_node(ball, farlight.translate(3), name="ball")
+        client, seen = self.connect(), {"width": 32, "height": 12, "layers": "id"}
+        frame = client.render(scene, **seen)
+        attached = self.connect().render(self.connect().attach("garage"), **seen)
+        for one in (frame, attached):
+            self.assertEqual(one.names, {car.number: "car", wheels[0].number: "wheel", wheels[1].number: "wheel", other.number: "ball"})
+            self.assertEqual(one.material_names, {rubber.number: "rubber"})
+            both = np.isin(one.ids[..., 0], [wheel.number for wheel in wheels])
+            self.assertEqual(set(np.unique(one.ids[..., 0])), {0, other.number, *(wheel.number for wheel in wheels)})
+            for thing, mask in (("car", both), (car, both), ("wheel", both), ("rubber", both | one.mask(other))):
+                np.testing.assert_array_equal(one.mask(thing), mask)
+            with self.assertRaisesRegex(farlight.InvalidValue, "did you mean wheel"):
+                one.mask("weel")
+        self.assertEqual(client.render(scene, width=4, height=4).names, {})
+
     def test_a_notebook_shows_a_frame(self):
         client, (scene, _) = self.connect(), triangle()
         picture = client.render(scene, STRAIGHT, width=8, height=8, samples=1)

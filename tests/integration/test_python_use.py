@@ -3,9 +3,11 @@
 and daemons that end in the middle."""
 import asyncio
 import ctypes
+import inspect
 import os
 import pty
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -132,6 +134,49 @@ class Arguments(Case):
         np.testing.assert_allclose(scene.get(farlight.ENVIRONMENT).colour, (1, 2, 0.5), rtol=1e-6)
         self.refused(lambda: scene.change(light, intensity="bright"), "set_light.intensity")
         self.refused(lambda: scene.change(light, intensity=-1), "set_light.colour[0]")
+
+
+class Keywords(Case):
+    SCRIPT = """import farlight
+with farlight.connect() as client:
+    scene = farlight.Scene()
+    red = scene.add_material((0.8, 0.1, 0.1), roughness=0.3, alpha_mode="blend")
+    scene.add_mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], material=red)
+    frame = client.render(scene, samples=64, layers=("depth", "normal"), integrator="path")
+async def main() -> None:
+    async with await farlight.aio.connect() as client:
+        (await client.render(scene, width=32)).depth
+        async for frame in client.frames(scene, last_frame=3):
+            print(frame.depth)
+"""
+
+    def test_type_checkers_know_the_keywords_and_the_types_of_their_values(self):
+        if shutil.which("mypy") is None:
+            self.skipTest("mypy is not installed")
+        wrong = (("roughness=", "roughnes="), ('"blend"', '"blended"'), ("samples=64", 'samples="64"'), ("integrator=", "intergrator="),
+                 ("width=32", "widht=32"), ("last_frame=3", 'last_frame="3"'))
+        script = self.SCRIPT
+        for right, mistake in wrong:
+            script = script.replace(right, mistake)
+        files = [self.folder / "right.py", self.folder / "wrong.py"]
+        for path, text in zip(files, (self.SCRIPT, script)):
+            path.write_text(text)
+        said = subprocess.run(["mypy", "--strict", "--cache-dir", self.folder / "cache", *files], env={**os.environ, "MYPYPATH": str(PACKAGE)},
+                              capture_output=True, text=True).stdout
+        lines = [line for line in said.splitlines() if ": error: " in line]
+        self.assertEqual([line.split("wrong.py:")[-1][:2] for line in lines], ["4:", "4:", "6:", "6:", "9:", "10"], said)
+
+    def test_signatures_have_every_keyword_with_the_default_of_the_message(self):
+        for method in (farlight.Client.render, farlight.Client.frames, farlight.Client.view, farlight.aio.AsyncClient.render):
+            taken = inspect.signature(method).parameters
+            for name in ("width", "integrator", "clamp", "denoise", "quadtree_radius"):
+                self.assertEqual(taken[name].default, getattr(messages.Render(), name))
+            self.assertNotIn("values", taken)
+        scene = farlight.Scene()
+        made = scene.get(scene.add_material())
+        for name, one in inspect.signature(scene.add_material).parameters.items():
+            if name not in ("material", "textures"):
+                np.testing.assert_equal(getattr(made, name), one.default, name)
 
 
 class Encoded(Case):

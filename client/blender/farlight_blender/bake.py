@@ -139,7 +139,7 @@ class Surface:
             return None if found is None else inside(found)
         low, high = arrays["place"].min(axis=0), arrays["place"].max(axis=0)
         place = inside(arrays["place"])
-        generated = np.where(high > low, (place - low) / np.where(high > low, high - low, 1), 0.50001)
+        generated = np.where(high > low, (place - low) / np.where(high > low, high - low, 1), 0.5)
         return Points(inside(arrays["uv"]) if "uv" in arrays else None, generated.astype(np.float32), place,
                       inside(arrays["normal"]), colours)
 
@@ -179,7 +179,7 @@ def anywhere() -> Points:
 
 
 def digest_of(tree: bpy.types.NodeTree, of_image: Callable[[bpy.types.Image], bytes]) -> bytes:
-    """The same for the same nodes."""
+    """The same for the same nodes, those of groups included."""
     hashed = hashlib.blake2b(digest_size=16)
 
     def add(*given: Any) -> None:
@@ -200,8 +200,10 @@ def digest_of(tree: bpy.types.NodeTree, of_image: Callable[[bpy.types.Image], by
                 add(point.location, point.handle_type)
         if getattr(node, "image", None) is not None:
             hashed.update(of_image(node.image))
+        if node.type == "GROUP" and node.node_tree is not None:
+            hashed.update(digest_of(node.node_tree, of_image))
     for link in tree.links:
-        add(link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier)
+        add(link.is_muted, link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier)
     return hashed.digest()
 
 

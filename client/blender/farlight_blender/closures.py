@@ -30,7 +30,7 @@ class Value:
     """A number or a colour: the same everywhere (constant), `scale` times what feeds a socket, or else what at() says."""
     at: Callable[[Points], Any]
     constant: Optional[Constant] = None
-    socket: Optional[bpy.types.NodeSocket] = None
+    socket: Optional[nodes.Socket] = None
     scale: Constant = 1.0
 
     def same(self, other: Value) -> bool:
@@ -106,7 +106,7 @@ class Closure:
     metallic: Value = field(default_factory=lambda: constant(0.0))
     roughness: Value = field(default_factory=lambda: constant(1.0))
     emission: Value = field(default_factory=lambda: constant(BLACK))
-    normal: Optional[bpy.types.NodeSocket] = None
+    normal: Optional[nodes.Socket] = None
     more: dict[str, Value] = field(default_factory=dict)
 
     def get(self, name: str) -> Value:
@@ -126,16 +126,16 @@ class Closures:
     def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
 
-    def of(self, node: bpy.types.Node) -> Optional[Closure]:
+    def of(self, node: nodes.Node) -> Optional[Closure]:
         """None: the node is not known."""
-        read: dict[str, Callable[[bpy.types.Node], Optional[Closure]]] = {"BSDF_PRINCIPLED": self._principled, "EMISSION": self._emission, "BSDF_DIFFUSE": self._diffuse, "BSDF_GLOSSY": self._glossy,
+        read: dict[str, Callable[[nodes.Node], Optional[Closure]]] = {"BSDF_PRINCIPLED": self._principled, "EMISSION": self._emission, "BSDF_DIFFUSE": self._diffuse, "BSDF_GLOSSY": self._glossy,
                 "BSDF_GLASS": self._glass, "BSDF_REFRACTION": self._refraction, "BSDF_TRANSPARENT": self._transparent,
                 "BSDF_TRANSLUCENT": self._translucent, "MIX_SHADER": self._mixture, "ADD_SHADER": self._sum}
         return read[node.type](node) if node.type in read else None
 
     # ---- values
 
-    def value(self, socket: Optional[bpy.types.NodeSocket], missing: float = 0.0) -> Value:
+    def value(self, socket: Optional[nodes.Socket], missing: float = 0.0) -> Value:
         """Of an input."""
         if socket is None:
             return constant(missing)
@@ -152,17 +152,22 @@ class Closures:
             self._note(f"{name} depends on the view: its mean is used")
             return constant(shading.mean_of_view(start))
 
+        fed: nodes.Socket = socket
+
         def at(points: Points) -> Any:
             try:
-                return shading.value(socket, points)
+                return shading.value(fed, points)
             except shading.Unknown as unknown:
                 self._note(f"{name} comes from {unknown}, which is not known: its own value is used")
                 return constant(fixed).at(points)
+        if shading.is_constant(socket):
+            first = at(shading.nowhere())[0]
+            return constant(tuple(float(one) for one in first) if np.ndim(first) else float(first))
         return Value(at, socket=socket)
 
     # ---- shaders
 
-    def _principled(self, node: bpy.types.Node) -> Closure:
+    def _principled(self, node: nodes.Node) -> Closure:
         more = {"transmission": self.value(nodes.first(node, "Transmission", "Transmission Weight")),
                 "clearcoat": times(self.value(nodes.first(node, "Clearcoat", "Coat Weight")), constant(CLEARCOAT_SHARE)),
                 "clearcoat_roughness": self.value(nodes.first(node, "Clearcoat Roughness", "Coat Roughness"))}
@@ -185,7 +190,7 @@ class Closures:
         return Closure("PRINCIPLED", base, self.value(node.inputs["Alpha"]), self.value(node.inputs["Metallic"]), self.value(node.inputs["Roughness"]),
                        shine, node.inputs["Normal"], more)
 
-    def _sheen_colour(self, node: bpy.types.Node, base: Value) -> Value:
+    def _sheen_colour(self, node: nodes.Node, base: Value) -> Value:
         """White, and by the tint that of the base, where nothing is metal or glass."""
         tint = self.value(node.inputs["Sheen Tint"])
         if not IS_OLD_SHEEN:
@@ -196,32 +201,32 @@ class Closures:
         scattered = times(rest(self.value(node.inputs["Metallic"])), rest(self.value(node.inputs["Transmission"])))
         return times(mixed(constant(WHITE), own, tint), scattered)
 
-    def _emission(self, node: bpy.types.Node) -> Closure:
+    def _emission(self, node: nodes.Node) -> Closure:
         """Cycles shows a surface of the strength 1 as white: it is radiance."""
         shine = times(self.value(node.inputs["Color"]), self.value(node.inputs["Strength"]))
         return Closure("EMISSION", constant(BLACK), emission=shine, more={"specular": constant(0.0)})
 
-    def _diffuse(self, node: bpy.types.Node) -> Closure:
+    def _diffuse(self, node: nodes.Node) -> Closure:
         return Closure("DIFFUSE", self.value(node.inputs["Color"]), normal=node.inputs["Normal"], more={"specular": constant(0.0)})
 
-    def _glossy(self, node: bpy.types.Node) -> Closure:
+    def _glossy(self, node: nodes.Node) -> Closure:
         return Closure("GLOSSY", self.value(node.inputs["Color"]), metallic=constant(1.0), roughness=self.value(node.inputs["Roughness"]),
                        normal=node.inputs["Normal"])
 
-    def _glass(self, node: bpy.types.Node) -> Closure:
+    def _glass(self, node: nodes.Node) -> Closure:
         return Closure("GLASS", self.value(node.inputs["Color"]), roughness=self.value(node.inputs["Roughness"]), normal=node.inputs["Normal"],
                        more={"transmission": constant(1.0), "ior": constant(max(nodes.number(node.inputs["IOR"]), 1.0))})
 
-    def _refraction(self, node: bpy.types.Node) -> Closure:
+    def _refraction(self, node: nodes.Node) -> Closure:
         made = self._glass(node)
         return replace(made, kind="REFRACTION", more={**made.more, "specular": constant(0.0)})
 
-    def _translucent(self, node: bpy.types.Node) -> Closure:
+    def _translucent(self, node: nodes.Node) -> Closure:
         colour = self.value(node.inputs["Color"])
         return Closure("TRANSLUCENT", constant(BLACK), normal=node.inputs["Normal"],
                        more={"specular": constant(0.0), "diffuse_transmission": constant(1.0), "diffuse_transmission_colour": colour})
 
-    def _transparent(self, node: bpy.types.Node) -> Closure:
+    def _transparent(self, node: nodes.Node) -> Closure:
         colour = self.value(node.inputs["Color"])
         if colour.constant is None or min(colour.constant) < 0.999:
             self._note(f"the colour of {node.name} is left out: it is clear")
@@ -229,7 +234,7 @@ class Closures:
 
     # ---- mixtures
 
-    def _parts(self, node: bpy.types.Node) -> list[Closure]:
+    def _parts(self, node: nodes.Node) -> list[Closure]:
         """Of a mixture. An empty socket is black, as in Cycles."""
         made = []
         for socket in [one for one in node.inputs if one.type == "SHADER"]:
@@ -241,7 +246,7 @@ class Closures:
                 self._note(f"the node {start.node.name} is not known, and is left out of {node.name}")
         return made
 
-    def _mixture(self, node: bpy.types.Node) -> Optional[Closure]:
+    def _mixture(self, node: nodes.Node) -> Optional[Closure]:
         parts, start = self._parts(node), nodes.source(node.inputs["Fac"])
         if len(parts) < 2:
             return parts[0] if parts else None
@@ -252,7 +257,7 @@ class Closures:
                 return made
         return self._mix(node, one, other, self.value(node.inputs["Fac"]))
 
-    def _mix(self, node: bpy.types.Node, one: Closure, other: Closure, share: Value) -> Closure:
+    def _mix(self, node: nodes.Node, one: Closure, other: Closure, share: Value) -> Closure:
         kept, taken = times(rest(share), one.alpha), times(share, other.alpha)
         alpha = mixed(one.alpha, other.alpha, share)
         if one.kind == "TRANSPARENT" or other.kind == "TRANSPARENT":
@@ -271,7 +276,7 @@ class Closures:
                     return replace(made, alpha=alpha, normal=self._normal(node, one, other, share))
         return self._blend(node, one, other, share, alpha)
 
-    def _blend(self, node: bpy.types.Node, one: Closure, other: Closure, share: Value, alpha: Value) -> Closure:
+    def _blend(self, node: nodes.Node, one: Closure, other: Closure, share: Value, alpha: Value) -> Closure:
         """Fields of both, but what a part does not have is the other's."""
         if not one.metallic.same(other.metallic) and not one.base.same(other.base):
             made = _metal_over(one, other, share)
@@ -293,7 +298,7 @@ class Closures:
         return Closure(one.kind if one.kind == other.kind else "PRINCIPLED", base, alpha, mixed(one.metallic, other.metallic, share), roughness,
                        mixed(one.emission, other.emission, share), self._normal(node, one, other, share), more)
 
-    def _normal(self, node: bpy.types.Node, one: Closure, other: Closure, share: Value) -> Optional[bpy.types.NodeSocket]:
+    def _normal(self, node: nodes.Node, one: Closure, other: Closure, share: Value) -> Optional[nodes.Socket]:
         starts = nodes.source(one.normal), nodes.source(other.normal)
         if starts[0] != starts[1] and None not in starts:
             self._note(f"{node.name}: its shaders have different normals: those of the heavier one are used")
@@ -301,7 +306,7 @@ class Closures:
             return one.normal if starts[0] is not None else other.normal
         return other.normal if (share.number() or 0) > 0.5 else one.normal
 
-    def _sum(self, node: bpy.types.Node) -> Optional[Closure]:
+    def _sum(self, node: nodes.Node) -> Optional[Closure]:
         parts = self._parts(node)
         if len(parts) < 2:
             return parts[0] if parts else None

@@ -47,7 +47,7 @@ class _Reading:
     points: Optional[shading.Points] = None  # of means
 
 
-def _uv_transform(node: bpy.types.Node) -> Optional[tuple[float, ...]]:
+def _uv_transform(node: nodes.Node) -> Optional[tuple[float, ...]]:
     """Rows (a b c), (d e f) of the protocol, of the Mapping node before an image. None: it is not laid out by the active UV map."""
     start = nodes.source(node.inputs["Vector"])
     if start is None or start.node.type == "UVMAP" or (start.node.type == "TEX_COORD" and start.name == "UV"):
@@ -70,7 +70,7 @@ def _uv_transform(node: bpy.types.Node) -> Optional[tuple[float, ...]]:
     return tuple(float(one) for one in (upside_down @ made @ upside_down)[:2].ravel())
 
 
-def _image_of(start: Optional[bpy.types.NodeSocket]) -> Optional[bpy.types.Node]:
+def _image_of(start: Optional[nodes.Socket]) -> Optional[nodes.Node]:
     """The node of an image that can be sent as it is."""
     if start is None or start.node.type != "TEX_IMAGE" or start.node.projection != "FLAT" or _uv_transform(start.node) is None:
         return None
@@ -134,7 +134,7 @@ class Reader:
             is_seen = shader is not None and (closure is None or closure.kind != "TRANSPARENT" or closure.alpha.constant != 0.0)
             self._volume(reading, volume, is_seen)
 
-    def _volume(self, reading: _Reading, node: bpy.types.Node, is_seen: bool) -> None:
+    def _volume(self, reading: _Reading, node: nodes.Node, is_seen: bool) -> None:
         """What absorbs is a body of glass, without a surface one that mirrors and bends nothing; nothing else is drawn."""
         density = nodes.number(node.inputs["Density"]) if node.type == "VOLUME_ABSORPTION" and not node.inputs["Density"].is_linked else 0
         colour, is_known = nodes.colour(node.inputs["Color"]) if density > 0 else (closures.BLACK, False)
@@ -276,13 +276,13 @@ class Reader:
         key = ("packed", *(one and (one[0].image.name_full, one[2]) for one in found.values()))
         self._texture(reading, METALLIC_ROUGHNESS, given[0][0], key, packed, is_srgb=False)
 
-    def _channel(self, reading: _Reading, value: Value) -> Optional[tuple[bpy.types.Node, Any, str]]:
+    def _channel(self, reading: _Reading, value: Value) -> Optional[tuple[nodes.Node, Any, str]]:
         """The image that feeds a number: its node, its values and which channel they are."""
         start = nodes.source(value.socket)
         if start is None or not isinstance(value.scale, float):
             return None
         name = start.name
-        image = start
+        image: Optional[nodes.Socket] = start
         if start.node.type in {"SEPRGB", "SEPARATE_COLOR"}:
             name = {"R": "Red", "G": "Green", "B": "Blue"}.get(name, name)
             image = nodes.source(start.node.inputs[0])
@@ -295,7 +295,7 @@ class Reader:
             return None
         return node, values, name
 
-    def _normal(self, reading: _Reading, socket: Optional[bpy.types.NodeSocket]) -> None:
+    def _normal(self, reading: _Reading, socket: Optional[nodes.Socket]) -> None:
         start = nodes.source(socket)
         if start is None or socket is None:
             return
@@ -310,7 +310,7 @@ class Reader:
             return
         self._note(reading, f"{socket.name} comes from {start.node.name}, which is not known: its own value is used")
 
-    def _bump(self, reading: _Reading, node: bpy.types.Node) -> None:
+    def _bump(self, reading: _Reading, node: nodes.Node) -> None:
         strength = nodes.number(node.inputs["Strength"]) * nodes.number(node.inputs["Distance"]) * (-1 if node.invert else 1)
         picture = _image_of(nodes.source(node.inputs["Height"]))
         if picture is not None:
@@ -329,7 +329,7 @@ class Reader:
 
     # ---- textures
 
-    def _use(self, reading: _Reading, place: int, node: bpy.types.Node, strength: float = 1.0, has_alpha: bool = False) -> bool:
+    def _use(self, reading: _Reading, place: int, node: nodes.Node, strength: float = 1.0, has_alpha: bool = False) -> bool:
         """An image at a place of the material; False: it cannot be read."""
         values = images.pixels(node.image) if node.image else None
         if values is None:
@@ -340,7 +340,7 @@ class Reader:
         self._texture(reading, place, node, key, texels, images.is_srgb(node.image), strength)
         return True
 
-    def _texture(self, reading: _Reading, place: int, node: bpy.types.Node, key: Hashable, texels: Any, is_srgb: bool,
+    def _texture(self, reading: _Reading, place: int, node: nodes.Node, key: Hashable, texels: Any, is_srgb: bool,
                  strength: float = 1.0) -> None:
         full = (key, node.extension, node.interpolation)
         is_new = not self._mirror.is_seen(ObjectKind.TEXTURE, full)
@@ -351,7 +351,7 @@ class Reader:
                                            nearest=int(node.interpolation == "Closest"))  # without its name, which is a file's
         reading.textures[place] = TextureUse(number, 0, _uv_transform(node) or UNLINKED, strength)
 
-    def _unread(self, reading: _Reading, node: bpy.types.Node) -> None:
+    def _unread(self, reading: _Reading, node: nodes.Node) -> None:
         self._note(reading, f"the image of {node.name} cannot be read")
 
 

@@ -202,7 +202,7 @@ def voronoi_edge(points: Any, randomness: float) -> Any:
 def checker(points: Any) -> Any:
     """1 where the first colour is."""
     cells = np.floor((points + 0.000001) * 0.999999).astype(np.int64)
-    return (cells.sum(axis=1) % 2 == 0).astype(np.float32)
+    return (cells.sum(axis=1) % 2).astype(np.float32)  # the cell at the origin has the second
 
 
 def brick(points: Any, size: tuple[float, float], mortar: tuple[float, float], bias: float, offset: tuple[float, int],

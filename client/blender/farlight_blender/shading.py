@@ -34,17 +34,16 @@ class Points:
         return len(self.place)
 
 
-def value(socket: bpy.types.NodeSocket, points: Points) -> Any:
+def value(socket: nodes.Socket, points: Points) -> Any:
     """Of an input: n numbers, or n x 3 of a colour or a vector."""
     start = nodes.source(socket)
     if start is None:
         if socket.type == "VALUE":
             return np.full(len(points), socket.default_value, np.float32)
         return np.tile(np.array(socket.default_value[:3], np.float32), (len(points), 1))
-    key = start.node.as_pointer(), start.identifier
-    if key not in points.made:
-        points.made[key] = _node(start.node, start, points)
-    return _as(points.made[key], start.type, socket.type)
+    if start not in points.made:
+        points.made[start] = _node(start.node, start, points)
+    return _as(points.made[start], start.type, socket.type)
 
 
 def _as(values: Any, made: str, wanted: str) -> Any:
@@ -55,7 +54,7 @@ def _as(values: Any, made: str, wanted: str) -> Any:
     return values
 
 
-def _node(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _node(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     made = READ.get(node.type)
     if made is None:
         raise Unknown(node.name)
@@ -64,7 +63,7 @@ def _node(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) ->
     return np.nan_to_num(np.asarray(values, np.float32), posinf=0.0, neginf=0.0)
 
 
-def _mean(node: bpy.types.Node, name: str, points: Points) -> float:
+def _mean(node: nodes.Node, name: str, points: Points) -> float:
     return float(value(node.inputs[name], points).mean())
 
 
@@ -76,14 +75,14 @@ def _uv(points: Points) -> Any:
     return np.column_stack((points.uv, np.zeros(len(points), np.float32)))
 
 
-def _coordinate(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _coordinate(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     made = {"Generated": points.generated, "UV": _uv(points), "Object": points.place, "Normal": points.normal}
     if output.identifier not in made or node.object is not None:
         raise Unknown(f"{output.name} of {node.name}")
     return made[output.identifier]
 
 
-def _mapping(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _mapping(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     given = value(node.inputs["Vector"], points)
     shift, turn, scale = (np.array([_axis(node.inputs[name], axis, points) if name in node.inputs else 0 for axis in range(3)])
                           for name in ("Location", "Rotation", "Scale"))
@@ -97,11 +96,11 @@ def _mapping(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> A
     return (given * scale) @ turned.T + (shift if node.vector_type == "POINT" else 0)
 
 
-def _axis(socket: bpy.types.NodeSocket, axis: int, points: Points) -> float:
+def _axis(socket: nodes.Socket, axis: int, points: Points) -> float:
     return float(value(socket, points)[:, axis].mean())
 
 
-def _where(node: bpy.types.Node, points: Points, scale: bool = True) -> Any:
+def _where(node: nodes.Node, points: Points, scale: bool = True) -> Any:
     """The place in a texture."""
     socket = node.inputs["Vector"]
     place = value(socket, points) if socket.is_linked or node.type == "TEX_WHITE_NOISE" else points.generated
@@ -116,7 +115,7 @@ def _where(node: bpy.types.Node, points: Points, scale: bool = True) -> Any:
 
 # ---- textures
 
-def _image(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _image(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     picture = images.pixels(node.image) if node.image else None
     if picture is None or node.projection != "FLAT":
         raise Unknown(node.name)
@@ -146,18 +145,18 @@ def _wrapped(at: Any, size: int, extension: str) -> Any:
     return at % size if extension == "REPEAT" else np.clip(at, 0, size - 1)
 
 
-def _noise(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _noise(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     detail, roughness, distortion = (_mean(node, name, points) for name in ("Detail", "Roughness", "Distortion"))
     made = procedural.noise(_where(node, points), detail, roughness, distortion, output.identifier == "Color")
     return made if output.identifier == "Color" else made[:, 0]
 
 
-def _white(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _white(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     made = procedural.white_noise(_where(node, points, scale=False))
     return made if output.identifier == "Color" else made[:, 0]
 
 
-def _voronoi(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _voronoi(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     randomness = min(max(_mean(node, "Randomness", points), 0), 1)
     if node.feature == "DISTANCE_TO_EDGE":
         return procedural.voronoi_edge(_where(node, points), randomness)
@@ -170,7 +169,7 @@ def _voronoi(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points)
     return colour if output.identifier == "Color" else distance
 
 
-def _checker(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _checker(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     first = procedural.checker(_where(node, points))
     if output.identifier == "Fac":
         return first
@@ -178,7 +177,7 @@ def _checker(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points)
     return np.where(first[:, None] > 0, one, other)
 
 
-def _brick(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _brick(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     names = ("Brick Width", "Row Height", "Mortar Size", "Mortar Smooth", "Bias")
     width, height, size, smooth, bias = (_mean(node, name, points) for name in names)
     tint, mortar = procedural.brick(_where(node, points), (max(width, 1e-6), max(height, 1e-6)), (size, smooth), bias,
@@ -190,12 +189,12 @@ def _brick(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -
     return bricks + (between - bricks) * mortar[:, None]
 
 
-def _gradient(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _gradient(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     made = np.clip(procedural.gradient(_where(node, points, scale=False), node.gradient_type), 0, 1)
     return _as(made, "VALUE", output.type)
 
 
-def _wave(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _wave(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     direction = node.bands_direction if node.wave_type == "BANDS" else node.rings_direction
     much, detail, scale, roughness, phase = (_mean(node, name, points) for name in ("Distortion", "Detail", "Detail Scale", "Detail Roughness",
                                                                                     "Phase Offset"))
@@ -203,14 +202,14 @@ def _wave(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) ->
     return _as(made, "VALUE", output.type)
 
 
-def _magic(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _magic(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     made = procedural.magic(_where(node, points), node.turbulence_depth, _mean(node, "Distortion", points))
     return made if output.identifier == "Color" else made.mean(axis=1)
 
 
 # ---- colours
 
-def _ramp(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _ramp(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     ramp = node.color_ramp
     colours = np.array([ramp.evaluate(step / (RAMP_STEPS - 1)) for step in range(RAMP_STEPS)], np.float32)
     at = np.clip(value(node.inputs["Fac"], points), 0, 1) * (RAMP_STEPS - 1)
@@ -232,7 +231,7 @@ def _blended(kind: str, share: Any, a: Any, b: Any) -> Any:
     return a + (one[kind]() - a) * share
 
 
-def _mix(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _mix(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     by_name = {one.identifier: one for one in node.inputs}
     if node.type == "MIX_RGB":
         share, a, b = (value(by_name[name], points) for name in ("Fac", "Color1", "Color2"))
@@ -264,7 +263,7 @@ def _from_hsv(colour: Any) -> Any:
     return most[:, None] * (1 - saturation[:, None] * (1 - shares))
 
 
-def _hue(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _hue(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     colour = value(node.inputs["Color"], points)
     hue, saturation, most, share = (value(node.inputs[name], points) for name in ("Hue", "Saturation", "Value", "Fac"))
     made = _hsv(colour)
@@ -272,22 +271,22 @@ def _hue(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
     return colour + (np.clip(_from_hsv(made), 0, None) - colour) * share[:, None]
 
 
-def _bright(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _bright(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     colour, bright, contrast = (value(node.inputs[name], points) for name in ("Color", "Bright", "Contrast"))
     return np.clip((1 + contrast)[:, None] * colour + (bright - contrast / 2)[:, None], 0, None)
 
 
-def _invert(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _invert(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     colour = value(node.inputs["Color"], points)
     return colour + (1 - 2 * colour) * value(node.inputs["Fac"], points)[:, None]
 
 
-def _gamma(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _gamma(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     colour = value(node.inputs["Color"], points)
     return np.where(colour > 0, np.abs(colour) ** value(node.inputs["Gamma"], points)[:, None], colour)
 
 
-def _curves(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _curves(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     colour, mapping = value(node.inputs["Color"], points), node.mapping
     mapping.initialize()
     steps = np.linspace(0, 1, RAMP_STEPS // 4 + 1)
@@ -296,7 +295,7 @@ def _curves(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> An
     return colour + (made - colour) * value(node.inputs["Fac"], points)[:, None]
 
 
-def _separate(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _separate(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     if getattr(node, "mode", "RGB") == "HSL":
         raise Unknown(node.name)
     values = value(node.inputs[0], points)
@@ -305,14 +304,14 @@ def _separate(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points
     return values[:, list(node.outputs).index(output)]
 
 
-def _combine(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _combine(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     if getattr(node, "mode", "RGB") == "HSL":
         raise Unknown(node.name)
     values = np.stack([value(one, points) for one in node.inputs[:3]], axis=-1)
     return _from_hsv(values) if getattr(node, "mode", "RGB") == "HSV" else values
 
 
-def _attribute(node: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _attribute(node: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     name = node.attribute_name if node.type == "ATTRIBUTE" else node.layer_name
     made = points.colours(name)
     if made is None or output.name not in {"Color", "Fac"}:
@@ -346,14 +345,14 @@ BY_AXIS = {"ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "MULTIPLY_ADD", "WRAP", "SNA
            "SINE", "COSINE", "TANGENT"}
 
 
-def _fraction(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _fraction(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     if node.operation not in MATHS:
         raise Unknown(node.name)
     made = MATHS[node.operation](*(value(one, points) for one in node.inputs[:3]))
     return np.clip(made, 0, 1) if node.use_clamp else made
 
 
-def _vector(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _vector(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     a, b, c = (value(one, points) for one in node.inputs[:3])
     if node.operation in BY_AXIS:
         return MATHS[node.operation](a, b, c)
@@ -371,7 +370,7 @@ def _vector(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> An
     raise Unknown(node.name)
 
 
-def _range(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _range(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     if node.data_type != "FLOAT" or node.interpolation_type == "STEPPED":
         raise Unknown(node.name)
     given, low, high, first, last = (value(one, points) for one in node.inputs[:5])
@@ -384,19 +383,19 @@ def _range(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any
     return first + share * (last - first)
 
 
-def _clamp(node: bpy.types.Node, _: bpy.types.NodeSocket, points: Points) -> Any:
+def _clamp(node: nodes.Node, _: nodes.Socket, points: Points) -> Any:
     given, low, high = (value(one, points) for one in node.inputs[:3])
     if node.clamp_type == "RANGE":
         low, high = np.minimum(low, high), np.maximum(low, high)
     return np.minimum(np.maximum(given, low), high)
 
 
-def _own(_: bpy.types.Node, output: bpy.types.NodeSocket, points: Points) -> Any:
+def _own(_: nodes.Node, output: nodes.Socket, points: Points) -> Any:
     given = output.default_value
     return np.full(len(points), given) if output.type == "VALUE" else np.tile(np.array(given[:3]), (len(points), 1))
 
 
-READ: dict[str, Callable[[bpy.types.Node, bpy.types.NodeSocket, Points], Any]] = {
+READ: dict[str, Callable[[nodes.Node, nodes.Socket, Points], Any]] = {
     "TEX_COORD": _coordinate, "UVMAP": lambda node, output, points: _uv(points), "MAPPING": _mapping, "TEX_IMAGE": _image, "TEX_NOISE": _noise,
     "TEX_WHITE_NOISE": _white, "TEX_VORONOI": _voronoi, "TEX_CHECKER": _checker, "TEX_BRICK": _brick, "TEX_GRADIENT": _gradient,
     "TEX_WAVE": _wave, "TEX_MAGIC": _magic, "VALTORGB": _ramp, "MIX": _mix, "MIX_RGB": _mix, "HUE_SAT": _hue, "BRIGHTCONTRAST": _bright,
@@ -406,16 +405,37 @@ READ: dict[str, Callable[[bpy.types.Node, bpy.types.NodeSocket, Points], Any]] =
     "RGBTOBW": lambda node, output, points: value(node.inputs[0], points) @ GREY}
 
 
+def is_constant(socket: nodes.Socket, known: Optional[dict[Any, bool]] = None) -> bool:
+    """Whether what feeds an input is the same everywhere: nodes compute it from numbers alone. `known`: what was found of nodes."""
+    start = nodes.source(socket)
+    if start is None:
+        return True
+    known, kind = {} if known is None else known, start.node.type
+    if start.node not in known:
+        known[start.node] = kind in READ and not kind.startswith("TEX_") and kind not in PLACES and \
+            all(is_constant(one, known) for one in start.node.inputs)
+    return known[start.node]
+
+
+def nowhere() -> Points:
+    """One point, for what is the same everywhere."""
+    zeros = np.zeros((1, 3), np.float32)
+    return Points(None, zeros, zeros, zeros, lambda name: None)
+
+
+PLACES = {"UVMAP", "VERTEX_COLOR", "ATTRIBUTE"}
+
+
 # ---- the view
 
-def ior_of(node: bpy.types.Node) -> float:
+def ior_of(node: nodes.Node) -> float:
     """Of Fresnel, and of Layer Weight's."""
     if node.type == "FRESNEL":
         return min(max(nodes.number(node.inputs["IOR"]), 1.0), 10.0)
     return min(1 / max(1 - nodes.number(node.inputs["Blend"]), 0.1), 10.0)
 
 
-def mean_of_view(output: bpy.types.NodeSocket) -> float:
+def mean_of_view(output: nodes.Socket) -> float:
     """Of Fresnel or Layer Weight, over the directions from which a surface is lit."""
     cosine = np.sqrt((np.arange(256) + 0.5) / 256)
     if output.name == "Facing":

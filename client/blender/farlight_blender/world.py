@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 QUARTER_TURN = -math.pi / 2
 
 
-def _turn(mirror: Mirror, node: bpy.types.Node) -> float:
+def _turn(mirror: Mirror, node: nodes.Node) -> float:
     """How far the picture is turned about the vertical by a Mapping node before it."""
     mapping = nodes.source(node.inputs["Vector"])
     if mapping is None or mapping.node.type == "TEX_COORD":

@@ -36,8 +36,8 @@ def boxes(node):
 
 def write_coco(folder, scene, count):
     """From the files of the pictures."""
-    named = [(node.number, scene.get(node).name) for node in scene.objects("node")]
-    made = {"images": [], "annotations": [], "categories": [{"id": number, "name": name or f"node {number}"} for number, name in named]}
+    named = scene.names().nodes.items()
+    made = {"images": [], "annotations": [], "categories": [{"id": number, "name": node.name or f"node {number}"} for number, node in named]}
     for number in range(count):
         with np.load(folder / f"{number:05}.npz") as known:
             node = known["node"]

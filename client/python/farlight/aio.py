@@ -14,8 +14,8 @@ from .client import RECEIVE_BYTES, SILENCE_S, Options, Retry
 from .connection import Operation
 from .core import Core, Progress
 from .errors import ConnectionLost, Error, TimedOut
-from .fields import Message
-from .frame import Frame
+from .fields import Message, takes
+from .frame import Frame, LayersOf
 from .jobs import Job
 from .objects import Object
 from .scene import Scene
@@ -218,12 +218,14 @@ class AsyncClient:
         assert isinstance(reply, messages.StatsReply)
         return reply
 
-    async def render(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Frame:
+    @takes(messages.job_keywords)
+    async def render(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (), **values: Any) -> Frame:
         """As Client.render()."""
         frame, = [frame async for frame in self.frames(scene, camera, layers=layers, **one_frame(values))]
         return frame
 
-    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (),
+    @takes(messages.job_keywords)
+    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (),
                **values: Any) -> AsyncGenerator[Frame, None]:
         """As Client.frames()."""
         return self._frames(scene, request(camera, layers, {**values, "kind": messages.JobKind.BATCH}))
@@ -254,6 +256,7 @@ class AsyncClient:
             finally:
                 self._flush(core)
 
+    @takes(messages.view_keywords)
     async def view(self, scene: Scene, camera: CameraOf = None, **values: Any) -> AsyncView:
         """As Client.view()."""
         render = request(camera, (), {**values, "kind": messages.JobKind.VIEW})

@@ -12,7 +12,7 @@ import numpy as np
 from . import arrays, decode, fields, messages
 from .arrays import Array, Numbers
 from .errors import InvalidValue
-from .frame import layer_set
+from .frame import LayersOf, layer_set
 from .messages import Encoding, ObjectKind
 from .objects import Object, make
 
@@ -125,7 +125,7 @@ def _look(render: messages.Render, camera: CameraOf) -> None:
         render.camera_path = messages.CameraPath.KEYS
 
 
-def request(camera: CameraOf, layers: Any, values: dict[str, Any]) -> messages.Render:
+def request(camera: CameraOf, layers: LayersOf, values: dict[str, Any]) -> messages.Render:
     """The message of a job, valid but for the scene. camera: one, a node of the scene that shows one, several as keys over
     time, or None: all of the scene is in view. `clips` may be those of the scene: clips=scene.objects("clip")."""
     if isinstance(values.get("clips"), (list, tuple)):

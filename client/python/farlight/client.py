@@ -15,8 +15,8 @@ from .camera import Camera, CameraOf, command, one_frame, request
 from .connection import Operation
 from .core import Core, Progress
 from .errors import ConnectionLost, Error, InvalidValue, Refused, TimedOut
-from .fields import Message
-from .frame import Frame
+from .fields import Message, takes
+from .frame import Frame, LayersOf
 from .jobs import Job
 from .objects import Object
 from .scene import Scene
@@ -300,13 +300,15 @@ class Client:
         assert isinstance(reply, messages.StatsReply)
         return reply
 
-    def render(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Frame:
+    @takes(messages.job_keywords)
+    def render(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (), **values: Any) -> Frame:
         """One picture. camera: a Camera, a node with one, or None: the whole scene in view. layers: "depth" or
         ("beauty", "normal"), as floats. `values`: fields of messages.Render, such as width, samples, integrator="path"."""
         frame, = self.frames(scene, camera, layers=layers, **one_frame(values))
         return frame
 
-    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Generator[Frame, None, None]:
+    @takes(messages.job_keywords)
+    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (), **values: Any) -> Generator[Frame, None, None]:
         """The frames first_frame .. last_frame, one after the other. After a lost connection it goes on with the next
         one, if there is a retry_for. Several cameras are keys over time. Arguments are checked at once; the job begins with
         the first frame that is asked for, and ends with the generator."""
@@ -336,6 +338,7 @@ class Client:
                 if self._link is not None:
                     self._flush()
 
+    @takes(messages.view_keywords)
     def view(self, scene: Scene, camera: CameraOf = None, **values: Any) -> View:
         """A picture that follows a camera."""
         render = request(camera, (), {**values, "kind": messages.JobKind.VIEW})

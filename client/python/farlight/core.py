@@ -13,8 +13,8 @@ from .errors import ConnectionLost, InvalidValue, ProtocolError, Refused
 from .fields import Bytes, Message
 from .frame import Frame
 from .jobs import Job, Pending
-from .messages import ErrorCode, ObjectKind, Sharing
-from .objects import Object
+from .messages import ErrorCode, Layer, ObjectKind, Sharing
+from .objects import Names, Object
 from .scene import Scene
 
 PIECE_BYTES = 262144
@@ -273,7 +273,16 @@ class Core(Connection):
     def _render_of(self, scene: Scene, render: messages.Render) -> Operation[Job]:
         yield from self.commit(scene)
         render.scene = self._scenes[scene].scene
-        return (yield from self._start(render))
+        known = (yield from self._names(scene)) if render.layers >> Layer.ID & 1 else None
+        job = yield from self._start(render)
+        job.known = known or job.known
+        return job
+
+    def _names(self, scene: Scene) -> Operation[Names]:
+        if not scene.is_attached:
+            return scene.names()
+        nodes = yield from self.objects(scene, ObjectKind.NODE, "")
+        return Names.of(nodes, (yield from self.objects(scene, ObjectKind.MATERIAL, "")))
 
     def batch(self, scene: Scene, render: messages.Render) -> Generator[Frame | None, None, None]:
         """Commits the scene; then the frames of a batch. None: nothing has come yet."""

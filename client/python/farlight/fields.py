@@ -9,17 +9,38 @@ is a newer one's: the rest is skipped.
 from __future__ import annotations
 
 import enum
+import inspect
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Union
+from typing import Any, ClassVar, ParamSpec, TypeVar, Union
 
 from .errors import Error, InvalidValue, ProtocolError
 
 Bytes = Union[bytes, bytearray, memoryview]
+P = ParamSpec("P")
+T = TypeVar("T")
 
 CONTROL_MAX_BYTES = 65536  # payload of a message without bulk data
 BULK_MAX_BYTES = 262144 + 4096
+
+
+class _Next:
+    def __repr__(self) -> str:
+        return "the next free number"
+
+
+NEXT: Any = _Next()  # the default that signatures show of an object's number
+
+
+def takes(signature: Callable[P, None]) -> Callable[[Callable[..., T]], Callable[P, T]]:
+    """A method that takes the fields of a message as keywords: with all of them in its signature, for help(), editors and type
+    checkers."""
+    def decorate(method: Callable[..., T]) -> Callable[P, T]:
+        named = inspect.signature(signature)
+        setattr(method, "__signature__", named.replace(return_annotation=inspect.signature(method).return_annotation))
+        return method
+    return decorate
 
 
 class Word(enum.IntEnum):

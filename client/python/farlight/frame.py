@@ -2,7 +2,9 @@
 """Frames as arrays."""
 from __future__ import annotations
 
+import difflib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -12,9 +14,10 @@ import numpy.typing as npt
 from . import png
 from .errors import InvalidValue
 from .messages import FrameBegin, FrameEnd, Layer, ObjectKind, PixelFormat, StructureRow
-from .objects import Object
+from .objects import Names, Object
 
 Array = npt.NDArray[Any]
+LayersOf = Union[str, Layer, Sequence[Union[str, Layer]]]
 
 _TYPES = {PixelFormat.RGBA8: "u1", PixelFormat.RGBA16F: "<f2", PixelFormat.RGBA32F: "<f4"}
 
@@ -31,7 +34,7 @@ def _layers_of(name: Union[str, Layer]) -> "list[Layer]":
     return whole or [Layer(Layer.of(name))]
 
 
-def layer_set(layers: Union[str, Layer, "tuple[str | Layer, ...]", "list[str | Layer]"]) -> int:
+def layer_set(layers: LayersOf) -> int:
     """The set of bits of "depth", or of ("beauty", "depth")."""
     try:
         names = (layers,) if isinstance(layers, (str, Layer)) else tuple(layers)
@@ -45,12 +48,13 @@ class Frame:
     """A picture as it came. `begin` and `end` are all that the daemon says of it: camera, revision, samples, digest,
     rays, times of the stages. Arrays are views of `data`, its pixels, rows from the top, and cannot be written to.
     `is_checked`: they have the digest that the daemon computed; not known of JPEG, and without libxxhash. `window`: of a
-    crop, the pixels left of it and above it, and the size of the whole picture."""
+    crop, the pixels left of it and above it, and the size of the whole picture. `known`: the scene's names, with the layer id."""
     begin: FrameBegin
     end: FrameEnd
     data: memoryview
     is_checked: bool = False
     window: Union[tuple[int, int, int, int], None] = None
+    known: Names = Names({}, {})
 
     def __repr__(self) -> str:
         width, height = self.size
@@ -132,12 +136,34 @@ class Frame:
         frames, or another camera of the next render(), is not known beforehand."""
         return self.layer(Layer.MOTION)
 
-    def mask(self, thing: Object) -> Array:
-        """Height x width: where the first surface is of that node or material."""
-        if not isinstance(thing, Object) or thing.kind not in (ObjectKind.NODE, ObjectKind.MATERIAL):
-            raise InvalidValue(f"{thing!r:.80} is no node or material", field="mask", remedy="give what an add_ function, find() or "
-                               "objects() of the scene returned")
-        is_there: Array = self.ids[..., 0 if thing.kind == ObjectKind.NODE else 1] == thing.number
+    @property
+    def names(self) -> dict[int, str]:
+        """The names of the nodes by their numbers, which `ids` has; without the layer id none."""
+        return {number: entry.name for number, entry in self.known.nodes.items()}
+
+    @property
+    def material_names(self) -> dict[int, str]:
+        """Likewise, of materials."""
+        return {number: entry.name for number, entry in self.known.materials.items()}
+
+    def mask(self, thing: Object | str) -> Array:
+        """Height x width: where the first surface is of that node, or hangs below it, or of that material. A name stands for all
+        nodes that have it, and for materials if no node has."""
+        if isinstance(thing, str):
+            nodes, materials = self.known.called(thing)
+            if not nodes and not materials:
+                names = sorted({*self.names.values(), *self.material_names.values()} - {""})
+                like = difflib.get_close_matches(thing, names)
+                raise InvalidValue(f"{thing!r:.80} is the name of no node and no material", field="mask", remedy=f"did you mean {' or '.join(like)}?"
+                                   if like else "frame.names and frame.material_names have them")
+        elif isinstance(thing, Object) and thing.kind in (ObjectKind.NODE, ObjectKind.MATERIAL):
+            is_node = thing.kind == ObjectKind.NODE
+            nodes, materials = self.known.below({thing.number}) if is_node else set(), set() if is_node else {thing.number}
+        else:
+            raise InvalidValue(f"{thing!r:.80} is no node or material", field="mask", remedy="give a name, or what an add_ function, find() "
+                               "or objects() of the scene returned")
+        ids = self.ids
+        is_there: Array = np.isin(ids[..., 0], list(nodes)) if nodes else np.isin(ids[..., 1], list(materials))
         return is_there
 
     @property

@@ -11,6 +11,7 @@ from .errors import ProtocolError
 from .fields import Message
 from .frame import Frame, pixels_bytes
 from .messages import Encoding
+from .objects import Names
 
 
 @dataclass
@@ -36,6 +37,7 @@ class Job:
     came: int = 0
     command: int = 0
     is_abandoned: bool = False
+    known: Names = Names({}, {})
 
     @property
     def is_view(self) -> bool:
@@ -89,6 +91,6 @@ class Job:
             raise ProtocolError(f"frame {message.frame} ends with {len(self.data)} of {self.begun.size_bytes} bytes, "
                                 f"and frame {self.begun.frame} was begun", field="frame_end.frame")
         pixels, is_checked = decode.decode(self.begun, self.data, pixels_bytes(self.begun))
-        frame = Frame(self.begun, message, pixels, is_checked, self._window())
+        frame = Frame(self.begun, message, pixels, is_checked, self._window(), self.known)
         self.begun, self.data, self.came = None, bytearray(), self.came + 1
         return frame

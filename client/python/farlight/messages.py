@@ -7,10 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from . import fields as _f
 from .fields import Bytes, Field, Message, Record, Word
+
+if TYPE_CHECKING:
+    from .arrays import Numbers
+    from .camera import CameraOf
+    from .frame import LayersOf
+    from .objects import Object
+    from .scene import MaterialsOf, Scene, Textures
 
 
 class ErrorCode(Word):
@@ -432,6 +439,60 @@ class QuadtreeHits(Word):
     AUTO = 0
     PRIMITIVE = 1  # the surface itself that a texel shows: exact distances
     PLANE = 2  # the plane that stands for it in the tree, as in the paper
+
+
+ErrorCodeWord = Literal["none", "protocol", "version", "invalid", "unknown-id", "unsupported", "limit", "busy",
+    "cancelled", "hash-mismatch", "out-of-memory", "device-lost", "internal", "denied", "shutting-down", "timeout",
+    "conflict"]
+SeverityWord = Literal["info", "warning", "error"]
+BrdfWord = Literal["ggx", "ward"]
+BackgroundWord = Literal["environment", "transparent", "colour"]
+AccumulationWord = Literal["off", "on", "anew"]
+DenoiseWord = Literal["off", "on", "auto"]
+LayerWord = Literal["beauty", "albedo", "normal", "depth", "position", "ao", "id", "unknown", "crypto-object0",
+    "crypto-object1", "crypto-object2", "crypto-material0", "crypto-material1", "crypto-material2", "diffuse-direct",
+    "diffuse-indirect", "specular-direct", "specular-indirect", "transmission", "emission", "background"]
+AttachmentWord = Literal["depth", "normals", "sticking"]
+DepthFormWord = Literal["metres", "inverse"]
+FramePartKindWord = Literal["colours", "depth", "normals", "coarse-depth", "sticking"]
+UnitWord = Literal["number", "metres", "built", "per-ray", "pixels"]
+IntegratorWord = Literal["whitted", "distributed", "raycast", "ao", "path"]
+PrimaryWord = Literal["raster", "trace", "auto"]
+PixelFilterWord = Literal["blackman-harris", "gaussian", "tent", "box"]
+RayKindWord = Literal["primary", "secondary", "shadow"]
+ToneMapWord = Literal["neutral", "aces", "none"]
+PixelFormatWord = Literal["rgba8", "rgba16f", "rgba32f"]
+EncodingWord = Literal["raw", "zstd", "jpeg", "h264", "predicted"]
+JobKindWord = Literal["batch", "view"]
+ViewSourceWord = Literal["rays", "layers"]
+SharingWord = Literal["private", "kept", "shared"]
+StageWord = Literal["apply", "build", "upload", "primary", "trace", "shade", "resolve", "readback", "encode", "queue",
+    "send", "frame", "compare"]
+ClockWord = Literal["cpu", "gpu"]
+NodeKindWord = Literal["group", "mesh", "spheres", "light", "camera"]
+ObjectKindWord = Literal["node", "mesh", "spheres", "material", "texture", "light", "camera", "disc", "skin", "clip",
+    "channel", "environment"]
+ChannelPathWord = Literal["node-translation", "node-rotation", "node-scale", "node-weights", "node-hidden",
+    "light-colour", "light-size", "material-base-colour", "material-emission", "material-metallic",
+    "material-roughness", "material-transmission", "material-ior", "view-eye", "view-look-at", "view-up", "view-fov-y",
+    "view-aperture", "view-focus", "view-exposure"]
+InterpolationWord = Literal["step", "linear", "cubic-spline", "catmull-rom", "bezier"]
+AlphaModeWord = Literal["opaque", "mask", "blend"]
+MaterialTextureWord = Literal["base-colour", "normal", "metallic-roughness", "occlusion", "emission", "transmission",
+    "bump", "specular", "specular-colour", "clearcoat", "clearcoat-roughness", "clearcoat-normal", "sheen",
+    "sheen-roughness", "iridescence", "iridescence-thickness", "diffuse-transmission", "diffuse-transmission-colour",
+    "anisotropy"]
+TextureFormatWord = Literal["rgba8-srgb", "rgba8-linear"]
+WrapWord = Literal["repeat", "clamp", "mirror"]
+LightKindWord = Literal["point", "spot", "directional", "rectangle", "sphere", "steady"]
+CameraPathWord = Literal["auto", "node", "keys", "orbit"]
+ComparisonLayoutWord = Literal["heat", "side"]
+ComparisonSpaceWord = Literal["linear", "srgb"]
+TracerWord = Literal["bvh", "naive", "reference", "ldc", "abuffer", "rayspace", "quadtree"]
+TracerFormWord = Literal["fast", "paper"]
+RayspaceModeWord = Literal["joint", "flat"]
+QuadtreeFacesWord = Literal["cube", "view"]
+QuadtreeHitsWord = Literal["auto", "primitive", "plane"]
 
 
 @dataclass
@@ -3029,3 +3090,324 @@ LIMITS = (  # that a daemon sends in the handshake, in their order: name, letter
     ("abuffer_memory_bytes", "Q", 'memory, in bytes, of the lists of the tracer abuffer, in whole MiB; a scene that needs more is refused; 0: no limit of its own'),
     ("ldc_layers_max", "I", 'Layers of a layered depth cube; of more the nearest are kept, and the frame says so'),
 )
+
+
+# What methods take: their own arguments, and fields of a message as keywords. Never called.
+
+
+def job_keywords(
+    self: Any, scene: Scene, camera: CameraOf=None, *, layers: LayersOf=(),
+    weight: int = 0,
+    pass_samples: int = 1,
+    adapt: int = 0,
+    still_encoding: Encoding | EncodingWord = Encoding(0),
+    width: int = 1280,
+    height: int = 720,
+    samples: int = 1,
+    depth: int = 8,
+    seed: int = 0,
+    first_frame: int = 0,
+    last_frame: int = 0,
+    frame_step: int = 1,
+    frames_per_second: float = 24.0,
+    time_origin_frame: int = 0,
+    tracer: Tracer | TracerWord = Tracer(0),
+    integrator: Integrator | IntegratorWord = Integrator(0),
+    primary: Primary | PrimaryWord = Primary(0),
+    tone_map: ToneMap | ToneMapWord = ToneMap(0),
+    exposure_stops: float = 0.0,
+    format: PixelFormat | PixelFormatWord = PixelFormat(0),
+    encoding: Encoding | EncodingWord = Encoding(0),
+    quality: int = 0,
+    camera_path: CameraPath | CameraPathWord = CameraPath(0),
+    camera_node: int = 0,
+    orbit_turn: float = 0.0,
+    orbit_seconds: float = 0.0,
+    compare: int = 0,
+    compare_with: Tracer | TracerWord = Tracer(0),
+    compare_far: float = 1e-4,
+    aperture: float = 0.0,
+    focus: float = 0.0,
+    shutter: float = 0.0,
+    pixel_filter: PixelFilter | PixelFilterWord = PixelFilter(0),
+    accumulate: Accumulation | AccumulationWord = Accumulation(0),
+    brdf: Brdf | BrdfWord = Brdf(0),
+    ao_distance: float = 0.0,
+    ao_falloff: float = 0.0,
+    ao_rays: int = 8,
+    layer_opacity: float = 0.5,
+    bvh_form: TracerForm | TracerFormWord = TracerForm(0),
+    ldc_resolution: int = 0,
+    ldc_form: TracerForm | TracerFormWord = TracerForm(0),
+    abuffer_resolution: int = 0,
+    abuffer_voxels: int = 0,
+    abuffer_form: TracerForm | TracerFormWord = TracerForm(0),
+    rayspace_mode: RayspaceMode | RayspaceModeWord = RayspaceMode(0),
+    rayspace_form: TracerForm | TracerFormWord = TracerForm(0),
+    quadtree_layers: int = 0,
+    quadtree_resolution: int = 0,
+    quadtree_faces: QuadtreeFaces | QuadtreeFacesWord = QuadtreeFaces(0),
+    quadtree_pixels: float = 0.0,
+    quadtree_radius: float = 0.0,
+    quadtree_margin: float = 0.0,
+    quadtree_hits: QuadtreeHits | QuadtreeHitsWord = QuadtreeHits(0),
+    quadtree_form: TracerForm | TracerFormWord = TracerForm(0),
+    views_across: int = 1,
+    views_down: int = 1,
+    baseline: float = 0.0,
+    eyes_over: int = 0,
+    view_source: ViewSource | ViewSourceWord = ViewSource(0),
+    upsample: int = 1,
+    depth_form: DepthForm | DepthFormWord = DepthForm(0),
+    depth_pixels: float = 0.25,
+    depth_radius: float = 0.15,
+    background: Background | BackgroundWord = Background(0),
+    background_red: float = 0.0,
+    background_green: float = 0.0,
+    background_blue: float = 0.0,
+    denoise: Denoise | DenoiseWord = Denoise(0),
+    clamp: float = 0.0,
+    moving_rate: float = 0.0,
+    noise: float = 0.0,
+    auto_azimuth: float = 24.0,
+    auto_elevation: float = 18.0,
+    auto_fov: float = 40.0,
+    auto_margin: float = 0.03,
+    auto_zoom: float = 1.0,
+    auto_node: int = 0,
+    crop_x: int = 0,
+    crop_y: int = 0,
+    crop_width: int = 0,
+    crop_height: int = 0,
+    wireframe: float = 0.0,
+    ground: int = 0,
+    ground_up_x: float = 0.0,
+    ground_up_y: float = 1.0,
+    ground_up_z: float = 0.0,
+    keys: Sequence[CameraKey] = (),
+    clips: Sequence[ClipUse | Object] = (),
+) -> None:
+    """Keywords that Render explains."""
+
+
+def view_keywords(
+    self: Any, scene: Scene, camera: CameraOf=None, *,
+    weight: int = 0,
+    pass_samples: int = 1,
+    adapt: int = 0,
+    still_encoding: Encoding | EncodingWord = Encoding(0),
+    width: int = 1280,
+    height: int = 720,
+    samples: int = 1,
+    depth: int = 8,
+    seed: int = 0,
+    first_frame: int = 0,
+    last_frame: int = 0,
+    frame_step: int = 1,
+    frames_per_second: float = 24.0,
+    time_origin_frame: int = 0,
+    tracer: Tracer | TracerWord = Tracer(0),
+    integrator: Integrator | IntegratorWord = Integrator(0),
+    primary: Primary | PrimaryWord = Primary(0),
+    tone_map: ToneMap | ToneMapWord = ToneMap(0),
+    exposure_stops: float = 0.0,
+    format: PixelFormat | PixelFormatWord = PixelFormat(0),
+    encoding: Encoding | EncodingWord = Encoding(0),
+    quality: int = 0,
+    camera_path: CameraPath | CameraPathWord = CameraPath(0),
+    camera_node: int = 0,
+    orbit_turn: float = 0.0,
+    orbit_seconds: float = 0.0,
+    compare: int = 0,
+    compare_with: Tracer | TracerWord = Tracer(0),
+    compare_far: float = 1e-4,
+    aperture: float = 0.0,
+    focus: float = 0.0,
+    shutter: float = 0.0,
+    pixel_filter: PixelFilter | PixelFilterWord = PixelFilter(0),
+    accumulate: Accumulation | AccumulationWord = Accumulation(0),
+    brdf: Brdf | BrdfWord = Brdf(0),
+    ao_distance: float = 0.0,
+    ao_falloff: float = 0.0,
+    ao_rays: int = 8,
+    layer_opacity: float = 0.5,
+    layers: int = 0,
+    bvh_form: TracerForm | TracerFormWord = TracerForm(0),
+    ldc_resolution: int = 0,
+    ldc_form: TracerForm | TracerFormWord = TracerForm(0),
+    abuffer_resolution: int = 0,
+    abuffer_voxels: int = 0,
+    abuffer_form: TracerForm | TracerFormWord = TracerForm(0),
+    rayspace_mode: RayspaceMode | RayspaceModeWord = RayspaceMode(0),
+    rayspace_form: TracerForm | TracerFormWord = TracerForm(0),
+    quadtree_layers: int = 0,
+    quadtree_resolution: int = 0,
+    quadtree_faces: QuadtreeFaces | QuadtreeFacesWord = QuadtreeFaces(0),
+    quadtree_pixels: float = 0.0,
+    quadtree_radius: float = 0.0,
+    quadtree_margin: float = 0.0,
+    quadtree_hits: QuadtreeHits | QuadtreeHitsWord = QuadtreeHits(0),
+    quadtree_form: TracerForm | TracerFormWord = TracerForm(0),
+    views_across: int = 1,
+    views_down: int = 1,
+    baseline: float = 0.0,
+    eyes_over: int = 0,
+    view_source: ViewSource | ViewSourceWord = ViewSource(0),
+    upsample: int = 1,
+    depth_form: DepthForm | DepthFormWord = DepthForm(0),
+    depth_pixels: float = 0.25,
+    depth_radius: float = 0.15,
+    background: Background | BackgroundWord = Background(0),
+    background_red: float = 0.0,
+    background_green: float = 0.0,
+    background_blue: float = 0.0,
+    denoise: Denoise | DenoiseWord = Denoise(0),
+    clamp: float = 0.0,
+    moving_rate: float = 0.0,
+    noise: float = 0.0,
+    auto_azimuth: float = 24.0,
+    auto_elevation: float = 18.0,
+    auto_fov: float = 40.0,
+    auto_margin: float = 0.03,
+    auto_zoom: float = 1.0,
+    auto_node: int = 0,
+    crop_x: int = 0,
+    crop_y: int = 0,
+    crop_width: int = 0,
+    crop_height: int = 0,
+    wireframe: float = 0.0,
+    ground: int = 0,
+    ground_up_x: float = 0.0,
+    ground_up_y: float = 1.0,
+    ground_up_z: float = 0.0,
+    keys: Sequence[CameraKey] = (),
+    clips: Sequence[ClipUse | Object] = (),
+) -> None:
+    """Keywords that Render explains."""
+
+
+def material_keywords(
+    self: Any, base_colour: Numbers=(0.8, 0.8, 0.8, 1.0), *, roughness: float=0.5, textures: Textures=None,
+    material: int = _f.NEXT,
+    alpha_mode: AlphaMode | AlphaModeWord = AlphaMode(0),
+    double_sided: int = 0,
+    unlit: int = 0,
+    emission: Numbers = (0.0, 0.0, 0.0),
+    metallic: float = 0.0,
+    transmission: float = 0.0,
+    ior: float = 1.0,
+    alpha_cutoff: float = 0.0,
+    anisotropy: float = 0.0,
+    anisotropy_rotation: float = 0.0,
+    emission_seen_only: int = 0,
+    specular: float = 1.0,
+    specular_red: float = 1.0,
+    specular_green: float = 1.0,
+    specular_blue: float = 1.0,
+    attenuation_distance: float = 0.0,
+    attenuation_red: float = 1.0,
+    attenuation_green: float = 1.0,
+    attenuation_blue: float = 1.0,
+    thickness: float = 0.0,
+    clearcoat: float = 0.0,
+    clearcoat_roughness: float = 0.0,
+    sheen: Numbers = (0.0, 0.0, 0.0),
+    sheen_roughness: float = 0.0,
+    iridescence: float = 0.0,
+    iridescence_ior: float = 1.3,
+    iridescence_minimum_nm: float = 100.0,
+    iridescence_maximum_nm: float = 400.0,
+    dispersion: float = 0.0,
+    diffuse_transmission: float = 0.0,
+    diffuse_transmission_red: float = 1.0,
+    diffuse_transmission_green: float = 1.0,
+    diffuse_transmission_blue: float = 1.0,
+    thin_walled: int = 0,
+    name: str = "",
+) -> None:
+    """Keywords that SetMaterial explains."""
+
+
+def texture_keywords(
+    self: Any, image: Numbers, *, srgb: bool=True,
+    texture: int = _f.NEXT,
+    wrap_u: Wrap | WrapWord = Wrap(0),
+    wrap_v: Wrap | WrapWord = Wrap(0),
+    nearest: int = 0,
+    name: str = "",
+) -> None:
+    """Keywords that SetTexture explains."""
+
+
+def mesh_keywords(
+    self: Any, positions: Numbers, triangles: Numbers | None=None, *, material: Object | None=None, materials:
+    MaterialsOf=None, normals: Numbers | None=None, tangents: Numbers | None=None, texcoords: Numbers | None=None,
+    colours: Numbers | None=None, place: bool=True,
+    mesh: int = _f.NEXT,
+    influence_count: int = 0,
+    target_count: int = 0,
+    closed: int = 0,
+    weights: Sequence[MorphWeight] = (),
+    name: str = "",
+) -> None:
+    """Keywords that SetMesh explains."""
+
+
+def spheres_keywords(
+    self: Any, centres: Numbers, radii: Numbers, *, material: Object | None=None, materials: MaterialsOf=None, place:
+    bool=True,
+    spheres: int = _f.NEXT,
+    name: str = "",
+) -> None:
+    """Keywords that SetSpheres explains."""
+
+
+def disc_keywords(
+    self: Any, centre: Numbers, normal: Numbers, radius: float, *, material: Object | None=None,
+    disc: int = _f.NEXT,
+    name: str = "",
+) -> None:
+    """Keywords that SetDisc explains."""
+
+
+def light_keywords(
+    self: Any, kind: LightKind | str, colour: Numbers, transform: Numbers | None=None, parent: Object | None=None, *,
+    light: int = _f.NEXT,
+    range: float = 0.0,
+    inner_cone: float = 0.0,
+    outer_cone: float = 0.0,
+    size: Numbers = (0.0, 0.0),
+    name: str = "",
+) -> None:
+    """Keywords that SetLight explains."""
+
+
+def camera_keywords(
+    self: Any, fov_degrees: float=40.0, transform: Numbers | None=None, parent: Object | None=None, *,
+    camera: int = _f.NEXT,
+    height: float = 0.0,
+    near: float = 0.0,
+    name: str = "",
+) -> None:
+    """Keywords that SetCamera explains."""
+
+
+def node_keywords(
+    self: Any, shows: Object | None=None, transform: Numbers | None=None, *, parent: Object | None=None,
+    node: int = _f.NEXT,
+    hidden: int = 0,
+    skin: int = 0,
+    weights: Sequence[MorphWeight] = (),
+    name: str = "",
+) -> None:
+    """Keywords that SetNode explains."""
+
+
+def environment_keywords(
+    self: Any, colour: Numbers=(1, 1, 1), image: Numbers | None=None, *,
+    rotation: float = 0.0,
+    backdrop: int = 0,
+    keeps_image: int = 0,
+    display_values: int = 0,
+) -> None:
+    """Keywords that SetEnvironment explains."""

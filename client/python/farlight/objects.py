@@ -7,7 +7,7 @@ import collections
 import copy
 import difflib
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from . import fields, messages
@@ -37,6 +37,35 @@ KINDS: dict[type[Message], ObjectKind] = {
 }
 SHOWN = {ObjectKind.MESH: NodeKind.MESH, ObjectKind.SPHERES: NodeKind.SPHERES, ObjectKind.LIGHT: NodeKind.LIGHT,
          ObjectKind.CAMERA: NodeKind.CAMERA}
+
+
+@dataclass(frozen=True, eq=False)
+class Names:
+    """What the objects of a scene were called when it was sent: entries as of Client.objects()."""
+    nodes: dict[int, messages.ObjectEntry]
+    materials: dict[int, messages.ObjectEntry]
+
+    @classmethod
+    def of(cls, nodes: Iterable[messages.ObjectEntry], materials: Iterable[messages.ObjectEntry]) -> Names:
+        """Of lists."""
+        return cls({one.object: one for one in nodes}, {one.object: one for one in materials})
+
+    def called(self, name: str) -> tuple[set[int], set[int]]:
+        """The numbers of the nodes of that name and of all below them; where there is none, of its materials."""
+        nodes = self.below({number for number, entry in self.nodes.items() if entry.name == name})
+        return nodes, set() if nodes else {number for number, entry in self.materials.items() if entry.name == name}
+
+    def below(self, nodes: set[int]) -> set[int]:
+        """They and all that hang below them."""
+        children: dict[int, list[int]] = {}
+        for number, entry in self.nodes.items():
+            children.setdefault(entry.parent, []).append(number)
+        found, added = set(nodes), list(nodes)
+        while added:
+            new = set(children.get(added.pop(), ())) - found
+            found |= new
+            added += new
+        return found
 
 
 def kind_of(kind: ObjectKind | str) -> ObjectKind:
@@ -198,6 +227,16 @@ class Objects:
         return self._numbers[kind]
 
     # ---- for clients
+
+    def names(self) -> Names:
+        """Those of now."""
+        entries: dict[ObjectKind, list[messages.ObjectEntry]] = {ObjectKind.NODE: [], ObjectKind.MATERIAL: []}
+        for key, (_, edit, _) in self._objects.items():
+            if isinstance(edit, messages.SetNode):
+                entries[key.kind].append(messages.ObjectEntry(key.number, edit.parent, edit.kind, edit.object, edit.name))
+            elif isinstance(edit, messages.SetMaterial):
+                entries[key.kind].append(messages.ObjectEntry(key.number, name=edit.name))
+        return Names.of(entries[ObjectKind.NODE], entries[ObjectKind.MATERIAL])
 
     def edits_since(self, version: int) -> list[Message]:
         """What makes of the scene at that version this one."""

@@ -5,17 +5,17 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Union
 
 import numpy as np
 
 from . import arrays, fields, messages
-from .arrays import Numbers
+from .arrays import Array, Numbers
 from .camera import Camera, CameraOf, look_at
 from .errors import InvalidValue
-from .fields import Message
+from .fields import Message, takes
 from .messages import LightKind, NodeKind, ObjectKind, Sharing
 from .objects import ENVIRONMENT, SHOWN, Object, Objects, make
 
@@ -23,6 +23,7 @@ __all__ = ["ENVIRONMENT", "Camera", "CameraOf", "Object", "Scene", "Sharing", "l
 
 PLACES = tuple(place.name.lower() for place in messages.MaterialTexture)
 RANGES_MAX = 4096  # of a mesh or of spheres
+MaterialsOf = Union[Sequence[Union[Object, int]], Array, None]
 Textures = Union[Object, Mapping[Union[int, str], Object], None]
 
 
@@ -59,14 +60,16 @@ class Scene(Objects):
 
     # ---- things that are seen
 
-    def add_material(self, base_colour: Numbers = (0.8, 0.8, 0.8, 1.0), *, textures: Textures = None, **values: Any) -> Object:
+    @takes(messages.material_keywords)
+    def add_material(self, base_colour: Numbers = (0.8, 0.8, 0.8, 1.0), *, roughness: float = 0.5,
+                     textures: Textures = None, **values: Any) -> Object:
         """A material of glTF 2.0. base_colour: 3 or 4 numbers of 0 .. 1; `values` are other fields of set_material
         (messages.SetMaterial). textures: one for the base colour, or {place: texture} with a place of scene.PLACES."""
         wanted = "3 or 4 numbers of 0 .. 1"
         base = arrays.numbers(base_colour, "base_colour", wanted)
         if base.shape not in ((3,), (4,)):
             raise InvalidValue(f"has the shape {base.shape}; allowed: {wanted}", field="base_colour")
-        start = {"roughness": 0.5, "material": self._next(ObjectKind.MATERIAL), "base_colour": [*base, 1.0][:4],
+        start = {"roughness": roughness, "material": self._next(ObjectKind.MATERIAL), "base_colour": [*base, 1.0][:4],
                  "textures": self._texture_uses(textures)}
         return self.set(make(messages.SetMaterial, {**start, **values}))
 
@@ -85,6 +88,7 @@ class Scene(Objects):
             uses[at].texture = number
         return uses
 
+    @takes(messages.texture_keywords)
     def add_texture(self, image: Numbers, *, srgb: bool = True, **values: Any) -> Object:
         """Height x width (grey), x 3 or x 4, rows from the top: whole numbers of 0 .. 255, or floats, which are clipped to
         0 .. 1. `srgb`: colours; False: data."""
@@ -94,13 +98,13 @@ class Scene(Objects):
                  "format": made, "arrays": [self.blob(texels.data)]}
         return self.set(make(messages.SetTexture, {**start, **values}))
 
-    def _ranges(self, material: Object | None, per_primitive: Any, count: int) -> list[messages.MaterialRange]:
+    def _ranges(self, material: Object | None, per_primitive: MaterialsOf, count: int) -> list[messages.MaterialRange]:
         if per_primitive is None:
             number = 0 if material is None else self.check(material, (ObjectKind.MATERIAL,), "material")
             return [messages.MaterialRange(0, count, number)] if number else []
         if not isinstance(per_primitive, np.ndarray):
-            per_primitive = [self.check(one, (ObjectKind.MATERIAL,), "materials") if isinstance(one, Object) else one
-                             for one in per_primitive]
+            per_primitive = np.array([self.check(one, (ObjectKind.MATERIAL,), "materials") if isinstance(one, Object) else one
+                                      for one in per_primitive])
         numbers = arrays.table(per_primitive, "<u4", 1, "materials", count)[:, 0]
         edges = [0, *(int(at) + 1 for at in np.flatnonzero(np.diff(numbers))), count]
         if len(edges) > RANGES_MAX + 1:
@@ -109,8 +113,9 @@ class Scene(Objects):
         return [messages.MaterialRange(first, end - first, int(numbers[first]))
                 for first, end in zip(edges[:-1], edges[1:])]
 
+    @takes(messages.mesh_keywords)
     def add_mesh(self, positions: Numbers, triangles: Numbers | None = None, *, material: Object | None = None,
-                 materials: Any = None, normals: Numbers | None = None, tangents: Numbers | None = None,
+                 materials: MaterialsOf = None, normals: Numbers | None = None, tangents: Numbers | None = None,
                  texcoords: Numbers | None = None, colours: Numbers | None = None, place: bool = True, **values: Any) -> Object:
         """positions: n x 3. triangles: m x 3 indices, counter-clockwise where they are in front; None: each three
         positions are one. materials: that of each triangle, or its number, neighbours alike: at most 4096 runs. normals
@@ -136,7 +141,8 @@ class Scene(Objects):
                  "arrays": [messages.BlobRef() if one is None else self.blob(one.data) for one in given], "ranges": ranges}
         return self._placed(self.set(make(messages.SetMesh, {**start, **values})), place)
 
-    def add_spheres(self, centres: Numbers, radii: Numbers, *, material: Object | None = None, materials: Any = None,
+    @takes(messages.spheres_keywords)
+    def add_spheres(self, centres: Numbers, radii: Numbers, *, material: Object | None = None, materials: MaterialsOf = None,
                     place: bool = True, **values: Any) -> Object:
         """Exact spheres: centres n x 3, radii n or one for all; materials and place as of add_mesh()."""
         points = arrays.table(centres, "<f4", 3, "centres")
@@ -152,6 +158,7 @@ class Scene(Objects):
                  "ranges": self._ranges(material, materials, len(points))}
         return self._placed(self.set(make(messages.SetSpheres, {**start, **values})), place)
 
+    @takes(messages.disc_keywords)
     def add_disc(self, centre: Numbers, normal: Numbers, radius: float, *, material: Object | None = None,
                  **values: Any) -> Object:
         """A disc in world space, such as a ground."""
@@ -177,6 +184,7 @@ class Scene(Objects):
         above = 0 if parent is None else self.check(parent, (ObjectKind.NODE,), "parent")
         return messages.SetNode(self._next(ObjectKind.NODE), above, kind, shows, parent_from_node=arrays.transform(transform))
 
+    @takes(messages.light_keywords)
     def add_light(self, kind: LightKind | str, colour: Numbers, transform: Numbers | None = None,
                   parent: Object | None = None, **values: Any) -> Object:
         """A light, and the node that places it, which is returned: scene.move(light, ...). The colour is power in the
@@ -184,12 +192,14 @@ class Scene(Objects):
         start = {"light": self._next(ObjectKind.LIGHT), "kind": kind, "colour": colour}
         return self._place(make(messages.SetLight, {**start, **values}), transform, parent)
 
+    @takes(messages.camera_keywords)
     def add_camera(self, fov_degrees: float = 40.0, transform: Numbers | None = None, parent: Object | None = None,
                    **values: Any) -> Object:
         """A camera of the scene, and the node that places it, which is returned: render(camera=node)."""
         start = {"camera": self._next(ObjectKind.CAMERA), "fov_y": math.radians(arrays.number(fov_degrees, "fov_degrees"))}
         return self._place(make(messages.SetCamera, {**start, **values}), transform, parent)
 
+    @takes(messages.node_keywords)
     def add_node(self, shows: Object | None = None, transform: Numbers | None = None, *, parent: Object | None = None,
                  **values: Any) -> Object:
         """Puts a mesh, spheres, a light or a camera where it is seen; without `shows` a group."""
@@ -209,6 +219,7 @@ class Scene(Objects):
         self.check(node, (ObjectKind.NODE,), "node")
         self.change(node, parent_from_node=arrays.transform(transform))
 
+    @takes(messages.environment_keywords)
     def set_environment(self, colour: Numbers = (1, 1, 1), image: Numbers | None = None, **values: Any) -> Object:
         """Light from all around; image: height x width x 3 linear floats, equirectangular, rows from +y down; the colour
         multiplies it. change(farlight.ENVIRONMENT, rotation=1.5) keeps the image."""

@@ -352,6 +352,12 @@ TEST(the_panel_changes_settings_of_every_kind_within_their_ranges)
         settings_act(&settings, ACTION_STEP_BACK);
     assert_string_equal(panel_says(&settings, "quadtree_pixels"), "0.001");
     assert_int_equal(settings_act(&settings, ACTION_STEP_BACK), SETTINGS_SAME);
+    choose(&settings, "quadtree_margin"); /* 0: its default, 0.05 */
+    assert_string_equal(panel_says(&settings, "quadtree_margin"), "0.05");
+    settings_act(&settings, ACTION_STEP_BACK);
+    assert_string_equal(panel_says(&settings, "quadtree_margin"), "0.025");
+    settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "quadtree_margin"), "0.05");
     settings.tracer = PROTOCOL_TRACER_REFERENCE; /* which has none */
     assert_int_equal(settings_act(&settings, ACTION_DOWN), SETTINGS_SAME);
     assert_int_equal(settings_act(&settings, ACTION_STEP_ON), SETTINGS_SAME);
