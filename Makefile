@@ -315,7 +315,7 @@ $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode e
   warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp) $(SERVING_WRAP)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ)
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ)
 # Measurements of the benchmark register themselves (tests/bench/bench.h).
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c,$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
@@ -689,8 +689,8 @@ $(B)/tests/fuzz/fuzz_request: $(REQUEST_OBJ) $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_request: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
 $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp environment gltf nff obj threemf): $(READERS_OBJ)
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp environment gltf nff obj threemf): FUZZ_LIBS = $(READERS_LIBS)
+$(addprefix $(B)/tests/fuzz/fuzz_,assimp environment gltf nff obj threemf): $(READERS_OBJ)
+$(addprefix $(B)/tests/fuzz/fuzz_,assimp environment gltf nff obj threemf): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
 run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))
