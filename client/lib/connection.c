@@ -401,11 +401,6 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
 static bool open_stream(struct fl_connection *connection, const struct fl_connect_options *options,
                         uint64_t deadline_ns, struct fl_error *error)
 {
-    struct fl_link link;
-    if (options->link && !fl_link_parse(options->link, &link, error)) {
-        snprintf(error->field, sizeof(error->field), "--link");
-        return false;
-    }
     static const char *const none[] = {NULL};
     const char *const *arguments = options->daemon_arguments ? options->daemon_arguments : none;
     int fd = -1;
@@ -420,12 +415,6 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
     } else {
         fd = fl_address_connect(options->server, deadline_ns, options->interrupt_fd, &connection->local, error);
         if (fd < 0)
-            return false;
-    }
-    if (options->link) {
-        connection->local = false;
-        connection->shaper = fl_shaper_start(&link, &fd, error);
-        if (!connection->shaper)
             return false;
     }
     return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error);
@@ -500,7 +489,6 @@ void fl_connection_destroy(struct fl_connection *connection)
         free(late);
     }
     fl_process_end(&connection->process, connection->said_goodbye ? 3000 : 500);
-    fl_shaper_destroy(connection->shaper);
     free(connection);
 }
 

@@ -4,7 +4,6 @@
 #define FARLIGHT_CLIENT_LIB_CONNECTION_H
 
 #include "lib/process.h"
-#include "lib/shaper.h"
 #include "lib/stream.h"
 #include "protocol/handshake.h"
 
@@ -21,7 +20,6 @@ struct fl_late {
 struct fl_connection {
     struct fl_stream stream;
     struct fl_process process; /* the private daemon or ssh */
-    struct fl_shaper *shaper;  /* NULL: the link is as it is */
     struct handshake_limits limits;
     int interrupt_fd;
     uint32_t last_request, last_scene, last_channel;
