@@ -315,9 +315,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
 {
     struct fl_stream *stream = &connection->stream;
     struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
-    hello.capabilities = HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_SEND_PARTS |
-                         HANDSHAKE_CAN_MARK_STICKING | HANDSHAKE_CAN_READ_OBJECTS;
-    hello.capabilities |= connection->can_h264 ? HANDSHAKE_CAN_H264 : 0;
+    hello.capabilities = HANDSHAKE_CAN_ABANDON | (connection->can_h264 ? HANDSHAKE_CAN_H264 : 0);
     snprintf(hello.name, sizeof(hello.name), "%s", name);
     if (getrandom(hello.nonce, sizeof(hello.nonce), 0) != (ssize_t)sizeof(hello.nonce))
         return fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
@@ -356,25 +354,12 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
                 return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
             connection->limits = reply.limits;
             connection->read_only = (reply.capabilities & HANDSHAKE_CAN_READ_ONLY) != 0;
-            connection->can_choose_primary = (reply.capabilities & HANDSHAKE_CAN_CHOOSE_PRIMARY) != 0;
-            connection->can_mark_sticking = (reply.capabilities & HANDSHAKE_CAN_MARK_STICKING) != 0;
-            connection->can_read_objects = (reply.capabilities & HANDSHAKE_CAN_READ_OBJECTS) != 0;
             connection->can_h264 = connection->can_h264 && (reply.capabilities & HANDSHAKE_CAN_H264) != 0;
             return true;
         }
         if (stream->ended)
             return fail_ended(connection, error);
     }
-}
-
-void fl_connection_fit_render(const struct fl_connection *connection, struct message_render *render)
-{
-    if (!connection->can_mark_sticking)
-        render->attachments &= ~(uint32_t)FL_ATTACH_STICKING;
-    if (render->primary != PROTOCOL_PRIMARY_AUTO || connection->can_choose_primary)
-        return;
-    render->primary =
-        render->tracer == PROTOCOL_TRACER_REFERENCE ? PROTOCOL_PRIMARY_TRACE : PROTOCOL_PRIMARY_RASTER;
 }
 
 /* `farlight bridge` on the other host. A host that begins with '-' would be an option of ssh. */
