@@ -315,7 +315,7 @@ $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode e
   warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp) $(SERVING_WRAP)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ)
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ) $(B)/tests/fixtures/frame_hooks.o
 # Measurements of the benchmark register themselves (tests/bench/bench.h).
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c,$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench

@@ -61,7 +61,8 @@ struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const c
     return event;
 }
 
-void engine_nudge(struct engine *engine)
+/* Any thread: there may be something to do. */
+static void engine_nudge(struct engine *engine)
 {
     /* One in the queue is enough. If the queue is full, that alone keeps the thread awake. */
     if (!atomic_exchange(&engine->nudged, true))
