@@ -140,12 +140,16 @@ SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 PUBLIC_HEADERS := client/lib/farlight.h client/warp/warp.h $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def)
 SHARED_OBJ := $(LIB_OBJ) $(PROTOCOL_OBJ)
 
+# The Python package: links to its sources, beside what is generated.
+PYTHON_SRC := $(wildcard client/python/farlight/*.py) client/python/farlight/py.typed client/python/pyproject.toml client/python/README.md
+PYTHON_PACKAGE := $(patsubst client/python/%,$(B)/python/%,$(PYTHON_SRC)) $(B)/python/farlight/messages.py
+
 MODULES_OBJ := $(call obj,$(TEXTURE_CXX) $(ASSIMP_CXX) $(IMAGES_CXX) $(PALETTE_C))
 MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so $(B)/farlight-palette.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view $(B)/farlight-web
 
 .PHONY: all
-all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/libfarlight.a $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
+all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/libfarlight.a $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1 $(PYTHON_PACKAGE)
 ifneq ($(EMBREE),1)
 	@echo 'built without Embree: the tracer reference is left out (its header is in the package libembree-dev)'
 endif
@@ -246,6 +250,14 @@ $(B)/protocol-docgen: $(call obj,$(DOCS_SRC)) $(PROTOCOL_OBJ) $(SEALED_OBJ) $(CO
 $(B)/protocol.md: $(B)/protocol-docgen protocol/docs/guide.md
 	$^ >$@.new && mv $@.new $@
 
+$(B)/python/%: client/python/%
+	@mkdir -p $(@D)
+	@ln -srf $< $@
+# With the package's version.py.
+$(B)/python/farlight/messages.py: client/python/generate.py $(wildcard client/python/farlight/*.py protocol/*.def) protocol/version.h
+	@mkdir -p $(@D)
+	$(call say,GEN)CC='$(CC)' python3 $< $(@D)
+
 # What the tables say of tracers and options, in the place of the line that asks for it.
 $(B)/shot.schema.json: client/cli/shot.schema.json $(B)/farlight
 	$(B)/farlight tracers --schema >$@.part && sed -e '/@SETTINGS@/{r $@.part' -e 'd;}' $< >$@.new && mv $@.new $@
@@ -303,7 +315,7 @@ $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode e
   warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp) $(SERVING_WRAP)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ)
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ) $(B)/tests/fixtures/frame_hooks.o
 # Measurements of the benchmark register themselves (tests/bench/bench.h).
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c,$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
@@ -331,19 +343,19 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libexif-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libstb-dev libassimp-dev libexpat1-dev libminizip-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-yaml python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
-LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libstb-dev libassimp-dev libexpat1-dev libminizip-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri python3
+TEST_PACKAGES := libcmocka-dev python3-jsonschema python3-yaml python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
+LINT_PACKAGES := clang clang-format glslang-tools python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
 STACK_PACKAGES := mesa-vulkan-drivers
 SYNC_PACKAGES := $(STACK_PACKAGES) libvulkan1 libvulkan-dev vulkan-validationlayers
-ANALYZE_PACKAGES := clang clang-tidy python3
+ANALYZE_PACKAGES := clang clang-tidy
 COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 # These come for Debian's own python3.
 FIDELITY_PACKAGES := python3-openimageio python3-numpy
 EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
-DEB_PACKAGES := debhelper dh-python python3 dpkg-dev fakeroot lintian xz-utils git
+DEB_PACKAGES := debhelper dh-python dpkg-dev fakeroot lintian xz-utils git
 WEB_PACKAGES := chromium python3-websocket
 FARM_PACKAGES := slurm-wlm slurmdbd mariadb-server-core mariadb-client-core nodejs python3-yaml
 BLENDER_PACKAGES := blender python3-numpy xvfb xauth
@@ -445,11 +457,11 @@ blender-test: blender-packages
 	blender --background --factory-startup --python-exit-code 1 --python tests/blender/test_addon.py -- $(B) $(TESTS)
 	xvfb-run -a -s "-screen 0 640x480x24" blender --factory-startup --window-geometry 0 0 640 480 --python tests/blender/viewport.py -- $(B)
 # One file for Blender's preferences, with the Python package in it.
-blender-addon:
+blender-addon: $(PYTHON_PACKAGE)
 	rm -rf build/blender && mkdir -p build/blender/farlight_blender/bundled out
 	cp client/blender/farlight_blender/*.py build/blender/farlight_blender
 	mkdir build/blender/farlight_blender/bundled/farlight
-	cp client/python/farlight/*.py build/blender/farlight_blender/bundled/farlight
+	cp $(B)/python/farlight/*.py build/blender/farlight_blender/bundled/farlight
 	cd build/blender && python3 -m zipfile -c $(CURDIR)/out/farlight_blender.zip farlight_blender
 
 # One user attacks a daemon in every way that tests/siege knows, another one looks at a triangle beside it.
@@ -460,11 +472,6 @@ siege: test-packages
 bench-plot: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench_plot.py $(B)
-
-# The Python package's messages, from the tables of protocol/; the package is installed without make, too.
-.PHONY: python-messages
-python-messages:
-	python3 client/python/generate.py
 
 # ---- what is checked without running it
 # Once for all configurations, until a header changes.
@@ -479,13 +486,12 @@ format:
 # Include rules, headers alone, layout: without installing, and without clang's compiler.
 check-rules: check-headers
 	@python3 tests/tools/check_includes.py
-	@python3 client/python/generate.py --check
 	@printf '%s\n' $(FORMATTED) | xargs -P $(JOBS) -n 40 clang-format --dry-run -Werror
-lint: lint-packages
+lint: lint-packages $(PYTHON_PACKAGE)
 	@$(MAKE) -s check-rules compile_commands.json
 	python3 tests/tools/check_shaders.py
-	cd client/python && mypy --strict --cache-dir $(CURDIR)/build/mypy -p farlight
-	cd client/blender && MYPYPATH=../python mypy --strict --ignore-missing-imports --cache-dir $(CURDIR)/build/mypy farlight_blender
+	cd $(B)/python && mypy --strict --cache-dir $(CURDIR)/build/mypy -p farlight
+	cd client/blender && MYPYPATH=$(CURDIR)/$(B)/python mypy --strict --ignore-missing-imports --cache-dir $(CURDIR)/build/mypy farlight_blender
 	python3 tests/tools/compile_commands.py --syntax
 # About a minute after a build; installs nothing, and names what is missing.
 check:
@@ -523,7 +529,7 @@ PYTHON_VERSION := $(if $(filter-out /usr,$(PREFIX)),$(shell /usr/bin/python3 -c 
 PYTHON_FOLDER ?= $(PREFIX)/lib/python$(PYTHON_VERSION)/dist-packages
 install: all
 	install -d $(DESTDIR)$(PYTHON_FOLDER)/farlight $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
-	install -m 644 client/python/farlight/*.py client/python/farlight/py.typed $(DESTDIR)$(PYTHON_FOLDER)/farlight
+	install -m 644 $(B)/python/farlight/*.py $(B)/python/farlight/py.typed $(DESTDIR)$(PYTHON_FOLDER)/farlight
 	install -m 755 client/python/examples/*.py $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
 	install -m 644 client/python/README.md $(DESTDIR)$(PREFIX)/share/doc/farlight/python.md
 	install -d $(DESTDIR)$(PREFIX)/share/farlight/blender/farlight_blender
@@ -647,7 +653,6 @@ help:
 	@echo 'make coverage   which lines tests reach, into out/coverage   [TESTS=part-of-a-name]'
 	@echo 'make compile_commands.json   how each source is compiled, for editors'
 	@echo 'make format     clang-format over our sources'
-	@echo 'make python-messages   write the messages of the Python package from the tables of protocol/'
 	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
 	@echo 'make clean      remove build/; distclean removes out/ as well'
 
@@ -684,8 +689,8 @@ $(B)/tests/fuzz/fuzz_request: $(REQUEST_OBJ) $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_request: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
 $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp environment gltf nff obj threemf): $(READERS_OBJ)
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp environment gltf nff obj threemf): FUZZ_LIBS = $(READERS_LIBS)
+$(addprefix $(B)/tests/fuzz/fuzz_,assimp environment gltf nff obj threemf): $(READERS_OBJ)
+$(addprefix $(B)/tests/fuzz/fuzz_,assimp environment gltf nff obj threemf): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
 run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))

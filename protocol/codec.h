@@ -51,10 +51,6 @@ size_t message_payload_bytes(const struct message *message);
 bool message_decode(struct message *out, uint16_t type, const uint8_t *payload, size_t payload_bytes,
                     struct scratch *scratch, struct decode_error *error);
 
-/* One line without line end: "render scene=1 channel=2 tracer=bvh keys=[2: {time_s=0 ..}, ..]". Control characters
- * of strings are escaped, long arrays abbreviated. */
-void message_print(FILE *stream, const struct message *message);
-
 #ifdef __cplusplus
 }
 #endif

@@ -146,8 +146,7 @@ const size_t protocol_record_count = LENGTH(protocol_records);
 const struct message_desc protocol_messages[] = {
 #define MESSAGE(NAME, name, number, from, doc)                                                                    \
     {{number, #name, MESSAGE_FROM_##from, 2 + wire_counted_message_##name,                                        \
-      has_bulk_message_##name ? CODEC_BULK_PAYLOAD_MAX_BYTES : CODEC_CONTROL_PAYLOAD_MAX_BYTES,                   \
-      has_bulk_message_##name != 0},                                                                              \
+      has_bulk_message_##name ? CODEC_BULK_PAYLOAD_MAX_BYTES : CODEC_CONTROL_PAYLOAD_MAX_BYTES},                  \
      #NAME, doc, describe_message_##name},
 #include "protocol/messages.def"
 };

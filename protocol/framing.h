@@ -40,7 +40,6 @@ struct message_info {
     uint32_t from;    /* bits of enum message_from */
     uint32_t payload_min_bytes;
     uint32_t payload_max_bytes;
-    bool has_bulk;
 };
 const struct message_info *message_lookup(uint32_t type);
 

@@ -42,10 +42,6 @@ extern "C" {
 #define HANDSHAKE_NEEDS_KEY (UINT64_C(1) << 2)     /* reply of version 0: only sealed connections are let in */
 #define HANDSHAKE_TRY_AGAIN (UINT64_C(1) << 4)     /* reply of version 0: there may be a place later */
 #define HANDSHAKE_CAN_ABANDON (UINT64_C(1) << 3)   /* frames of views may end unfinished, as frame_end says */
-#define HANDSHAKE_CAN_CHOOSE_PRIMARY (UINT64_C(1) << 5) /* `auto` of primary is known; 0.1.0 lacks it */
-#define HANDSHAKE_CAN_SEND_PARTS (UINT64_C(1) << 6)     /* frames of views may come in parts, coarse first */
-#define HANDSHAKE_CAN_MARK_STICKING (UINT64_C(1) << 7)  /* the attachment `sticking` is known */
-#define HANDSHAKE_CAN_READ_OBJECTS (UINT64_C(1) << 8)   /* scene_objects, object_get, edit_begin.base_revision */
 
 struct handshake_hello {
     uint16_t version_min;

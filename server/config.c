@@ -68,10 +68,6 @@ static const struct option options[] = {
      "GPU: a number of --list-devices, software, or auto for the first hardware, else software"},
     {"engine", "encode_threads", START, OPTION_U32, AT(encode_threads), "0", 0, 64, "",
      "Threads that encode frames, of which one user or key has all but one at most; 0: one per core, 2 to 4"},
-    {"engine", "frames_in_flight", START, OPTION_U32, AT(frames_in_flight), "3", 1, 16, "",
-     "Frames of one job between the renderer and the network"},
-    {"engine", "queue", START, OPTION_U32, AT(engine_queue), "1024", 16, 65536, "",
-     "Commands, and events, that may wait between the network and the renderer"},
 
     {"memory", "scene", ANYTIME, OPTION_BYTES, AT(scene_bytes), "25%", MIB, 16 * TIB, "bytes",
      "Host memory of one scene, and of all together without their blobs; a percentage is of the host's memory"},
@@ -400,8 +396,6 @@ bool config_engine(const struct config *config, struct engine_options *engine, s
     *engine = (struct engine_options){
         .gpu = {.index = -1, .binaries_bytes = config->program_bytes},
         .encode_threads = config->encode_threads,
-        .queue_capacity = config->engine_queue,
-        .frames_in_flight = config->frames_in_flight,
         .limits = engine_limits(config),
         .device_bytes_limit = config->device_bytes,
     };
@@ -431,7 +425,7 @@ bool config_hub(const struct config *config, struct hub_options *hub, struct err
         .engine_limits = engine_limits(config),
         .insecure = config->insecure,
     };
-    hub->limits.frames_in_flight = config->frames_in_flight;
+    hub->limits.frames_in_flight = ENGINE_FRAMES_IN_FLIGHT;
     return readers_parse(&hub->readers, config->readers, "server.readers", error) &&
            auth_read_keys(&hub->keys, config->key_file, config->reader_key_file, error);
 }

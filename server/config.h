@@ -26,7 +26,7 @@ struct config {
     uint64_t trace_file_bytes;
     uint32_t unused_s;              /* without a client, after which the daemon ends; 0: it does not */
     char device[CONFIG_TEXT_BYTES]; /* "auto", "software" or a number */
-    uint32_t encode_threads, frames_in_flight, engine_queue;
+    uint32_t encode_threads;
     uint64_t scene_bytes, device_bytes, program_bytes;
     uint32_t scene_linger_s, lingering_scenes;
     char store[CONFIG_TEXT_BYTES]; /* folder of the scenes on disk; empty: there are none */

@@ -252,7 +252,7 @@ struct cli_job {
     int input_fd;             /* of a model "-": its bytes, once cli_read_input() has them */
     const char *model_format; /* of it; NULL: by its first bytes */
     bool watch;               /* again and again, as its files change */
-    const char *model, *server, *key_file, *link, *environment, *output, *camera, *keys_file, *trace_file;
+    const char *model, *server, *key_file, *environment, *output, *camera, *keys_file, *trace_file;
     double environment_degrees, point_size; /* as of fl_load_options */
     const char *variant;                    /* likewise */
     enum cli_image image;
@@ -415,16 +415,11 @@ unsigned cli_connect_timeout_ms(double left_s);
 
 /* ---- daemon.c: commands that only query a daemon ---- */
 
-/* Of the option that all commands with --server have. */
-#define CLI_LINK_HELP                                                                                             \
-    "Try a slow link out, such as 2mbit,100ms,1%: rate, round trip, chance that the connection is reset in each " \
-    "second (default: FARLIGHT_LINK)"
-
 struct cli_daemon {
-    const char *server, *key_file, *link; /* as typed */
+    const char *server, *key_file; /* as typed */
     struct cli_retries retries;
 };
-/* --server, --key, --link and --retry-for: a child parser; its input is a struct cli_daemon. */
+/* --server, --key and --retry-for: a child parser; its input is a struct cli_daemon. */
 extern const struct argp cli_daemon_argp;
 /* Interruptible from then on. Tries again for the time of --retry-for, if that was given. Without --server
  * FARLIGHT_SERVER counts; if neither names a daemon, a private one is started, or (`must_be_named`) it is

@@ -18,7 +18,6 @@ _farlight()
         words="$("$program" help 2>/dev/null | sed -n 's/^  \([a-z]*\) .*/\1/p') --version"
     else
         case $before in
-        --link) words="2mbit,100ms,1% 10mbit,50ms 50mbit" ;;
         --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id beauty,unknown" ;;
         --scale) words="1 2 4 8" ;;
         --still-encoding) words="raw zstd predicted jpeg" ;;
@@ -51,7 +50,6 @@ _farlight_program()
     case ${program##*/}:$before in
     farlightd:--device) words="auto software $("$program" --list-devices 2>/dev/null | sed -n 's/^\([0-9][0-9]*\).*/\1/p')" ;;
     farlightd:--log-level) words="error warning info debug" ;;
-    farlight-view:--link) words="2mbit,100ms,1% 10mbit,50ms 50mbit" ;;
     farlight-view:--*) words=$("${program%-view}" complete "$before" 2>/dev/null) ;;
     farlight-export:--format) words="png jpeg exr hdr webp tiff gif" ;;
     esac

@@ -7,13 +7,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { KEY_KEY = 0x400, KEY_LINK, KEY_RETRY_FOR };
+enum { KEY_KEY = 0x400, KEY_RETRY_FOR };
 
 static const struct argp_option options[] = {
     {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
     {"key", KEY_KEY, "FILE", 0,
      "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
-    {"link", KEY_LINK, "RATE,ROUND-TRIP,RESETS", 0, CLI_LINK_HELP, 0},
     {"retry-for", KEY_RETRY_FOR, "DURATION", 0,
      "Wait for a daemon that is not there for this long, in seconds or as 5m or 2h (default 0)", 0},
     {0}};
@@ -26,9 +25,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         argp_failure(state, CLI_USAGE, 0, "--retry-for: %s", error.text);
     if (key == KEY_RETRY_FOR)
         return 0;
-    if (key != 's' && key != KEY_KEY && key != KEY_LINK)
+    if (key != 's' && key != KEY_KEY)
         return ARGP_ERR_UNKNOWN;
-    *(key == 's' ? &daemon->server : key == KEY_KEY ? &daemon->key_file : &daemon->link) = value;
+    *(key == 's' ? &daemon->server : &daemon->key_file) = value;
     return 0;
 }
 
@@ -72,7 +71,6 @@ struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const 
         return NULL;
     const struct fl_connect_options wanted = {.server = server,
                                               .key_file = cli_key_file(server, daemon->key_file),
-                                              .link = typed_or_usual(daemon->link, "FARLIGHT_LINK"),
                                               .name = name,
                                               .interrupt_fd = cli_interrupt_fd()};
     return daemon->retries.has_duration ? connect_within(wanted, daemon->retries.for_s, error)

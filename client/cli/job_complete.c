@@ -192,7 +192,7 @@ static bool complete_outputs(struct cli_job *job, bool is_series)
 
 static bool complete_encoding(struct cli_job *job)
 {
-    if (!job->has_encoding && (job->link || (job->server && strncmp(job->server, "unix:", 5) != 0)))
+    if (!job->has_encoding && job->server && strncmp(job->server, "unix:", 5) != 0)
         job->options.encoding = PROTOCOL_ENCODING_ZSTD;
     if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
         return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",

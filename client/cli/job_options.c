@@ -2,7 +2,6 @@
 /* Options of render, animate, view and compare: those that are fields of `render` (job_fields.h), and those that
  * are more than a field. */
 #include "cli/job_fields.h"
-#include "lib/link.h"
 #include "lib/text.h"
 
 #include <ctype.h>
@@ -22,7 +21,6 @@ enum key {
     KEY_OUTPUT = 'o',
     KEY_QUIET = 'q',
     KEY_KEY = 0x100,
-    KEY_LINK,
     KEY_SIZE,
     KEY_CROP,
     KEY_ENVIRONMENT,
@@ -100,7 +98,6 @@ static const struct argp_option special[] = {
     {"key", KEY_KEY, "FILE", 0,
      "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)",
      CLI_GROUP_OUTPUT},
-    {"link", KEY_LINK, "RATE,ROUND-TRIP,RESETS", 0, CLI_LINK_HELP, CLI_GROUP_OUTPUT},
     {"retry-for", KEY_RETRY_FOR, "DURATION", 0,
      "Reconnect to a lost daemon for this long, in seconds or as 5m or 2h (default 5m, view: until it ends; 0: "
      "never)",
@@ -391,9 +388,6 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_KEY:
         job->key_file = value;
         return 0;
-    case KEY_LINK:
-        job->link = value;
-        return fl_link_parse(value, &(struct fl_link){0}, &job->error) ? 0 : name_field(job, field);
     case KEY_AT:
         return cli_set_place(job, field, value);
     case KEY_PARENTS:
@@ -694,9 +688,9 @@ static bool read_variable(struct cli_job *job, const struct argp_option *option)
 static bool read_environment(struct cli_job *job)
 {
     for (const struct argp_option *option = all_options(); option->name || option->doc; option++) {
-        const bool has_variable = option->key == KEY_SERVER || option->key == KEY_LINK ||
-                                  option->key == KEY_SIZE || option->key == KEY_ENVIRONMENT ||
-                                  option->key == KEY_ENVIRONMENT_ROTATION || option->key >= KEY_FIELD;
+        const bool has_variable = option->key == KEY_SERVER || option->key == KEY_SIZE ||
+                                  option->key == KEY_ENVIRONMENT || option->key == KEY_ENVIRONMENT_ROTATION ||
+                                  option->key >= KEY_FIELD;
         if (option->name && has_variable && !read_variable(job, option))
             return false;
     }

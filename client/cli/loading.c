@@ -31,7 +31,6 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
     const struct cli_job *job = loading->job;
     const struct fl_connect_options connect = {.server = job->server,
                                                .key_file = cli_key_file(job->server, job->key_file),
-                                               .link = job->link,
                                                .name = "farlight",
                                                .interrupt_fd = cli_interrupt_fd(),
                                                .timeout_ms = loading->timeout_ms,

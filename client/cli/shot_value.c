@@ -13,7 +13,6 @@
 #define TIME_MAX_S 1e6
 /* Rotations in degrees are cut into steps below this, so that the shorter arc is the intended one. */
 #define STEP_DEGREES 60.0
-#define DEGREES_MAX 3.6e6
 #define RADIANS_PER_DEGREE 0.017453292519943295
 
 /* A property's keys as they are read; `numbers` is the protocol's count per value. */

@@ -175,7 +175,6 @@ static bool connect_to(struct thumbnails *wanted, struct fl_error *error)
     const struct cli_job *job = &wanted->job;
     const struct fl_connect_options connect = {.server = job->server,
                                                .key_file = cli_key_file(job->server, job->key_file),
-                                               .link = job->link,
                                                .name = "farlight",
                                                .interrupt_fd = cli_interrupt_fd()};
     wanted->connection = fl_connect(&connect, error);

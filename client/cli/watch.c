@@ -20,7 +20,7 @@
 #define FOLDER_EVENTS                                                                                             \
     (IN_CLOSE_WRITE | IN_MODIFY | IN_MOVED_TO | IN_MOVED_FROM | IN_CREATE | IN_DELETE | IN_ATTRIB | IN_ONLYDIR)
 
-bool cli_watch_begin(struct cli_watch *watch, struct fl_error *error)
+static bool cli_watch_begin(struct cli_watch *watch, struct fl_error *error)
 {
     watch->fd = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
     return watch->fd >= 0 || fl_error_set(error, FL_ERROR_SYSTEM, "--watch", "inotify_init1: %s", strerror(errno));

@@ -24,7 +24,6 @@ struct cli_watch {
     uint64_t changed_ns; /* since when nothing has changed any more; 0: nothing has changed */
 };
 
-bool cli_watch_begin(struct cli_watch *watch, struct fl_error *error);
 /* Begins with models, and an environment (NULL: none), before they are read: what changes while that happens has
  * changed. */
 bool cli_watch_begin_models(struct cli_watch *watch, const struct fl_model *models, size_t count,

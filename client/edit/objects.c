@@ -14,17 +14,6 @@
 #define ANSWER_NS 30000000000ull
 #define ENVIRONMENT 1u /* the identifier of the only one */
 
-static bool check_daemon(const struct fl_connection *connection, struct fl_error *error)
-{
-    if (!fl_connection_check(connection, error))
-        return false;
-    if (connection->can_read_objects)
-        return true;
-    fl_error_set(error, FL_ERROR_REFUSED, connection->address, "the daemon cannot say what a scene has");
-    error->server_code = PROTOCOL_ERROR_UNSUPPORTED;
-    return fl_error_remedy(error, "it is older than this program: install a newer one there");
-}
-
 /* ---- names ---- */
 
 struct list {
@@ -107,7 +96,7 @@ bool fl_scene_objects(struct fl_scene *scene, enum protocol_object_kind kind, st
     struct list list = {0};
     *objects = NULL;
     *count = 0;
-    if (!check_daemon(scene->connection, error))
+    if (!fl_connection_check(scene->connection, error))
         return false;
     if (!list_objects(scene, kind, "", &list, error)) {
         free(list.objects);
@@ -124,7 +113,7 @@ bool fl_scene_object(struct fl_scene *scene, enum protocol_object_kind kind, uin
     struct message question;
     struct fl_received received;
     struct list list = {0};
-    if (!check_daemon(scene->connection, error))
+    if (!fl_connection_check(scene->connection, error))
         return false;
     message_init(&question, MESSAGE_SCENE_OBJECTS);
     question.scene_objects.scene = scene->scene;
@@ -268,7 +257,7 @@ bool fl_scene_find_objects(struct fl_scene *scene, enum protocol_object_kind kin
     struct list objects = {0}, nodes = {0};
     struct found found = {0};
     uint64_t id = 0;
-    bool good = check_daemon(scene->connection, error);
+    bool good = fl_connection_check(scene->connection, error);
     if (good && which[0] == '#' && fl_text_integer(which + 1, 1, UINT32_MAX, &id, NULL))
         good = add_id(&found, (uint32_t)id, error);
     else if (good && kind == PROTOCOL_OBJECT_ENVIRONMENT)
@@ -325,7 +314,7 @@ bool edit_object_read(struct fl_scene *scene, enum protocol_object_kind kind, ui
     struct message question;
     struct fl_received received;
     *object = (struct edit_object){.kind = kind, .id = id};
-    if (!check_daemon(connection, error))
+    if (!fl_connection_check(connection, error))
         return false;
     if (type == MESSAGE_OK)
         return fl_error_set(error, FL_ERROR_ARGUMENT, protocol_object_kind_text(kind),

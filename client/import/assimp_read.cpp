@@ -107,17 +107,8 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 extern "C" bool assimp_import(struct import_scene *scene, struct files *files, const struct assimp_format *format,
                               const unsigned char *bytes, size_t size_bytes)
 {
-    try {
+    return reading::run(scene, assimp::too_large, [&] {
         assimp::reader r = {{scene}, files, format};
         assimp::import(r, bytes, size_bytes);
-    } catch (const reading::failed &) {
-        // said already
-    } catch (const std::bad_alloc &) {
-        import_fail(scene, nullptr, "%s", assimp::too_large);
-    } catch (const std::exception &exception) {
-        import_fail(scene, nullptr, "the file cannot be parsed: %s", exception.what());
-    } catch (...) {
-        import_fail(scene, nullptr, "the file cannot be parsed");
-    }
-    return !scene->failed;
+    });
 }

@@ -63,7 +63,7 @@ char *files_folder_of(const char *path)
 bool files_open(struct files *files, const char *model_path, const char *environment_path,
                 char reason[FILES_REASON_BYTES])
 {
-    *files = (struct files){.folder = -1, .model = -1, .environment = -1, .images = -1};
+    *files = (struct files){.folder = -1, .model = -1, .environment = -1};
     if (model_path) {
         char *folder;
 
@@ -86,12 +86,6 @@ bool files_open(struct files *files, const char *model_path, const char *environ
     return true;
 }
 
-/* No link: it could lead to the images of others. */
-void files_open_images(struct files *files)
-{
-    files->images = openat(files->folder, FILES_IMAGES_BESIDE, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-}
-
 void files_finish(struct files *files)
 {
     if (files->folder >= 0)
@@ -100,9 +94,7 @@ void files_finish(struct files *files)
         close(files->model);
     if (files->environment >= 0)
         close(files->environment);
-    if (files->images >= 0)
-        close(files->images);
-    files->folder = files->model = files->environment = files->images = -1;
+    files->folder = files->model = files->environment = -1;
     for (size_t i = 0; i < files->named_count; i++)
         free(files->named[i]);
     free(files->named);
@@ -287,7 +279,7 @@ static bool may_be_key(int descriptor)
 }
 
 /* A file that is missing is remembered, too, as --watch waits for it. Without memory it is left out. */
-static void remember(struct files *files, const char *folder, const char *name)
+static void remember(struct files *files, const char *name)
 {
     char **grown = files->named_count < FILES_NAMED_MAX
                        ? realloc(files->named, (files->named_count + 1) * sizeof(*grown))
@@ -296,22 +288,23 @@ static void remember(struct files *files, const char *folder, const char *name)
     if (!grown)
         return;
     files->named = grown;
-    if (asprintf(&grown[files->named_count], "%s%s", folder, name) >= 0)
+    grown[files->named_count] = strdup(name);
+    if (grown[files->named_count])
         files->named_count++;
 }
 
-static unsigned char *read_beneath(struct files *files, int folder, const char *name, size_t *size_bytes,
-                                   char reason[FILES_REASON_BYTES])
+unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
+                          char reason[FILES_REASON_BYTES])
 {
     unsigned char *bytes = NULL;
     int descriptor;
 
-    if (folder < 0) {
+    if (files->folder < 0) {
         snprintf(reason, FILES_REASON_BYTES, "cannot be found: a model from standard input has no folder");
         return NULL;
     }
-    remember(files, folder == files->images ? FILES_IMAGES_BESIDE "/" : "", name);
-    descriptor = open_beneath(folder, name, reason);
+    remember(files, name);
+    descriptor = open_beneath(files->folder, name, reason);
 
     if (descriptor < 0 && strchr(name, '\\')) {
         char *slashed = strdup(name);
@@ -320,7 +313,7 @@ static unsigned char *read_beneath(struct files *files, int folder, const char *
             if (*at == '\\')
                 *at = '/';
         if (slashed)
-            descriptor = open_beneath(folder, slashed, reason);
+            descriptor = open_beneath(files->folder, slashed, reason);
         free(slashed);
     }
     if (descriptor < 0)
@@ -331,12 +324,6 @@ static unsigned char *read_beneath(struct files *files, int folder, const char *
         bytes = files_read_descriptor(files, descriptor, size_bytes, reason);
     close(descriptor);
     return bytes;
-}
-
-unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
-                          char reason[FILES_REASON_BYTES])
-{
-    return read_beneath(files, files->folder, name, size_bytes, reason);
 }
 
 /* The last part of a path of any system, without blanks and quotes around it. False: it has none, or is too long.
@@ -397,17 +384,6 @@ unsigned char *files_read_moved(struct files *files, const char *name, size_t *s
             return bytes;
     }
     found[0] = '\0';
-    return bytes;
-}
-
-unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
-                                char reason[FILES_REASON_BYTES])
-{
-    char reason_beside[FILES_REASON_BYTES];
-    unsigned char *bytes = read_beneath(files, files->folder, name, size_bytes, reason);
-
-    if (!bytes && files->images >= 0)
-        bytes = read_beneath(files, files->images, name, size_bytes, reason_beside);
     return bytes;
 }
 

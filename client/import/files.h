@@ -27,7 +27,6 @@ struct files {
     int folder;      /* descriptor of the model's folder, -1: it has none, as it is standard input */
     int model;       /* descriptor of the model file */
     int environment; /* likewise, -1: none */
-    int images;      /* descriptor of a folder with further images, -1: none */
     char **named;    /* what the model named, there or not, relative to its folder */
     size_t named_count;
     uint64_t read_bytes, read_ns;
@@ -38,11 +37,6 @@ struct files {
 bool files_open(struct files *files, const char *model_path, const char *environment_path,
                 char reason[FILES_REASON_BYTES]);
 void files_finish(struct files *files);
-
-/* AFF's images lie beside the model's folder, in one of this name, as BART is published. */
-#define FILES_IMAGES_BESIDE "../TextureFiles"
-/* Opens it if it is there; after files_open(). */
-void files_open_images(struct files *files);
 
 /* Folder part of a path, malloc'd: "." if it has none. NULL: out of memory. */
 char *files_folder_of(const char *path);
@@ -59,10 +53,6 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
  * its name, which is empty otherwise. The reason is that of the whole name. */
 unsigned char *files_read_moved(struct files *files, const char *name, size_t *size_bytes,
                                 char found[FILES_NAME_BYTES], char reason[FILES_REASON_BYTES]);
-
-/* As files_read(); what is not in the model's folder may be in that of further images. */
-unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
-                                char reason[FILES_REASON_BYTES]);
 
 /* Whether the content may be vertices and the like: no text, archive, database, program or key. False: *kind says
  * what. */

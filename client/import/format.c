@@ -36,8 +36,6 @@ struct format format_of_name(const char *name)
         format.reader = FORMAT_OBJ;
     else if (has_ending(name, ".nff"))
         format.reader = FORMAT_NFF;
-    else if (has_ending(name, ".aff"))
-        format.reader = FORMAT_AFF;
     else if (has_ending(name, ".3mf"))
         format.reader = FORMAT_3MF;
     else if (format.assimp)
@@ -162,7 +160,7 @@ static const struct {
 
 static const char *endings_of_all(char out[256])
 {
-    size_t used = (size_t)snprintf(out, 256, ".gltf, .glb, .obj, .nff, .aff, .3mf");
+    size_t used = (size_t)snprintf(out, 256, ".gltf, .glb, .obj, .nff, .3mf");
 
     for (size_t i = 0; assimp_format_at(i) && used < 240; i++)
         used += (size_t)snprintf(out + used, 256 - used, "%s%s", assimp_format_at(i + 1) ? ", " : " and ",

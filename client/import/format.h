@@ -15,7 +15,6 @@ enum format_reader {
     FORMAT_GLTF,
     FORMAT_OBJ,
     FORMAT_NFF,
-    FORMAT_AFF,
     FORMAT_3MF,
     FORMAT_ASSIMP,
 };

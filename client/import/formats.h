@@ -17,8 +17,6 @@ extern "C" {
 bool gltf_import(struct import_scene *scene, struct files *files, const unsigned char *bytes, size_t size_bytes);
 /* Wavefront OBJ with its MTL files. */
 bool obj_import(struct import_scene *scene, struct files *files, const unsigned char *bytes, size_t size_bytes);
-/* Animated File Format of BART, with the files that it includes. */
-bool aff_import(struct import_scene *scene, struct files *files, const unsigned char *bytes, size_t size_bytes);
 /* Neutral File Format of the Standard Procedural Databases. */
 bool nff_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
 /* Any of assimp.h's formats. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For formats that change the material as they go (OBJ, NFF, AFF): triangles and spheres are sorted by material,
+/* For formats that change the material as they go (OBJ, NFF): triangles and spheres are sorted by material,
  * so that each set has few ranges. */
 #ifndef FARLIGHT_IMPORT_GROUPING_H
 #define FARLIGHT_IMPORT_GROUPING_H

@@ -113,8 +113,8 @@ static void add_source(struct argp_state *state, struct options *options, const 
 {
     if (options->source_count == SOURCES_MAX)
         argp_error(state, "more than %d models", SOURCES_MAX);
-    options->sources[options->source_count++] = (struct source){
-        .path = path, .scale = 1, .files = {.folder = -1, .model = -1, .environment = -1, .images = -1}};
+    options->sources[options->source_count++] =
+        (struct source){.path = path, .scale = 1, .files = {.folder = -1, .model = -1, .environment = -1}};
 }
 
 static struct source *last_source(struct argp_state *state, struct options *options, const char *option)
@@ -206,11 +206,11 @@ static void leave_at_once(int status)
 #endif
 }
 
-/* Of all models, of AFF the images beside it, and that of the modules, which are loaded when they are needed. */
+/* Of all models, and that of the modules, which are loaded when they are needed. */
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
-    char *folders[2 * SOURCES_MAX + 1] = {NULL};
-    const size_t folder_count = 2 * options->source_count + 1;
+    char *folders[SOURCES_MAX + 1] = {NULL};
+    const size_t folder_count = options->source_count + 1;
     struct sandbox_options sandbox = {.read_folders = (const char *const *)folders,
                                       .read_folder_count = folder_count,
                                       .cpu_seconds = CPU_SECONDS_MAX};
@@ -220,12 +220,8 @@ static bool enter_sandbox(struct import_scene *scene, const struct options *opti
     for (size_t i = 0; i < options->source_count; i++) {
         const struct source *source = &options->sources[i];
 
-        if (source->files.folder < 0)
-            continue;
-        folders[2 * i] = files_folder_of(source->path);
-        if (folders[2 * i] && source->of.reader == FORMAT_AFF &&
-            asprintf(&folders[2 * i + 1], "%s/" FILES_IMAGES_BESIDE, folders[2 * i]) < 0)
-            folders[2 * i + 1] = NULL;
+        if (source->files.folder >= 0)
+            folders[i] = files_folder_of(source->path);
     }
     folders[folder_count - 1] = module_folder(TEXTURE_MODULE);
     entered = sandbox_enter(&sandbox, reason, sizeof(reason));
@@ -255,8 +251,6 @@ static bool parse_model(struct import_scene *scene, struct source *source)
         return obj_import(scene, &source->files, bytes, size_bytes);
     case FORMAT_NFF:
         return nff_import(scene, bytes, size_bytes);
-    case FORMAT_AFF:
-        return aff_import(scene, &source->files, bytes, size_bytes);
     case FORMAT_3MF:
         return threemf_import(scene, bytes, size_bytes);
     case FORMAT_ASSIMP:
@@ -396,7 +390,7 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
                 uint64_t start_ns)
 {
     struct message_import_done done = {0};
-    struct files surroundings = {.folder = -1, .model = -1, .environment = -1, .images = -1};
+    struct files surroundings = {.folder = -1, .model = -1, .environment = -1};
     uint64_t parsed_ns, begin_ns = monotonic_now_ns();
     bool imported, marks, sent;
     pthread_t marker;
@@ -436,15 +430,14 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
 
 int main(int argc, char **argv)
 {
-    static const struct argp argp = {
-        option_rows,
-        parse_option,
-        "MODEL...",
-        "Turn each MODEL (glTF 2.0, GLB, OBJ, NFF, AFF, PLY, STL, FBX, COLLADA, 3MF and "
-        "more) into messages of farlight's protocol.",
-        NULL,
-        NULL,
-        NULL};
+    static const struct argp argp = {option_rows,
+                                     parse_option,
+                                     "MODEL...",
+                                     "Turn each MODEL (glTF 2.0, GLB, OBJ, NFF, PLY, STL, FBX, COLLADA, 3MF and "
+                                     "more) into messages of farlight's protocol.",
+                                     NULL,
+                                     NULL,
+                                     NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
     uint64_t start_ns = monotonic_now_ns();
     static struct source sources[SOURCES_MAX];

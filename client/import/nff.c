@@ -28,7 +28,7 @@ static bool read_fill(struct nff *nff)
     return nff_use_fill(nff);
 }
 
-bool nff_read_light(struct nff *nff)
+static bool read_light(struct nff *nff)
 {
     float numbers[6] = {0};
     uint32_t count = word_reader_some(&nff->reader, numbers, 6);
@@ -181,34 +181,24 @@ static bool read_background(struct nff *nff)
     return word_reader_numbers(&nff->reader, nff->background, 3, "b");
 }
 
-bool nff_statement(struct nff *nff, struct word word, bool *read)
-{
-    if (word_is(word, "v"))
-        *read = read_view(nff);
-    else if (word_is(word, "b"))
-        *read = read_background(nff);
-    else if (word_is(word, "l"))
-        *read = nff_read_light(nff);
-    else if (word_is(word, "f"))
-        *read = read_fill(nff);
-    else if (word_is(word, "s"))
-        *read = read_sphere(nff);
-    else if (word_is(word, "c"))
-        *read = read_cone(nff);
-    else if (word_is(word, "p") || word_is(word, "pp"))
-        *read = read_polygon(nff, word.length == 2);
-    else
-        return false;
-    return true;
-}
-
 static bool read_statement(struct nff *nff, struct word word)
 {
     float nothing[1];
-    bool read = true;
 
-    if (nff_statement(nff, word, &read))
-        return read;
+    if (word_is(word, "v"))
+        return read_view(nff);
+    if (word_is(word, "b"))
+        return read_background(nff);
+    if (word_is(word, "l"))
+        return read_light(nff);
+    if (word_is(word, "f"))
+        return read_fill(nff);
+    if (word_is(word, "s"))
+        return read_sphere(nff);
+    if (word_is(word, "c"))
+        return read_cone(nff);
+    if (word_is(word, "p") || word_is(word, "pp"))
+        return read_polygon(nff, word.length == 2);
     if (word_is(word, "tet"))
         return read_solid(nff, 4);
     if (word_is(word, "hex"))
@@ -223,18 +213,14 @@ static bool read_statement(struct nff *nff, struct word word)
                        word_shown(word), word.text);
 }
 
-void nff_init(struct nff *nff, struct import_scene *scene, const unsigned char *bytes, size_t size_bytes)
+static void nff_init(struct nff *nff, struct import_scene *scene, const unsigned char *bytes, size_t size_bytes)
 {
     *nff = (struct nff){.scene = scene, .fill = default_fill, .polygon_budget = POLYGON_BUDGET};
-    nff->reader = (struct word_reader){.scene = scene,
-                                       .at = (const char *)bytes,
-                                       .end = (const char *)bytes + size_bytes,
-                                       .comment_marks = "#",
-                                       .word_marks = "",
-                                       .line = 1};
+    nff->reader = (struct word_reader){
+        .scene = scene, .at = (const char *)bytes, .end = (const char *)bytes + size_bytes, .line = 1};
 }
 
-void nff_free(struct nff *nff)
+static void nff_free(struct nff *nff)
 {
     free(nff->lights);
     free(nff->materials);
@@ -248,8 +234,8 @@ static bool finish(struct nff *nff)
 
     if (shapes->sphere_count == 0 && shapes->triangle_count == 0)
         return import_fail(nff->scene, NULL, "it contains nothing that can be shown");
-    if (!nff_add_materials(nff, NULL) || !nff_add_lights(nff) ||
-        !shapes_finish(nff->shapes, 0, nff->material_ids) || (nff->has_view && !nff_add_camera(nff)))
+    if (!nff_add_materials(nff) || !nff_add_lights(nff) || !shapes_finish(nff->shapes, nff->material_ids) ||
+        (nff->has_view && !nff_add_camera(nff)))
         return false;
     nff_add_background(nff);
     return !nff->scene->failed;

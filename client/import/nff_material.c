@@ -27,28 +27,22 @@ float nff_colour(const struct nff *nff, float shown)
 /* The protocol's limit of a mirror's colour. */
 #define SPECULAR_MAX 1000.0f
 
-static float max_component(const float colour[3])
-{
-    return fmaxf(fmaxf(colour[0], colour[1]), colour[2]);
-}
-
 /* A mirror of NFF shows the same share at every angle, and the surface below it scatters what the mirror leaves.
  * Fresnel's curve begins at `share` of the light from straight on and would rise to all of it: as it is scaled to
  * begin at all of it, it stays there, and then it is as much weaker. Reflections are sharp, as Shine only shapes
  * highlights. */
-static void mirror(struct message_set_material *material, const float share[3])
+static void mirror(struct message_set_material *material, float share)
 {
-    const float most = max_component(share), root = (material->ior - 1) / (material->ior + 1);
-    float *const colour[3] = {&material->specular_red, &material->specular_green, &material->specular_blue};
+    const float root = (material->ior - 1) / (material->ior + 1);
 
-    if (most == 0 && material->transmission == 0) {
+    if (share == 0 && material->transmission == 0) {
         material->ior = 1; /* nothing is mirrored */
         return;
     }
     material->roughness = 0;
-    material->specular = most;
-    for (int c = 0; c < 3; c++)
-        *colour[c] = most > 0 ? fminf(share[c] / most / (root * root), SPECULAR_MAX) : 1;
+    material->specular = share;
+    material->specular_red = share > 0 ? fminf(1 / (root * root), SPECULAR_MAX) : 1;
+    material->specular_green = material->specular_blue = material->specular_red;
 }
 
 /* Where the index of refraction says nothing, light goes straight on, and what is met is a pane. */
@@ -70,36 +64,17 @@ static float below(float sent, float share)
 /* NFF's numbers are a display's: where one of the parts is all that is seen, a display shows it times the colour,
  * and the mirror times what it mirrors, which has a hue of its own. What passes is not scattered, as in pictures
  * of the Standard Procedural Databases that POV-Ray makes of their author's output. */
-static void from_plain(const struct nff *nff, const float n[8], struct message_set_material *material)
+static void from_fill(const struct nff *nff, const float n[8], struct message_set_material *material)
 {
-    const float share = nff_colour(nff, n[4]), shares[3] = {share, share, share};
+    const float share = nff_colour(nff, n[4]);
     const float through = nff_colour(nff, n[6]), sent = through + nff_colour(nff, n[3]) * (1 - through);
 
     if (through > 0)
         transmit(material, through / sent, n[7]);
-    mirror(material, shares);
+    mirror(material, share);
     for (int c = 0; c < 3; c++)
         material->base_colour[c] =
             below(through > 0 ? nff_colour(nff, n[c]) * sent : nff_colour(nff, unit(n[c]) * unit(n[3])), share);
-}
-
-/* What the ambient light shows is there whatever else lights the surface: it becomes emission. Glass has the hue
- * of what it scatters, but lets all of T through. */
-static void from_extended(const float n[12], const float ambient[3], struct message_set_material *material)
-{
-    const float *diffuse = n + 3;
-    const float brightest = fmaxf(max_component(diffuse), 0), through = unit(n[10]);
-    const float shares[3] = {unit(n[6]), unit(n[7]), unit(n[8])};
-
-    if (through > 0)
-        transmit(material, through, n[11]);
-    mirror(material, shares);
-    for (int c = 0; c < 3; c++) {
-        material->base_colour[c] = below(fmaxf(diffuse[c], 0), shares[c]);
-        if (through > 0)
-            material->base_colour[c] = brightest > 0 ? unit(diffuse[c] / brightest) : 1;
-        material->emission[c] = fminf(fmaxf(n[c] * ambient[c], 0), 1e6f);
-    }
 }
 
 static size_t find_slot(const struct nff *nff, const struct nff_fill *fill)
@@ -154,33 +129,23 @@ bool nff_use_fill(struct nff *nff)
     return true;
 }
 
-static uint32_t add_material(struct nff *nff, const struct nff_material *from, const uint32_t *textures)
+static uint32_t add_material(struct nff *nff, const struct nff_material *from)
 {
     struct message_set_material material;
-    struct record_texture_use uses[5] = {0}; /* by position: 0 base colour, 4 emission */
 
     import_material_default(&material);
     material.double_sided = 1;
     material.name = from->name;
-    if (from->fill.extended)
-        from_extended(from->fill.numbers, nff->ambient, &material);
-    else
-        from_plain(nff, from->fill.numbers, &material);
-    if (from->fill.texture != 0) {
-        import_texture_use_default(&uses[0], textures[from->fill.texture]);
-        import_texture_use_default(&uses[4], textures[from->fill.texture]);
-        material.textures = uses;
-        material.textures_count = 5;
-    }
+    from_fill(nff, from->fill.numbers, &material);
     return import_add_material(nff->scene, &material);
 }
 
-bool nff_add_materials(struct nff *nff, const uint32_t *textures)
+bool nff_add_materials(struct nff *nff)
 {
     nff->material_ids = calloc(nff->material_count + 1, sizeof(*nff->material_ids));
     if (!nff->material_ids)
         return import_fail(nff->scene, NULL, "out of memory");
     for (size_t i = 0; i < nff->material_count && !nff->scene->failed; i++)
-        nff->material_ids[i + 1] = add_material(nff, &nff->materials[i], textures);
+        nff->material_ids[i + 1] = add_material(nff, &nff->materials[i]);
     return !nff->scene->failed;
 }

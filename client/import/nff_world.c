@@ -7,13 +7,13 @@
 
 #define PI 3.14159265358979323846
 
-static uint32_t show(struct nff *nff, enum protocol_node_kind kind, uint32_t object, const float matrix[12],
-                     const char *name)
+static bool show(struct nff *nff, enum protocol_node_kind kind, uint32_t object, const float matrix[12],
+                 const char *name)
 {
     struct message_set_node node = {.kind = kind, .object = object, .name = name};
 
     memcpy(node.parent_from_node, matrix, sizeof(node.parent_from_node));
-    return object != 0 ? import_add_node(nff->scene, &node) : 0;
+    return object != 0 && import_add_node(nff->scene, &node) != 0;
 }
 
 bool nff_add_camera(struct nff *nff)
@@ -40,8 +40,7 @@ bool nff_add_camera(struct nff *nff)
         matrix[row * 4 + 3] = nff->from[row];
     camera.fov_y = (float)((double)nff->angle_degrees * PI / 180);
     camera.near = fmaxf(nff->hither, 0);
-    nff->camera_node = show(nff, PROTOCOL_NODE_CAMERA, import_add_camera(nff->scene, &camera), matrix, "view");
-    return nff->camera_node != 0;
+    return show(nff, PROTOCOL_NODE_CAMERA, import_add_camera(nff->scene, &camera), matrix, "view");
 }
 
 /* A surface that scatters all light sends out what NFF's formula says, Kd times N.L times the light; hence the
@@ -52,7 +51,7 @@ bool nff_add_lights(struct nff *nff)
     float share = (float)(sqrt((double)nff->light_count) / (double)nff->light_count);
 
     for (size_t i = 0; i < nff->light_count; i++) {
-        struct nff_light *light = &nff->lights[i];
+        const struct nff_light *light = &nff->lights[i];
         struct message_set_light set = {.kind = PROTOCOL_LIGHT_STEADY};
         float matrix[12];
         char name[32];
@@ -64,8 +63,7 @@ bool nff_add_lights(struct nff *nff)
         }
         snprintf(name, sizeof(name), "light %zu", i + 1);
         set.name = name;
-        light->node = show(nff, PROTOCOL_NODE_LIGHT, import_add_light(nff->scene, &set), matrix, name);
-        if (light->node == 0)
+        if (!show(nff, PROTOCOL_NODE_LIGHT, import_add_light(nff->scene, &set), matrix, name))
             return false;
     }
     return true;

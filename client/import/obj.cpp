@@ -344,17 +344,8 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 extern "C" bool obj_import(struct import_scene *scene, struct files *files, const unsigned char *bytes,
                            size_t size_bytes)
 {
-    try {
+    return reading::run(scene, "out of memory", [&] {
         obj::reader r = {scene, files};
         obj::import(r, bytes, size_bytes);
-    } catch (const reading::failed &) {
-        // said already
-    } catch (const std::bad_alloc &) {
-        import_fail(scene, nullptr, "out of memory");
-    } catch (const std::exception &exception) {
-        import_fail(scene, nullptr, "the file cannot be parsed: %s", exception.what());
-    } catch (...) {
-        import_fail(scene, nullptr, "the file cannot be parsed");
-    }
-    return !scene->failed;
+    });
 }

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <new>
 #include <string>
 #include <vector>
@@ -18,6 +19,23 @@ namespace reading
 // Thrown after import_fail(); caught where the format's C function begins, and at the edges of libraries in C.
 struct failed {
 };
+
+// Where a format's C function begins: exceptions end here. Whether the scene was read.
+template <typename work> bool run(import_scene *scene, const char *too_large, work read)
+{
+    try {
+        read();
+    } catch (const failed &) {
+        // said already
+    } catch (const std::bad_alloc &) {
+        import_fail(scene, nullptr, "%s", too_large);
+    } catch (const std::exception &exception) {
+        import_fail(scene, nullptr, "the file cannot be parsed: %s", exception.what());
+    } catch (...) {
+        import_fail(scene, nullptr, "the file cannot be parsed");
+    }
+    return !scene->failed;
+}
 
 // What every reader begins with. The functions below are found by it, so that a reader calls them by their names.
 struct base {

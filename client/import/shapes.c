@@ -7,7 +7,7 @@
 
 void shapes_init(struct shapes *shapes, struct import_scene *scene, uint64_t *polygon_budget)
 {
-    *shapes = (struct shapes){.scene = scene, .to_shapes = placement_identity(), .polygon_budget = polygon_budget};
+    *shapes = (struct shapes){.scene = scene, .polygon_budget = polygon_budget};
     for (int c = 0; c < 3; c++) {
         shapes->lower[c] = INFINITY;
         shapes->upper[c] = -INFINITY;
@@ -18,17 +18,10 @@ void shapes_free(struct shapes *shapes)
 {
     free(shapes->positions);
     free(shapes->normals);
-    free(shapes->texcoords);
     free(shapes->indices);
     free(shapes->triangle_materials);
     free(shapes->spheres);
     free(shapes->sphere_materials);
-}
-
-void shapes_place(struct shapes *shapes, const struct placement *to_shapes)
-{
-    shapes->to_shapes = *to_shapes;
-    shapes->mirrors = placement_determinant(to_shapes) < 0;
 }
 
 /* Arrays of floats or numbers that grow together, with `width` elements for each. */
@@ -61,17 +54,16 @@ static bool reserve(struct import_scene *scene, const struct growing *arrays, si
 
 bool shapes_reserve(struct shapes *shapes, size_t more_vertices, size_t more_triangles)
 {
-    void *positions = shapes->positions, *normals = shapes->normals, *texcoords = shapes->texcoords;
+    void *positions = shapes->positions, *normals = shapes->normals;
     void *indices = shapes->indices, *materials = shapes->triangle_materials;
-    const struct growing vertices[] = {{&positions, 3}, {&normals, 3}, {&texcoords, 2}};
+    const struct growing vertices[] = {{&positions, 3}, {&normals, 3}};
     const struct growing triangles[] = {{&indices, 3}, {&materials, 1}};
     bool reserved =
-        reserve(shapes->scene, vertices, 3, &shapes->vertex_capacity, shapes->vertex_count + more_vertices) &&
+        reserve(shapes->scene, vertices, 2, &shapes->vertex_capacity, shapes->vertex_count + more_vertices) &&
         reserve(shapes->scene, triangles, 2, &shapes->triangle_capacity, shapes->triangle_count + more_triangles);
 
     shapes->positions = positions;
     shapes->normals = normals;
-    shapes->texcoords = texcoords;
     shapes->indices = indices;
     shapes->triangle_materials = materials;
     return reserved;
@@ -102,22 +94,20 @@ uint32_t shapes_add_vertex(struct shapes *shapes, const struct shape_vertex *ver
     float *position = shapes->positions + shapes->vertex_count * 3;
     float *normal = shapes->normals + shapes->vertex_count * 3;
 
-    placement_point(&shapes->to_shapes, vertex->position, position);
-    placement_normal(&shapes->to_shapes, vertex->normal, normal);
+    memcpy(position, vertex->position, 12);
+    memcpy(normal, vertex->normal, 12);
     normalise(normal);
-    memcpy(shapes->texcoords + shapes->vertex_count * 2, vertex->texcoord, 8);
     include(shapes, position, 0);
     return (uint32_t)shapes->vertex_count++;
 }
 
-/* Where it is mirrored its corners are in the other order: the side that was outside stays so. */
 void shapes_add_triangle(struct shapes *shapes, uint32_t a, uint32_t b, uint32_t c)
 {
     uint32_t *to = shapes->indices + shapes->triangle_count * 3;
 
     to[0] = a;
-    to[1] = shapes->mirrors ? c : b;
-    to[2] = shapes->mirrors ? b : c;
+    to[1] = b;
+    to[2] = c;
     shapes->triangle_materials[shapes->triangle_count++] = shapes->material;
 }
 
@@ -133,8 +123,8 @@ bool shapes_add_sphere(struct shapes *shapes, const float centre[3], float radiu
     if (!reserved)
         return false;
     to = shapes->spheres + shapes->sphere_count * 4;
-    placement_point(&shapes->to_shapes, centre, to);
-    to[3] = (float)((double)radius * cbrt(fabs(placement_determinant(&shapes->to_shapes))));
+    memcpy(to, centre, 12);
+    to[3] = radius;
     shapes->sphere_materials[shapes->sphere_count++] = shapes->material;
     include(shapes, to, to[3]);
     return true;
@@ -196,7 +186,7 @@ static void to_identifiers(uint32_t *numbers, size_t count, const uint32_t *mate
         numbers[i] = materials[numbers[i]];
 }
 
-bool shapes_finish(struct shapes *shapes, uint32_t parent, const uint32_t *materials)
+bool shapes_finish(struct shapes *shapes, const uint32_t *materials)
 {
     struct import_scene *scene = shapes->scene;
 
@@ -208,17 +198,14 @@ bool shapes_finish(struct shapes *shapes, uint32_t parent, const uint32_t *mater
                                    .triangle_count = (uint32_t)shapes->triangle_count,
                                    .positions = shapes->positions,
                                    .normals = shapes->normals,
-                                   .texcoords = {shapes->textured ? shapes->texcoords : NULL},
                                    .indices = shapes->indices};
 
         shapes->positions = shapes->normals = NULL;
         shapes->indices = NULL;
-        if (shapes->textured)
-            shapes->texcoords = NULL;
-        if (!import_add_grouped_mesh(scene, parent, &mesh, shapes->triangle_materials))
+        if (!import_add_grouped_mesh(scene, 0, &mesh, shapes->triangle_materials))
             return false;
     }
     return shapes->sphere_count == 0 ||
-           import_add_grouped_spheres(scene, parent, "spheres", shapes->spheres, shapes->sphere_materials,
+           import_add_grouped_spheres(scene, 0, "spheres", shapes->spheres, shapes->sphere_materials,
                                       (uint32_t)shapes->sphere_count);
 }

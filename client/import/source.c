@@ -65,8 +65,6 @@ bool source_read(struct source *source, char reason[FILES_REASON_BYTES])
     if (source->format)
         snprintf(name, sizeof(name), "model.%s", source->format);
     source->of = format_of_name(source->format ? name : source->path);
-    if (source->of.reader == FORMAT_AFF && !is_standard_input(source))
-        files_open_images(&source->files);
     source->bytes = files_read_descriptor(&source->files, source->files.model, &source->size_bytes, reason);
     if (!source->bytes)
         return false;

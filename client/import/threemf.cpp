@@ -250,16 +250,9 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 
 extern "C" bool threemf_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes)
 {
-    try {
+    const char *too_large = "the file asks for more memory than a model may have: it should be made of parts";
+    return reading::run(scene, too_large, [&] {
         threemf::reader r = {{scene}};
         threemf::import(r, bytes, size_bytes);
-    } catch (const reading::failed &) {
-        // said already
-    } catch (const std::bad_alloc &) {
-        import_fail(scene, nullptr,
-                    "the file asks for more memory than a model may have: it should be made of parts");
-    } catch (const std::exception &exception) {
-        import_fail(scene, nullptr, "the file cannot be parsed: %s", exception.what());
-    }
-    return !scene->failed;
+    });
 }

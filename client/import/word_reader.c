@@ -8,14 +8,13 @@
 
 const char *word_reader_where(struct word_reader *reader)
 {
-    snprintf(reader->where, sizeof(reader->where), "%.120s%sline %u", reader->file ? reader->file : "",
-             reader->file ? " " : "", reader->line);
+    snprintf(reader->where, sizeof(reader->where), "line %u", reader->line);
     return reader->where;
 }
 
-static bool is_one_of(const char *marks, char c)
+static bool is_blank(char c)
 {
-    return c != '\0' && strchr(marks, c);
+    return c == ' ' || c == '\t' || c == '\r' || c == '\f';
 }
 
 bool word_reader_skip(struct word_reader *reader, bool same_line)
@@ -23,7 +22,7 @@ bool word_reader_skip(struct word_reader *reader, bool same_line)
     while (reader->at < reader->end) {
         char c = *reader->at;
 
-        if (is_one_of(reader->comment_marks, c))
+        if (c == '#')
             while (reader->at < reader->end && *reader->at != '\n')
                 reader->at++;
         else if (c == '\n') {
@@ -31,7 +30,7 @@ bool word_reader_skip(struct word_reader *reader, bool same_line)
                 return false;
             reader->line++;
             reader->at++;
-        } else if (is_one_of(" \t\r\f", c))
+        } else if (is_blank(c))
             reader->at++;
         else
             return true;
@@ -39,31 +38,21 @@ bool word_reader_skip(struct word_reader *reader, bool same_line)
     return false;
 }
 
-static bool ends_word(const struct word_reader *reader, char c)
+static bool ends_word(char c)
 {
-    return c == '\0' || is_one_of(" \t\r\f\n", c) || is_one_of(reader->comment_marks, c) ||
-           is_one_of(reader->word_marks, c);
+    return c == '\0' || c == '\n' || c == '#' || is_blank(c);
 }
 
 struct word word_reader_next(struct word_reader *reader)
 {
     struct word word = {reader->at, 0};
 
-    while (reader->at < reader->end && !ends_word(reader, *reader->at))
+    while (reader->at < reader->end && !ends_word(*reader->at))
         reader->at++;
-    if (reader->at == word.text && reader->at < reader->end) /* a mark, or a NUL byte in the file */
+    if (reader->at == word.text && reader->at < reader->end) /* a NUL byte in the file */
         reader->at++;
     word.length = (size_t)(reader->at - word.text);
     return word;
-}
-
-bool word_reader_get(struct word_reader *reader, struct word *word, const char *of)
-{
-    *word = (struct word){reader->at, 0};
-    if (!word_reader_skip(reader, false))
-        return import_fail(reader->scene, word_reader_where(reader), "the file ends within '%s'", of);
-    *word = word_reader_next(reader);
-    return true;
 }
 
 bool word_is(struct word word, const char *text)
@@ -115,14 +104,10 @@ uint32_t word_reader_some(struct word_reader *reader, float *out, uint32_t maxim
     bool more = false;
 
     while (word_reader_skip(reader, true)) {
-        const char *before = reader->at;
         struct word word = word_reader_next(reader);
 
         if (!more && count < maximum && to_number(word, &out[count])) {
             count++;
-        } else if (reader->free_form) {
-            reader->at = before;
-            break;
         } else {
             more = true;
         }
@@ -131,28 +116,6 @@ uint32_t word_reader_some(struct word_reader *reader, float *out, uint32_t maxim
         import_note(reader->scene, PROTOCOL_SEVERITY_INFO, word_reader_where(reader),
                     "unknown words at the end of a line");
     return count;
-}
-
-bool word_reader_count(struct word_reader *reader, uint32_t *out, uint32_t minimum, uint32_t maximum,
-                       const char *of)
-{
-    struct word word;
-    uint64_t value = 0;
-
-    if (!word_reader_get(reader, &word, of))
-        return false;
-    for (size_t i = 0; i < word.length; i++) {
-        if (word.text[i] < '0' || word.text[i] > '9' || value > UINT32_MAX)
-            return import_fail(reader->scene, word_reader_where(reader),
-                               "'%.*s' is not a whole number of '%s'; %u to %u are allowed", word_shown(word),
-                               word.text, of, minimum, maximum);
-        value = value * 10 + (uint64_t)(word.text[i] - '0');
-    }
-    if (value < minimum || value > maximum)
-        return import_fail(reader->scene, word_reader_where(reader), "'%s' has %.*s; %u to %u are allowed", of,
-                           word_shown(word), word.text, minimum, maximum);
-    *out = (uint32_t)value;
-    return true;
 }
 
 /* A number takes two bytes at least, but for the last one. */

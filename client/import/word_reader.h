@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Words and numbers of a text, for the formats that are read by hand (NFF, AFF). Blanks separate words; a failure
- * names the line. Not thread-safe. */
+/* Words and numbers of an NFF file. Blanks separate words, '#' begins a comment; a failure names the line. Not
+ * thread-safe. */
 #ifndef FARLIGHT_IMPORT_WORD_READER_H
 #define FARLIGHT_IMPORT_WORD_READER_H
 
@@ -9,12 +9,8 @@
 struct word_reader {
     struct import_scene *scene;
     const char *at, *end;
-    const char *comment_marks; /* each begins a comment that ends with the line */
-    const char *word_marks;    /* each is a word of its own */
-    bool free_form;            /* several statements may share a line */
-    const char *file;          /* NULL: the model file itself */
-    uint32_t line;             /* of `at`, from 1 on */
-    char where[160];
+    uint32_t line; /* of `at`, from 1 on */
+    char where[24];
 };
 
 struct word {
@@ -29,22 +25,16 @@ const char *word_reader_where(struct word_reader *reader);
 bool word_reader_skip(struct word_reader *reader, bool same_line);
 /* The word that `word_reader_skip` has found. */
 struct word word_reader_next(struct word_reader *reader);
-/* The next word, over several lines if need be; false: the text ends, and the scene has failed. `of` is the
- * statement, as people know it. */
-bool word_reader_get(struct word_reader *reader, struct word *word, const char *of);
 
 bool word_is(struct word word, const char *text);
 /* For "%.*s" of a message: as much of the word as is shown. */
 int word_shown(struct word word);
 
-/* Exactly `count` numbers, over several lines if need be; false: the scene has failed. */
+/* Exactly `count` numbers, over several lines if need be; false: the scene has failed. `of` is the statement, as
+ * people know it. */
 bool word_reader_numbers(struct word_reader *reader, float *out, uint32_t count, const char *of);
-/* Up to `maximum` numbers of this line; stops at the first word that is none. The rest of the line is skipped,
- * unless the text is free in its form. */
+/* Up to `maximum` numbers of this line; stops at the first word that is none. The rest of the line is skipped. */
 uint32_t word_reader_some(struct word_reader *reader, float *out, uint32_t maximum);
-/* A whole number. */
-bool word_reader_count(struct word_reader *reader, uint32_t *out, uint32_t minimum, uint32_t maximum,
-                       const char *of);
 /* Whether the rest of the text can hold so many numbers: an array is not worth its memory if it cannot. False: the
  * scene has failed. */
 bool word_reader_can_hold(struct word_reader *reader, uint64_t numbers, const char *of);

@@ -315,9 +315,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
 {
     struct fl_stream *stream = &connection->stream;
     struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
-    hello.capabilities = HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_SEND_PARTS |
-                         HANDSHAKE_CAN_MARK_STICKING | HANDSHAKE_CAN_READ_OBJECTS;
-    hello.capabilities |= connection->can_h264 ? HANDSHAKE_CAN_H264 : 0;
+    hello.capabilities = HANDSHAKE_CAN_ABANDON | (connection->can_h264 ? HANDSHAKE_CAN_H264 : 0);
     snprintf(hello.name, sizeof(hello.name), "%s", name);
     if (getrandom(hello.nonce, sizeof(hello.nonce), 0) != (ssize_t)sizeof(hello.nonce))
         return fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
@@ -356,25 +354,12 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
                 return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
             connection->limits = reply.limits;
             connection->read_only = (reply.capabilities & HANDSHAKE_CAN_READ_ONLY) != 0;
-            connection->can_choose_primary = (reply.capabilities & HANDSHAKE_CAN_CHOOSE_PRIMARY) != 0;
-            connection->can_mark_sticking = (reply.capabilities & HANDSHAKE_CAN_MARK_STICKING) != 0;
-            connection->can_read_objects = (reply.capabilities & HANDSHAKE_CAN_READ_OBJECTS) != 0;
             connection->can_h264 = connection->can_h264 && (reply.capabilities & HANDSHAKE_CAN_H264) != 0;
             return true;
         }
         if (stream->ended)
             return fail_ended(connection, error);
     }
-}
-
-void fl_connection_fit_render(const struct fl_connection *connection, struct message_render *render)
-{
-    if (!connection->can_mark_sticking)
-        render->attachments &= ~(uint32_t)FL_ATTACH_STICKING;
-    if (render->primary != PROTOCOL_PRIMARY_AUTO || connection->can_choose_primary)
-        return;
-    render->primary =
-        render->tracer == PROTOCOL_TRACER_REFERENCE ? PROTOCOL_PRIMARY_TRACE : PROTOCOL_PRIMARY_RASTER;
 }
 
 /* `farlight bridge` on the other host. A host that begins with '-' would be an option of ssh. */
@@ -401,11 +386,6 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
 static bool open_stream(struct fl_connection *connection, const struct fl_connect_options *options,
                         uint64_t deadline_ns, struct fl_error *error)
 {
-    struct fl_link link;
-    if (options->link && !fl_link_parse(options->link, &link, error)) {
-        snprintf(error->field, sizeof(error->field), "--link");
-        return false;
-    }
     static const char *const none[] = {NULL};
     const char *const *arguments = options->daemon_arguments ? options->daemon_arguments : none;
     int fd = -1;
@@ -420,12 +400,6 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
     } else {
         fd = fl_address_connect(options->server, deadline_ns, options->interrupt_fd, &connection->local, error);
         if (fd < 0)
-            return false;
-    }
-    if (options->link) {
-        connection->local = false;
-        connection->shaper = fl_shaper_start(&link, &fd, error);
-        if (!connection->shaper)
             return false;
     }
     return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error);
@@ -500,7 +474,6 @@ void fl_connection_destroy(struct fl_connection *connection)
         free(late);
     }
     fl_process_end(&connection->process, connection->said_goodbye ? 3000 : 500);
-    fl_shaper_destroy(connection->shaper);
     free(connection);
 }
 

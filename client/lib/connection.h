@@ -4,7 +4,6 @@
 #define FARLIGHT_CLIENT_LIB_CONNECTION_H
 
 #include "lib/process.h"
-#include "lib/shaper.h"
 #include "lib/stream.h"
 #include "protocol/handshake.h"
 
@@ -21,7 +20,6 @@ struct fl_late {
 struct fl_connection {
     struct fl_stream stream;
     struct fl_process process; /* the private daemon or ssh */
-    struct fl_shaper *shaper;  /* NULL: the link is as it is */
     struct handshake_limits limits;
     int interrupt_fd;
     uint32_t last_request, last_scene, last_channel;
@@ -33,9 +31,6 @@ struct fl_connection {
     struct fl_late *late, **late_end; /* owned: sent before everything else as soon as the buffer has space */
     bool read_only;                   /* the daemon lets it change nothing */
     bool can_h264;                    /* this client and the daemon */
-    bool can_choose_primary;          /* likewise */
-    bool can_mark_sticking;           /* likewise */
-    bool can_read_objects;            /* likewise */
     struct fl_error broken;           /* why the connection is broken; code NONE: it works */
     struct message_stats_reply stats; /* the last answer */
     uint64_t start_ns;
@@ -56,8 +51,6 @@ bool fl_connection_break(struct fl_connection *connection, struct fl_error *erro
 /* False, with the reason, if the connection is broken. */
 bool fl_connection_check(const struct fl_connection *connection, struct fl_error *error);
 uint32_t fl_connection_next_request(struct fl_connection *connection);
-/* Replaces the primary `auto`, which an older daemon refuses, by the one that such a daemon uses by default. */
-void fl_connection_fit_render(const struct fl_connection *connection, struct message_render *render);
 
 /* Sends one message and waits until the kernel has it. */
 bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,

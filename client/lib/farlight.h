@@ -86,9 +86,6 @@ struct fl_connect_options {
      * fails if the daemon does not have it. TCP beyond loopback needs it; NULL: nothing is sealed. Of no effect
      * for a private daemon. With a key the calling process can no longer be dumped or traced by its user. */
     const char *key_file;
-    /* "2mbit,100ms,1%": the connection is as over a link of that rate and round trip, and is reset with that
-     * chance in each second; ",seed=N" says when. A thread carries its bytes. NULL: the link is as it is. */
-    const char *link;
     bool can_h264;       /* frames of views may come in H.264, for the caller to decode */
     int interrupt_fd;    /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */
     unsigned timeout_ms; /* to connect, start and shake hands; 0: 30 s */
@@ -104,7 +101,7 @@ FL_API void fl_connection_destroy(struct fl_connection *connection);
 FL_API void fl_connection_set_interrupt(struct fl_connection *connection, int interrupt_fd);
 /* From the call of fl_connect until the daemon was ready. */
 FL_API uint64_t fl_connection_start_ns(const struct fl_connection *connection);
-/* Private or on a Unix socket, and no link is asked for: bytes cost next to nothing. */
+/* Private or on a Unix socket: bytes cost next to nothing. */
 FL_API bool fl_connection_is_local(const struct fl_connection *connection);
 /* Frames of views may be asked for in H.264: the caller said so, and the daemon has an encoder for it. */
 FL_API bool fl_connection_can_h264(const struct fl_connection *connection);

@@ -62,7 +62,6 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_rend
         .encoding = render->encoding,
         .layers = render->layers != 0 ? render->layers : FL_LAYERS_PICTURE,
     };
-    fl_connection_fit_render(connection, render);
     render->kind = PROTOCOL_JOB_BATCH;
     render->scene = scene->scene;
     render->channel = job->channel;

@@ -85,7 +85,6 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
     struct message message = {.type = MESSAGE_RENDER, .render = *wanted};
     struct message_render *render = &message.render;
     fill_render(render, view);
-    fl_connection_fit_render(view->connection, render);
     const uint32_t eyes = render->views_across * render->views_down;
     struct asked *asked = &view->asked[view->asked_count];
     asked->request = fl_connection_next_request(view->connection);

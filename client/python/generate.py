@@ -1,23 +1,21 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Writes farlight/messages.py from the tables of protocol/, or says whether it is current.
+"""Writes messages.py, from the tables of protocol/, and version.py into a folder.
 
-Usage: generate.py [--check]. The C preprocessor reads the tables, as it does for the C side. A record or a message
-becomes a dataclass with the defaults of the table, an enumeration an IntEnum. A method of the package that takes fields of a
-message as keywords, and says so by @takes(messages.NAME_keywords), has a signature there with all of them.
+Usage: generate.py FOLDER. The C preprocessor ($CC or cc) reads the tables, as it does for the C side. A record or a
+message becomes a dataclass with the defaults of the table, an enumeration an IntEnum. A method of the package that takes
+fields of a message as keywords, and says so by @takes(messages.NAME_keywords), has a signature there with all of them.
 """
 import ast
 import keyword
+import os
 import pathlib
 import re
 import subprocess
 import sys
 import textwrap
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-TARGET = HERE / "farlight" / "messages.py"
-VERSION = HERE / "farlight" / "version.py"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q"}
 WIDTH = 120
 
@@ -58,8 +56,9 @@ def read(table, names):
         values = [argument if argument in STRINGS else f"#{argument}" for argument in arguments]
         source += f"#define {name}({', '.join(arguments)}) (\"{name}\", {', '.join(values)}),\n"
     source += f'#include "protocol/{table}"\n'
-    done = subprocess.run(["cc", "-E", "-P", "-I", str(ROOT), "-xc", "-"], input=source, capture_output=True, text=True,
-                          check=True)
+    compiler = os.environ.get("CC", "cc").split()
+    done = subprocess.run([*compiler, "-E", "-P", "-I", str(ROOT), "-xc", "-"], input=source, stdout=subprocess.PIPE,
+                          text=True, check=True)
     return ast.literal_eval(f"[{done.stdout}]")
 
 
@@ -244,7 +243,7 @@ def limits():
     return lines + [")"]
 
 
-def generate():
+def messages():
     head = ["# SPDX-License-Identifier: MIT",
             '"""Every message of the protocol. Written by generate.py from the tables of protocol/: change those instead.',
             "", "Enumerations accept their words, too: Render(tracer=\"ldc\").", '"""',
@@ -258,16 +257,15 @@ def generate():
     return "\n".join(head + enumerations() + structs(groups) + limits() + signatures(groups)) + "\n"
 
 
+def version():
+    number_ = re.search(r'FARLIGHT_VERSION "(.*)"', (ROOT / "protocol/version.h").read_text(encoding="utf-8"))[1]
+    return f'# SPDX-License-Identifier: MIT\n"""The version of farlight that this package belongs to."""\nVERSION = "{number_}"\n'
+
+
 def main():
-    made = generate()
-    if sys.argv[1:] == ["--check"]:
-        if not TARGET.exists() or TARGET.read_text(encoding="utf-8") != made:
-            sys.exit(f"{TARGET.relative_to(ROOT)} is out of date: run client/python/generate.py")
-        told = re.search(r'FARLIGHT_VERSION "(.*)"', (ROOT / "protocol/version.h").read_text(encoding="utf-8"))[1]
-        if f'VERSION = "{told}"' not in VERSION.read_text(encoding="utf-8"):
-            sys.exit(f"{VERSION.relative_to(ROOT)} is not {told}, the version of protocol/version.h")
-    else:
-        TARGET.write_text(made, encoding="utf-8")
+    folder = pathlib.Path(sys.argv[1])
+    (folder / "messages.py").write_text(messages(), encoding="utf-8")
+    (folder / "version.py").write_text(version(), encoding="utf-8")
 
 
 if __name__ == "__main__":

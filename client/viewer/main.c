@@ -298,7 +298,6 @@ static void fill(struct command_line *line)
     struct viewer_options *viewer = &line->viewer;
     viewer->server = job->server && job->server[0] != '\0' ? job->server : NULL;
     viewer->key_file = cli_key_file(viewer->server, job->key_file);
-    viewer->link = job->link;
     viewer->model = job->model;
     viewer->watch = job->watch;
     viewer->models = job->models;

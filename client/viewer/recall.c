@@ -44,7 +44,7 @@ static const char *text_of(enum recall_choice choice, int value)
     }
 }
 
-int recall_value(enum recall_choice choice, const struct settings *settings)
+static int recall_value(enum recall_choice choice, const struct settings *settings)
 {
     const int values[RECALL_COUNT] = {(int)settings->tracer, (int)settings->integrator, (int)settings->tone_map,
                                       settings->coarser,     (int)settings->local,      (int)settings->holes,

@@ -35,7 +35,6 @@ void recall_load(struct recall *recall, const char *path);
 bool recall_save(const struct recall *recall, const char *path, struct fl_error *error);
 
 /* A choice as a number, and back. */
-int recall_value(enum recall_choice choice, const struct settings *settings);
 void recall_apply(const struct recall *recall, struct settings *settings);
 /* Notes what is another than it was at first. */
 void recall_note(struct recall *recall, const struct settings *first, const struct settings *now);

@@ -136,7 +136,6 @@ static void *open_all(void *argument)
     const struct session_options *options = &session->options;
     const struct fl_connect_options connect = {.server = options->server,
                                                .key_file = options->key_file,
-                                               .link = options->link,
                                                .name = "farlight view",
                                                .can_h264 = true,
                                                .interrupt_fd = options->interrupt_fd,

@@ -9,9 +9,9 @@
 struct session;
 
 struct session_options {
-    const char *server, *key_file, *link; /* as of fl_connect_options */
-    const char *model, *environment;      /* that are loaded .. */
-    const struct fl_model *models;        /* several, as of fl_load_options */
+    const char *server, *key_file;   /* as of fl_connect_options */
+    const char *model, *environment; /* that are loaded .. */
+    const struct fl_model *models;   /* several, as of fl_load_options */
     size_t model_count;
     int input_fd; /* likewise */
     double environment_degrees, point_size;

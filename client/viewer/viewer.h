@@ -8,7 +8,7 @@
 #include "viewer/recall.h"
 
 struct viewer_options {
-    const char *server, *key_file, *link, *model, *environment, *scene_name; /* as of session_options */
+    const char *server, *key_file, *model, *environment, *scene_name; /* as of session_options */
     const struct fl_model *models;
     size_t model_count;
     int input_fd;

@@ -23,7 +23,6 @@ struct session *viewer_open_session(struct viewer *viewer, const char *dropped, 
     const struct viewer_options *options = viewer->options;
     const struct session_options session = {.server = options->server,
                                             .key_file = options->key_file,
-                                            .link = options->link,
                                             .model = dropped ? dropped : options->model,
                                             .models = dropped ? NULL : options->models,
                                             .model_count = dropped ? 0 : options->model_count,

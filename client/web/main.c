@@ -214,7 +214,6 @@ static bool complete(struct command_line *line, struct fl_error *error)
     line->gateway.seat = (struct seat_options){.job = job,
                                                .server = server,
                                                .key_file = cli_key_file(server, job->key_file),
-                                               .link = named(job->link),
                                                .scene = job->scene ? job->scene : cli_base_name(job->model),
                                                /* Of a model's daemon the thread tells that shares it. */
                                                .outage = job->model ? NULL : &line->outage};
@@ -229,7 +228,6 @@ static bool check_scene(const struct seat_options *seat, struct fl_error *error)
 {
     const struct fl_connect_options connect = {.server = seat->server,
                                                .key_file = seat->key_file,
-                                               .link = seat->link,
                                                .name = "farlight-web",
                                                .interrupt_fd = cli_interrupt_fd()};
     const struct cli_job *job = seat->job;

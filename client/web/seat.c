@@ -304,7 +304,6 @@ static bool come_to_scene(struct seat *seat, struct fl_error *error)
 {
     const struct fl_connect_options connect = {.server = seat->options.server,
                                                .key_file = seat->options.key_file,
-                                               .link = seat->options.link,
                                                .name = "farlight-web",
                                                .can_h264 = true,
                                                .interrupt_fd = seat->end_fd};

@@ -9,9 +9,9 @@
 #include "web/request.h"
 
 struct seat_options {
-    const char *server, *key_file, *link, *scene; /* as of fl_connect and fl_scene_attach */
-    const struct cli_job *job;                    /* its camera, and its options, which views begin with */
-    struct web_outage *outage;                    /* NULL: what happens to the daemon is told elsewhere */
+    const char *server, *key_file, *scene; /* as of fl_connect and fl_scene_attach */
+    const struct cli_job *job;             /* its camera, and its options, which views begin with */
+    struct web_outage *outage;             /* NULL: what happens to the daemon is told elsewhere */
     bool may_edit;
     void (*changed)(void *user); /* there is a parcel, or it has ended; from the thread */
     void *user;

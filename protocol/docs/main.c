@@ -45,17 +45,11 @@ static void print_capabilities(void)
            "a daemon "
            "with a key |\n"
            "| %d | of a reply of version 0: there may be a place later |\n"
-           "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n"
-           "| %d | `auto` of `primary` is known; without it in the reply, `auto` is refused by the daemon |\n"
-           "| %d | of a client: it takes frames of views in parts, if it asks for them; of a reply: they may come "
-           "|\n"
-           "| %d | the attachment `sticking` is known |\n"
-           "| %d | `scene_objects`, `object_get` and `base_revision` of `edit_begin` are known |\n\n",
+           "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will "
+           "|\n\n",
            __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
            __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_TRY_AGAIN),
-           __builtin_ctzll(HANDSHAKE_CAN_ABANDON), __builtin_ctzll(HANDSHAKE_CAN_CHOOSE_PRIMARY),
-           __builtin_ctzll(HANDSHAKE_CAN_SEND_PARTS), __builtin_ctzll(HANDSHAKE_CAN_MARK_STICKING),
-           __builtin_ctzll(HANDSHAKE_CAN_READ_OBJECTS));
+           __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
 }
 
 static void print_handshake(void)

@@ -73,7 +73,7 @@ bool sealed_key_read(struct sealed_key *key, const char *path, struct decode_err
     }
     close(fd);
     if (!ok) {
-        sealed_key_wipe(key);
+        sodium_memzero(key, sizeof(*key));
     }
     return ok;
 }
@@ -114,9 +114,4 @@ bool sealed_key_create(const char *path, struct decode_error *error)
         return invalid(error, path, strerror(why));
     }
     return true;
-}
-
-void sealed_key_wipe(struct sealed_key *key)
-{
-    sodium_memzero(key, sizeof(*key));
 }

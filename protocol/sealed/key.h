@@ -14,7 +14,6 @@ extern "C" {
 bool sealed_key_read(struct sealed_key *key, const char *path, struct decode_error *error);
 /* Makes a new key in a new file of mode 0600; one that is there is left alone. */
 bool sealed_key_create(const char *path, struct decode_error *error);
-void sealed_key_wipe(struct sealed_key *key);
 
 #ifdef __cplusplus
 }

@@ -59,8 +59,9 @@ bool animation_key_camera(const struct camera_key *key, const char *field, struc
 
 /* ---- orbit -------------------------------------------------------------------------------------- */
 
-bool animation_turn(struct frame_camera *camera, const float axis_world[3], const float centre_world[3],
-                    double angle)
+/* Turns a camera about an axis through a point, counterclockwise seen against the axis; false: the axis is 0. */
+static bool animation_turn(struct frame_camera *camera, const float axis_world[3], const float centre_world[3],
+                           double angle)
 {
     double axis[3], length = 0.0;
     for (int i = 0; i < 3; i++)

@@ -17,9 +17,6 @@
 double animation_time_s(const struct engine_job *job, uint32_t frame);
 /* Catmull-Rom through the keys in time; before the first and after the last it stands still. At least one key. */
 void animation_key_at(const struct camera_key *keys, uint32_t key_count, double time_s, struct camera_key *key);
-/* Turns a camera about an axis through a point, counterclockwise seen against the axis; false: the axis is 0. */
-bool animation_turn(struct frame_camera *camera, const float axis_world[3], const float centre_world[3],
-                    double angle);
 /* Errors that depend on neither the frame nor the scene. */
 bool animation_check(const struct engine_job *job, struct error *error);
 /* The scene's bounds at the job's time 0, for cameras that show the whole scene. They depend on the scene's

@@ -12,7 +12,6 @@
 #include <stdlib.h>
 
 #define QUEUE_CAPACITY_DEFAULT 1024
-#define FRAMES_IN_FLIGHT_DEFAULT 3
 /* Time for commands between two slices, so that a flood of commands does not stop the frames. */
 #define COMMANDS_NS UINT64_C(1500000)
 /* Maximum of commands that wait: the network side lets owners take turns at the places, so the fewer there are,
@@ -61,7 +60,8 @@ struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const c
     return event;
 }
 
-void engine_nudge(struct engine *engine)
+/* Any thread: there may be something to do. */
+static void engine_nudge(struct engine *engine)
 {
     /* One in the queue is enough. If the queue is full, that alone keeps the thread awake. */
     if (!atomic_exchange(&engine->nudged, true))
@@ -263,7 +263,7 @@ struct engine *engine_create(const struct engine_options *options, struct error 
     if (!engine->options.queue_capacity)
         engine->options.queue_capacity = QUEUE_CAPACITY_DEFAULT;
     if (!engine->options.frames_in_flight)
-        engine->options.frames_in_flight = FRAMES_IN_FLIGHT_DEFAULT;
+        engine->options.frames_in_flight = ENGINE_FRAMES_IN_FLIGHT;
     engine_set_limits(engine, &options->limits);
     if (!engine->options.frame_window_bytes)
         engine->options.frame_window_bytes = ENGINE_FRAME_WINDOW_BYTES;

@@ -49,11 +49,13 @@ struct engine_keeper {
     void (*forget)(void *context, uint64_t principal, const char *name);
 };
 
+#define ENGINE_FRAMES_IN_FLIGHT 3 /* the default */
+
 struct engine_options {
     struct gpu_options gpu;
     unsigned encode_threads;     /* 0: one per core, at most 4 */
     size_t queue_capacity;       /* commands and events; 0: 1024 */
-    uint32_t frames_in_flight;   /* per job, rendered and not yet fetched; 0: 3 */
+    uint32_t frames_in_flight;   /* per job, rendered and not yet fetched; 0: the default */
     uint64_t frame_window_bytes; /* the same in bytes of pixels, if that means fewer frames; at least one frame; 0:
                                     default */
     struct engine_limits limits;

@@ -185,7 +185,6 @@ void engine_post_done(struct engine *engine, uint64_t client, uint32_t request, 
 void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request, const struct error *error);
 void engine_post_device_gone(struct engine *engine);
 void engine_set_limits(struct engine *engine, const struct engine_limits *limits);
-void engine_nudge(struct engine *engine); /* any thread: there may be something to do */
 
 /* The error of a cancelled command; NULL: out of memory. */
 struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const char *why);

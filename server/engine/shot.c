@@ -11,7 +11,8 @@
 #define SHUTTER_MAX_S 1e6
 #define EXPOSURE_MAX_STOPS 64.0f
 
-uint64_t shot_seed(uint64_t job_seed, uint32_t frame)
+/* The same for frame 0 as for the job; for others another noise. */
+static uint64_t shot_seed(uint64_t job_seed, uint32_t frame)
 {
     /* The finaliser of MurmurHash3 (Appleby): one to one, and 0 for 0. */
     uint64_t mixed = frame;

@@ -24,8 +24,6 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
 bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
                const struct view_camera *from, struct animation_bounds *bounds, struct error *error);
 void shot_finish(struct shot *shot);
-/* The same for frame 0 as for the job; for others another noise. */
-uint64_t shot_seed(uint64_t job_seed, uint32_t frame);
 /* Whether a job can begin: checks what does not depend on the frame, and the first frame. `bounds` may be NULL. */
 bool shot_check(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
                 struct error *error);

@@ -116,11 +116,6 @@ bool gpu_texture_reserve_array(struct gpu_device *device, struct gpu_texture *te
     return reserve(device, texture, internal_format, width, height, layers > 0 ? layers : 1, error);
 }
 
-void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels)
-{
-    gpu_texture_write_rows(texture, format, type, 0, texture->height, texels);
-}
-
 void gpu_texture_write_rows(struct gpu_texture *texture, unsigned format, unsigned type, uint32_t first_row,
                             uint32_t rows, const void *texels)
 {

@@ -23,7 +23,6 @@ bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture,
 /* The same for an array of `layers` layers, at least 1. */
 bool gpu_texture_reserve_array(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
                                uint32_t width, uint32_t height, uint32_t layers, struct error *error);
-void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels);
 /* `texels`: of those rows. */
 void gpu_texture_write_rows(struct gpu_texture *texture, unsigned format, unsigned type, uint32_t first_row,
                             uint32_t rows, const void *texels);

@@ -129,16 +129,3 @@ uint64_t address_network(const struct address *address)
         network = network << 8 | host.s6_addr[i];
     return network;
 }
-
-bool address_same_host(const struct address *a, const struct address *b)
-{
-    if (a->storage.ss_family != b->storage.ss_family)
-        return false;
-    if (a->storage.ss_family == AF_INET)
-        return as_ipv4(a).sin_addr.s_addr == as_ipv4(b).sin_addr.s_addr;
-    if (a->storage.ss_family == AF_INET6) {
-        struct in6_addr host_a = as_ipv6(a).sin6_addr, host_b = as_ipv6(b).sin6_addr;
-        return memcmp(&host_a, &host_b, sizeof(host_a)) == 0;
-    }
-    return true;
-}

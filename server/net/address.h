@@ -22,8 +22,6 @@ void address_print(const struct address *address, char text[ADDRESS_TEXT_BYTES])
 bool address_is_unix(const struct address *address);
 bool address_is_loopback(const struct address *address); /* false for unix */
 const char *address_path(const struct address *address); /* of unix */
-/* Whether the hosts are the same; ports are ignored. Unix peers have no address: all are the same. */
-bool address_same_host(const struct address *a, const struct address *b);
 /* The number of the network that one owner usually has: an IPv4 address, the first half of an IPv6 address. 0 for
  * Unix. */
 uint64_t address_network(const struct address *address);

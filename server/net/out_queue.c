@@ -27,7 +27,7 @@ struct out_message *out_message_create(size_t head_bytes)
     return message;
 }
 
-size_t out_message_bytes(const struct out_message *message)
+static size_t out_message_bytes(const struct out_message *message)
 {
     return message->head_bytes + message->body_bytes + message->padding_bytes;
 }

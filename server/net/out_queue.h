@@ -38,7 +38,6 @@ struct out_message {
     uint8_t head[];
 };
 struct out_message *out_message_create(size_t head_bytes); /* NULL: out of memory */
-size_t out_message_bytes(const struct out_message *message);
 
 struct out_list {
     struct out_message *first, **end;

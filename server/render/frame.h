@@ -180,8 +180,6 @@ struct frame_scene;
 struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error);
 void frame_scene_destroy(struct frame_scene *shared); /* after its renderers; accepts NULL */
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared);
-/* For tests: how long a step of bringing a tracer to the scene may take; 0: the shortest that it can be cut to. */
-void frame_scene_set_step(struct frame_scene *shared, uint64_t step_ns);
 
 /* The resources of one viewer: the waves and the picture of one frame at a time, and the last one's samples. */
 struct frame_renderer;
@@ -212,17 +210,6 @@ void frame_abandon(struct frame_renderer *renderer);
 bool frame_step_waits(const struct frame_renderer *renderer);
 
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer); /* without what is shared */
-/* How many pixels a slice has and how many rays a wave may have; 0: chosen for the device. A wave that becomes
- * larger than that splits its slice, which costs time and never changes the picture. From the next frame on. */
-void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice_pixels, uint32_t wave_rays);
-/* For tests: whether pictures are copied from the device while it has other work, as is chosen for the device.
- * From the next frame on. */
-void frame_renderer_read_behind(struct frame_renderer *renderer, bool reads_behind);
-/* For tests: whether the passes of a slice are queued without waiting for the counts of its waves, as is chosen
- * for the device. From the next frame on. */
-void frame_renderer_queue_ahead(struct frame_renderer *renderer, bool queues_ahead);
-/* For tests: from the next frame on `impl` stands for that number of tracer_impl_by_number(); NULL: none does. */
-void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl);
 
 /* How a camera that sees all of some bounds is placed. Angles in radians. */
 struct frame_framing {

@@ -36,11 +36,6 @@ struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *
     return shared;
 }
 
-void frame_scene_set_step(struct frame_scene *shared, uint64_t step_ns)
-{
-    shared->step_ns = step_ns;
-}
-
 void frame_scene_destroy(struct frame_scene *shared)
 {
     if (!shared)
@@ -95,28 +90,6 @@ void frame_renderer_destroy(struct frame_renderer *renderer)
     denoise_history_finish(&renderer->history, renderer->device);
     key_view_finish(&renderer->key, renderer->device);
     free(renderer);
-}
-
-void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice_pixels, uint32_t wave_rays)
-{
-    renderer->wanted_slice_pixels = slice_pixels;
-    renderer->wanted_wave_rays = wave_rays;
-}
-
-void frame_renderer_read_behind(struct frame_renderer *renderer, bool reads_behind)
-{
-    renderer->reads_behind = reads_behind;
-}
-
-void frame_renderer_queue_ahead(struct frame_renderer *renderer, bool queues_ahead)
-{
-    renderer->queues_ahead = queues_ahead;
-}
-
-void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl)
-{
-    renderer->stand_in = impl;
-    renderer->stand_in_number = number;
 }
 
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)

@@ -80,7 +80,10 @@ static uint64_t time_of(unsigned query)
     return time_ns;
 }
 
-uint64_t slices_ahead_fixed_ns(struct slice_cost one, struct slice_cost other)
+/* A slice has a wave after the other, each as long as its longest ray takes, however few there are: in
+ * waves of many bounces that can be more than a step. The fixed part of what two slices of different sizes took,
+ * on a line through both; 0 if there is none. */
+static uint64_t slices_ahead_fixed_ns(struct slice_cost one, struct slice_cost other)
 {
     const struct slice_cost fewer = one.rays < other.rays ? one : other,
                             more = one.rays < other.rays ? other : one;

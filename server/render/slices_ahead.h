@@ -52,10 +52,6 @@ void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *sl
 /* What it learns of a slice that took so long. is_rest: it has fewer rays than were asked for, as a band of the
  * picture ended. */
 void slices_ahead_note(struct slices_ahead *ahead, struct slice_cost cost, bool is_rest, uint64_t step_ns);
-/* A slice has a wave after the other, each as long as its longest ray takes, however few there are: in
- * waves of many bounces that can be more than a step. The fixed part of what two slices of different sizes took,
- * on a line through both; 0 if there is none. */
-uint64_t slices_ahead_fixed_ns(struct slice_cost one, struct slice_cost other);
 /* How many rays the next slices have, after such a one: the device works about `step_ns` on each, or twice as long
  * as it takes anyway if that is more, so that half of its time at least goes into rays. */
 uint32_t slices_ahead_next_rays(struct slice_cost cost, uint64_t fixed_ns, uint64_t step_ns);

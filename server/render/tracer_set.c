@@ -12,7 +12,8 @@ void change_history_note(struct change_history *history, unsigned changed)
         history->last[__builtin_ctz(left)] = history->update_count;
 }
 
-unsigned change_history_since(const struct change_history *history, uint64_t update_count)
+/* Bits that changed after that many updates. */
+static unsigned change_history_since(const struct change_history *history, uint64_t update_count)
 {
     unsigned changed = 0;
     for (unsigned bit = 0; bit < sizeof(changed) * 8; bit++)

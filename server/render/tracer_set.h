@@ -12,8 +12,6 @@ struct change_history {
     uint64_t last[sizeof(unsigned) * 8]; /* by bit of enum scene_change: the number of the last such update */
 };
 void change_history_note(struct change_history *history, unsigned changed);
-/* Bits that changed after that many updates. */
-unsigned change_history_since(const struct change_history *history, uint64_t update_count);
 
 #define TRACERS_KEPT 4 /* of those that no frame uses the one that was used longest ago is replaced */
 

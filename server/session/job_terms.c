@@ -526,7 +526,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .keeps_rate = render->moving_rate > 0.0f,
         .depth = {(enum depth_form)render->depth_form, render->depth_pixels, render->depth_radius},
         .hidden_layers = render->hidden_layers,
-        .parts = render->parts != 0 && session->can_send_parts,
+        .parts = render->parts != 0,
         .margin = is_view ? render->margin : 0.0f,
     };
 }

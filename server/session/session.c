@@ -377,9 +377,6 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     session->can_abandon = hello->capabilities & HANDSHAKE_CAN_ABANDON;
     if (session->can_abandon)
         reply->capabilities |= HANDSHAKE_CAN_ABANDON;
-    session->can_send_parts = hello->capabilities & HANDSHAKE_CAN_SEND_PARTS;
-    reply->capabilities |= hello->capabilities & (HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_SEND_PARTS |
-                                                  HANDSHAKE_CAN_MARK_STICKING | HANDSHAKE_CAN_READ_OBJECTS);
     fill_limits(&reply->limits, session);
     snprintf(session->name, sizeof(session->name), "%s", hello->name);
     return reply->text[0] == '\0';

@@ -38,7 +38,6 @@ struct session {
     bool introduced;                 /* the hello is done: the engine may know it */
     bool can_h264;                   /* the client decodes it, and an encoder is here */
     bool can_abandon;                /* frames of views may end unfinished */
-    bool can_send_parts;             /* .. or come in parts, coarse first */
     struct engine_command *farewell; /* for when it is gone, which must not fail for lack of memory */
 
     struct requests requests;

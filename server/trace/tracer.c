@@ -181,9 +181,3 @@ bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct 
         progress = tracer_update_step(tracer, scene, update, STEP_WITHOUT_END, error);
     return progress == TRACER_DONE;
 }
-
-void tracer_outdate(struct tracer *tracer)
-{
-    tracer_update_abandon(tracer);
-    tracer->updated = false;
-}

@@ -231,8 +231,6 @@ void tracer_update_abandon(struct tracer *tracer);
 /* All steps at once. */
 bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct tracer_update *update,
                    struct error *error);
-/* The next update takes everything as changed. */
-void tracer_outdate(struct tracer *tracer);
 /* The rows of the structure, as of the last update. */
 void tracer_tell(const struct tracer *tracer, struct structure_rows *rows);
 

@@ -41,11 +41,6 @@ uint pack_unit_24(vec3 unit)
     return uint(p.x) & 0xfffu | (uint(p.y) & 0xfffu) << 12;
 }
 
-vec3 unpack_unit_24(uint bits)
-{
-    return unit_from_octahedral(vec2(bitfieldExtract(int(bits), 0, 12), bitfieldExtract(int(bits), 12, 12)) / 2047.0);
-}
-
 // struct hit's tangent: x 16 bits, y 15 bits, lowest bit set where the handedness is negative.
 // packSnorm2x16 puts y in the upper half; here x is the upper half and y's lowest bit is free.
 uint pack_tangent(vec3 unit, float handedness)

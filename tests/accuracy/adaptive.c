@@ -2,6 +2,7 @@
 /* Adaptive sampling: tiles stop when their error is below the limit, hold what a picture of so many samples holds,
  * and are as near to the truth as was asked for. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 enum { WIDTH = 64, HEIGHT = 32, ACROSS = WIDTH / 8, TILES = ACROSS * (HEIGHT / 8), SAMPLES_MAX = 1024 };

@@ -2,6 +2,7 @@
 /* Denoised pictures: nearer to the truth than noisy ones, the same where there is no noise, and as samples are
  * added the same in the end. That no scene is worse for it: tests/integration/test_pictures.py. */
 #include "tests/accuracy/path_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 ALL_TESTS(fixture_setup, fixture_teardown)

@@ -7,6 +7,7 @@
 #include "shared/layers.h"
 #include "render/layers.h"
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 #include <epoxy/gl.h>

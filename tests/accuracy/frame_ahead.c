@@ -6,6 +6,7 @@
 #include "render/frame_state.h"
 #include "render/layers.h"
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
 

@@ -2,6 +2,7 @@
 /* Renderers that share a scene on the device: frames that are stepped in turns show what each shows alone, and
  * none begins that would change what another one in progress looks at. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "render/frame_state.h"
 #include "tests/harness/test.h"
 

@@ -2,6 +2,7 @@
 /* A frame goes on in short steps, so that a cancel is served soon, whatever the integrator and however slow the
  * tracer; and how it is cut into steps is not seen in the picture. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 
 #include "render/frame_state.h"
 #include "trace/tracer.h"

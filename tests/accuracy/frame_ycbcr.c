@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Pictures that the device converts to Y'CbCr are those that it gives as RGBA8, converted. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/accuracy/ycbcr_exact.h"
 #include "tests/harness/test.h"
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Layers beside a picture's light, against what is known of simple scenes. */
 #include "tests/accuracy/sampled_scenes.h"
+#include "tests/fixtures/frame_hooks.h"
 
 #include "shared/layers.h"
 #include "trace/tracer.h"

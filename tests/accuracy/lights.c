@@ -3,6 +3,7 @@
  * meet, against those that are met alone; and how much noise is left. A material with a mask that cuts nothing out
  * looks the same and is not sampled as a light, so both are compared in one program. */
 #include "tests/accuracy/path_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 
 #include "scene/pose.h"
 #include "shared/path.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The integrator `path` in closed rooms that glow, where energy is known. */
 #include "tests/accuracy/path_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 /* ---- closed rooms ---- */

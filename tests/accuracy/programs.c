@@ -4,6 +4,7 @@
 #include "gpu/program_ahead.h"
 #include "protocol/tracers.h"
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 #include <stdio.h>

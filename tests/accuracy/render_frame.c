@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The order of a frame: both ways to the primary hits, slices and their splits, seeds, formats, cameras. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 #include "tests/fixtures/framing.h"
 

@@ -3,6 +3,7 @@
  * host's, and that a picture does not depend on how its samples were grouped, cut into slices or spread over
  * frames. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 
 #include "gpu/buffer.h"
 #include "render/pixel_filter.h"

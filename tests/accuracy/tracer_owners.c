@@ -2,6 +2,7 @@
 /* What a tracer depends on decides when it is brought to the scene and who owns it: the scene, a view, or the work
  * of a frame. Stand-ins that count what they are asked for answer as `naive` does. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 #include "render/frame_state.h"

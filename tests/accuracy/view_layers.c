@@ -2,6 +2,7 @@
 /* Pictures of eyes that are made from the layers of a key view, beside rendered ones. In place of the structure
  * stands one that knows all surfaces: what differs is then what the pictures of the layers lack. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 #include "render/frame_state.h"

@@ -2,6 +2,7 @@
 /* Frames whose waves are traced by two tracers: exact ones agree on every ray, and a tracer that is made wrong is
  * caught in the wave and in the class where it is wrong, whatever shading makes of it. */
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/frame_hooks.h"
 
 #include "shared/hit.h"
 #include "shared/ray.h"

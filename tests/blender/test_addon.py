@@ -17,7 +17,8 @@ import unittest.mock
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path[:0] = [str(HERE), str(ROOT / "client/python"), str(ROOT / "client/blender")]
+BUILD = os.path.abspath(sys.argv[sys.argv.index("--") + 1])
+sys.path[:0] = [str(HERE), f"{BUILD}/python", str(ROOT / "client/blender")]
 
 import bpy  # pylint: disable=wrong-import-position
 import numpy as np  # pylint: disable=wrong-import-position
@@ -968,7 +969,7 @@ class Elsewhere(Case):
 
 
 def main():
-    os.environ["FARLIGHT_LIBEXEC"] = os.path.abspath(sys.argv[sys.argv.index("--") + 1])
+    os.environ["FARLIGHT_LIBEXEC"] = BUILD
     names = sys.argv[sys.argv.index("--") + 2:]
     farlight_blender.register()
     loader = unittest.TestLoader()

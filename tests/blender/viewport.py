@@ -11,7 +11,8 @@ import traceback
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path[:0] = [str(ROOT / "client/python"), str(ROOT / "client/blender"), str(HERE)]
+BUILD = os.path.abspath(sys.argv[sys.argv.index("--") + 1])
+sys.path[:0] = [f"{BUILD}/python", str(ROOT / "client/blender"), str(HERE)]
 
 import bpy  # pylint: disable=wrong-import-position
 from mathutils import Euler  # pylint: disable=wrong-import-position
@@ -130,7 +131,7 @@ def step(state={"at": 0, "since": None}):  # pylint: disable=dangerous-default-v
         os._exit(1)
 
 
-os.environ["FARLIGHT_LIBEXEC"] = os.path.abspath(sys.argv[sys.argv.index("--") + 1])
+os.environ["FARLIGHT_LIBEXEC"] = BUILD
 bpy.context.preferences.view.show_splash = False
 clamps = []  # that views were asked for
 told = []  # what the viewport's engine has said

@@ -44,7 +44,6 @@ static void check_round_trip(const struct message *message, size_t payload_bytes
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static FILE *nowhere;
     struct scratch scratch;
     struct message message;
     struct decode_error error;
@@ -60,9 +59,5 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         return 0;
     }
     check_round_trip(&message, size - 2);
-    nowhere = nowhere ? nowhere : fopen("/dev/null", "w");
-    if (nowhere) {
-        message_print(nowhere, &message);
-    }
     return 0;
 }

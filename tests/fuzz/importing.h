@@ -16,7 +16,7 @@ typedef bool importing_fn(struct import_scene *scene, struct files *files, const
 static inline void import_any(importing_fn *import, const uint8_t *data, size_t size)
 {
     static struct import_scene scene;
-    struct files files = {.folder = -1, .model = -1, .environment = -1, .images = -1};
+    struct files files = {.folder = -1, .model = -1, .environment = -1};
     unsigned char *bytes = malloc(size + 1);
     FUZZ_REQUIRE(bytes);
     if (size > 0)

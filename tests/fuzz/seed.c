@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
  * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene, sessions in
- * FOLDER/session, frames in FOLDER/frame, models in FOLDER/aff, FOLDER/assimp, FOLDER/gltf, FOLDER/obj and
+ * FOLDER/session, frames in FOLDER/frame, models in FOLDER/assimp, FOLDER/gltf, FOLDER/obj and
  * FOLDER/nff. */
 #include <errno.h>
 #include <inttypes.h>
@@ -410,25 +410,12 @@ static const char nff_model[] =
     "f 1 0.5 0.2 0.8 0.2 20 0.1 1.5\ns 0 0 0 1\nc 0 0 0 1 0 2 0 0.5\np 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
     "pp 3\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n";
 
-static const char aff_model[] =
-    "% all of it\nb 0.5 0.5 1\nv\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 0.1\nresolution 8 8\nam 1 1 1\n"
-    "la lamp 0 5 0 1 1 1\nd 1\ni 1 missing.aff\nfm 0.1 0.1 0.1 0.5 0.5 0.5 0.2 0.2 0.2 20 0.5 1.5\n"
-    "xs 1 2 1 0 1 0 90 1 2 3 {\ns 0 0 0 1\nx thing {\nm vertices 3 0 0 0 1 0 0 0 1 0 normals 1 0 0 1\n"
-    "texturecoords 1 a.ppm 0 0 triangles 1 0 1 2 0 0 0 0 0 0\ntt a.ppm 0 0 0 0 0 1 0 0 1 0 0 1 0 0 1\n"
-    "ttp a.ppm 0 0 0 0 0 1 0 0 1 0 0 0 0 1 1 0 0 1 0 0 0 1 0 1\n"
-    "tpa 2 0 0 0 0 0 0 1 1 0 0 0 0 1 0 1 0 0 0 1 1 0 0 1 0 0 1 1 0 1 0 0 1 0 1 1 0 0 1\n}\n}\na 0 2 50\n"
-    "k thing { transl 4 -1 0 0 0 0 0 0 0 0 0 0 0.1 0.2 0.3 1 1 0 0 0 0 0 2 1 1 0 0 0 0\n"
-    "rot 4 -1 0 1 0 0 0 0 0 0 0 1 0 0 0 0 0 1 0 1 0 90 0 0 0 2 1 1 0 200 0 0 0\n"
-    "scale 4 -1 1 1 1 0 0 0 0 1 1 1 0 0 0 1 2 1 1 0 0 0 2 1 1 1 0 0 0 visibility 2 0 1 1 0 }\n"
-    "k camera { transl 4 0 0 0 5 0 0 0 0 0 0 5 0 0 0 1 0 0 6 0 0 0 2 0 0 5 0 0 0 }\n";
-
 static bool write_models(const char *folder)
 {
     for (int i = 0; i < (int)(sizeof(assimp_models) / sizeof(assimp_models[0])); i++)
         if (!seed_write_file(folder, "assimp", "model", i, assimp_models[i], strlen(assimp_models[i])))
             return false;
-    return seed_write_file(folder, "aff", "model", 0, aff_model, sizeof(aff_model) - 1) &&
-           seed_write_file(folder, "gltf", "model", 0, gltf_model, sizeof(gltf_model) - 1) &&
+    return seed_write_file(folder, "gltf", "model", 0, gltf_model, sizeof(gltf_model) - 1) &&
            seed_write_file(folder, "obj", "model", 0, obj_model, sizeof(obj_model) - 1) &&
            seed_write_file(folder, "nff", "model", 0, nff_model, sizeof(nff_model) - 1);
 }

@@ -22,7 +22,7 @@ from farlight_test import Case, Daemon, OneDaemon, bundled_scenes, frames_of, lo
 from test_animate import Cut
 from test_sealed import SealedDaemon
 
-PACKAGE = farlight_test.ROOT / "client/python"
+PACKAGE = farlight_test.BIN.absolute() / "python"
 DEBIANS = "/usr/lib/python3/dist-packages"
 sys.path.insert(0, str(PACKAGE))
 if not importlib.util.find_spec("numpy"):  # another python3 comes before Debian's

@@ -21,7 +21,7 @@ from test_python import DEBIANS, PACKAGE, STRAIGHT, begin, python, say, started,
 
 import numpy as np
 import farlight
-from farlight import decode, handshake, libraries, messages
+from farlight import decode, libraries, messages
 from farlight.core import Core
 
 SQUARE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], np.float64)
@@ -304,20 +304,6 @@ class WithDaemon(OneDaemon):
     async def read_async(self, name):
         async with await farlight.aio.connect(self.daemon.address) as client:
             return list((await client.read(await client.attach(name), farlight.ENVIRONMENT))[0].colour)
-
-    def test_an_older_daemon_is_not_asked_to_keep_an_image(self):
-        """It would not know the field, and drop the image."""
-        asked, why = started(say(messages.Ping(1)))
-        self.assertIsNone(why)
-        scene = asked.scene
-        scene.set(messages.SetEnvironment(colour=(1, 1, 1), keeps_image=1))
-        sent = bytes(asked.core.unsent())
-        with self.assertRaises(farlight.Refused) as raised:
-            for _ in asked.core.commit(scene):
-                pass
-        self.assertEqual(raised.exception.code, messages.ErrorCode.UNSUPPORTED)
-        self.assertEqual(bytes(asked.core.unsent()), sent)
-        self.assertFalse(asked.core.capabilities & handshake.CAN_READ_OBJECTS)
 
     @long_test
     def test_clips_of_a_file_are_played_by_their_objects(self):

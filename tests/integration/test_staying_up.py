@@ -210,9 +210,9 @@ class Reading(Case):
     def test_what_needs_a_restart_is_named_and_stays(self):
         self.config.write_text("")
         with self.daemon() as daemon:
-            self.config.write_text(f"[engine]\nqueue = 64\n[server]\ntrace_file = {self.folder}/trace\n")
+            self.config.write_text(f"[engine]\nencode_threads = 1\n[server]\ntrace_file = {self.folder}/trace\n")
             log = self.reload(daemon, READ_AGAIN)
-            for name in ("engine.queue", "server.trace_file"):
+            for name in ("engine.encode_threads", "server.trace_file"):
                 line = next(line for line in log.splitlines() if name in line)
                 self.assertIn("restart", line)
             self.assertFalse((self.folder / "trace").exists())

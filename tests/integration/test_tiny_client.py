@@ -17,7 +17,6 @@ STRAIGHT = ((0, 0, 5), (0, 0, 0), (0, 1, 0), 0.8)
 ABOVE, LEFT = ((0, 1, 5), (0, 0, 0), (0, 1, 0), 0.8), ((-1, 1, 5), (0, 0, 0), (0, 1, 0), 0.8)
 JPEG = 2  # encoding
 COLOURS, DEPTH, NORMALS, COARSE_DEPTH = 0, 1, 2, 3  # frame_part_kind
-TAKES_PARTS = 1 << 6  # capabilities
 GRID = 300  # 90,601 vertices: positions of more than a megabyte
 
 
@@ -341,7 +340,7 @@ class Session(Case):
 
     def test_every_prefix_of_parts_is_what_the_document_says(self):
         """The link seems to take long for each frame, so that they come in parts."""
-        client, (width, height) = self.connect(grid_scene(), capabilities=TAKES_PARTS), (96, 64)
+        client, (width, height) = self.connect(grid_scene()), (96, 64)
         fixed = fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, encoding=JPEG, quality=75,
                            still_encoding=JPEG, attachments=3, depth_form=1, depth_pixels=0.5, depth_radius=0.2, parts=1,
                            camera_path=tiny_client.CAMERA_PATH_KEYS, credit=99)

@@ -214,4 +214,11 @@ void add_box_mesh(struct test_edits *edits, uint32_t id);
 struct scene *scene_of_boxes(uint32_t count);
 void add_box(struct test_edits *edits, uint32_t node, float x, float y, float z);
 
+/* The next update takes everything as changed. */
+static inline void tracer_outdate(struct tracer *tracer)
+{
+    tracer_update_abandon(tracer);
+    tracer->updated = false;
+}
+
 #endif

@@ -42,7 +42,6 @@ class Connection:
         self._is_greeted = False
         self.failure: Error | None = None
         self.limits: dict[str, int] = {}
-        self.capabilities = 0
         self.daemon = ""
         self._changes: dict[int, int] = {}  # scene -> revision of another client's last change
         self._pending: dict[int, Pending] = {}
@@ -106,7 +105,7 @@ class Connection:
     def _take_reply(self) -> bool:
         reply = handshake.parse(self._in)
         if reply is not None:
-            self.limits, self.capabilities, self.daemon = reply.limits, reply.capabilities, reply.daemon
+            self.limits, self.daemon = reply.limits, reply.daemon
             del self._in[:reply.size]
             self._is_greeted = True
         return reply is not None

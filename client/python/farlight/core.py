@@ -7,7 +7,7 @@ import collections
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
-from . import fields, framing, handshake, messages
+from . import fields, framing, messages
 from .connection import UPLOAD_CHANNEL, Connection, Operation, refused
 from .errors import ConnectionLost, InvalidValue, ProtocolError, Refused
 from .fields import Bytes, Message
@@ -167,8 +167,6 @@ class Core(Connection):
         state.is_busy = True
         try:
             version, edits = scene.version, scene.edits_since(state.version)
-            if any(getattr(edit, "keeps_image", 0) for edit in edits):
-                self._check_reads_objects()  # an older one would drop the image
             payloads = [(edit.TYPE, fields.encode(edit)) for edit in edits]  # all are valid before the first is sent
             yield from self._upload(scene.blobs_of(edits))
             answer = yield from self._transact(messages.EditBegin(state.scene, base_revision), payloads)
@@ -188,17 +186,12 @@ class Core(Connection):
         state = self._scenes.get(scene)
         return self._changes.get(state.scene, 0) if state else 0
 
-    def _check_reads_objects(self) -> None:
-        if not self.capabilities & handshake.CAN_READ_OBJECTS:
-            raise Refused("the daemon is too old to tell of its objects", code=ErrorCode.UNSUPPORTED)
-
     def read(self, scene: Scene, thing: Object) -> Operation[tuple[Message, int]]:
         """An object as the daemon has it, and the scene's revision."""
         if not isinstance(thing, Object) or thing.kind not in READABLE:
             raise InvalidValue(f"{thing!r:.80} cannot be read; allowed: {', '.join(kind.word for kind in READABLE)}",
                                field="object")
         state = yield from self.open(scene)
-        self._check_reads_objects()
         answer, came = yield from self.ask(messages.ObjectGet(state.scene, thing.kind, thing.number),
                                            extra=READABLE[thing.kind])
         if came is None:
@@ -210,7 +203,6 @@ class Core(Connection):
                 name: str) -> Operation[list[messages.ObjectEntry]]:
         """Those of a kind, or those of a name."""
         state = yield from self.open(scene)
-        self._check_reads_objects()
         found: list[messages.ObjectEntry] = []
         at = 0
         while True:
@@ -240,9 +232,6 @@ class Core(Connection):
             len(self._jobs) < most or not any(self._will_end(job) for job in self._jobs.values())))
         self._channel += 1
         render.channel = self._channel
-        if not self.capabilities & handshake.CAN_CHOOSE_PRIMARY and render.primary in ("auto", messages.Primary.AUTO):
-            is_reference = render.tracer in ("reference", messages.Tracer.REFERENCE)
-            render.primary = messages.Primary.TRACE if is_reference else messages.Primary.RASTER
         fields.encode(render)
         request, pending = self._begin((messages.Ok,))
         # With the words as values, to compare what comes.

@@ -11,7 +11,7 @@ from .messages import ErrorCode
 
 VERSION = 1
 MAGIC = b"FARL"
-NEEDS_KEY, TRY_AGAIN, CAN_CHOOSE_PRIMARY, CAN_READ_OBJECTS = 1 << 2, 1 << 4, 1 << 5, 1 << 8  # bits of capabilities
+NEEDS_KEY, TRY_AGAIN = 1 << 2, 1 << 4  # bits of capabilities
 NAME_MAX_BYTES, LIMITS_MAX_BYTES, FIXED_BYTES = 64, 256, 48
 
 
@@ -20,7 +20,7 @@ def hello(name: str) -> bytes:
     encoded = name.encode("utf-8", "replace") if isinstance(name, str) else b"\0"
     if len(encoded) > NAME_MAX_BYTES or b"\0" in encoded:
         raise InvalidValue(f"{name!r} is not at most {NAME_MAX_BYTES} bytes without NUL", field="name")
-    made = MAGIC + VERSION.to_bytes(2, "little") * 2 + (CAN_CHOOSE_PRIMARY | CAN_READ_OBJECTS).to_bytes(8, "little")
+    made = MAGIC + VERSION.to_bytes(2, "little") * 2 + bytes(8)
     made += os.urandom(16) + bytes((len(encoded),)) + encoded
     return made + bytes(-len(made) % 8)
 
@@ -28,7 +28,6 @@ def hello(name: str) -> bytes:
 @dataclass(frozen=True)
 class Reply:
     """A daemon's, which lets us in; `size` bytes were it."""
-    capabilities: int
     limits: dict[str, int]
     daemon: str
     size: int
@@ -70,4 +69,4 @@ def parse(data: bytearray) -> Reply | None:
     if version != VERSION:
         raise Refused(texts[1] or f"the daemon chose version {version}", code=ErrorCode.VERSION,
                       retryable=bool(capabilities & TRY_AGAIN))
-    return Reply(capabilities, _limits(bytes(data[FIXED_BYTES:FIXED_BYTES + limits_bytes])), texts[0], at)
+    return Reply(_limits(bytes(data[FIXED_BYTES:FIXED_BYTES + limits_bytes])), texts[0], at)

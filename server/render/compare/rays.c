@@ -43,7 +43,7 @@ void error_histogram_add(struct error_histogram *histogram, float error)
         histogram->max = error;
 }
 
-void error_histogram_merge(struct error_histogram *into, const struct error_histogram *from)
+static void error_histogram_merge(struct error_histogram *into, const struct error_histogram *from)
 {
     if (from->count == 0)
         return;

@@ -46,7 +46,6 @@ struct error_histogram {
 };
 
 void error_histogram_add(struct error_histogram *histogram, float error);
-void error_histogram_merge(struct error_histogram *into, const struct error_histogram *from);
 /* The smallest value that at least `share` (0 to 1) of the errors do not exceed; 0 without errors. */
 float error_histogram_percentile(const struct error_histogram *histogram, double share);
 

@@ -35,7 +35,8 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
  * 2 N texels of each image on its way. Two samples of a column are one round; by parity all of a column are looked
  * at where a surface is passed. Two more of each part are those of what it collects for a shadow ray, and of the
  * search itself (abuffer/exact.glsl). */
-uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store)
+/* The most rounds of the traversal's loops that a ray can take. */
+static uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store)
 {
     const uint64_t parts = 12 * (uint64_t)store->voxels_along;
     const uint64_t columns = 3 * (2 * (uint64_t)store->resolution + parts);

@@ -11,8 +11,6 @@
 
 #include <stdbool.h>
 
-/* The most rounds of the traversal's loops that a ray can take. */
-uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store);
 /* What tracer_impl.trace_range and .surfaces do. Buffers of the scene are bound. A hit's distance is where the ray
  * meets the sample's plane, its surface that of the sample's own primitive at the place nearest to there. */
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,

@@ -12,7 +12,6 @@
 #include <stdint.h>
 
 #define ABUFFER_BLOCK_VOXELS 4u /* along a side */
-#define ABUFFER_VOXEL_PASSES (1 + RASTER_REACH_PASSES)
 
 /* Items of each pass. */
 uint32_t abuffer_voxel_blocks(const struct abuffer_store *store);

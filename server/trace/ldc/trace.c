@@ -50,7 +50,7 @@ static void bind(struct ldc_store *store, bool cells)
 /* Of each cube, with R cells along a side and at most L samples in a texel: a ray passes 3 R cells, 3 R / 4 blocks
  * and 3 R / 16 nodes, each step on to the next; in a cell it tests what its three texels have. Image by image it
  * is less: 2 R texels of each image and the nodes above them, down to each and on from it. */
-uint64_t ldc_rounds_of_a_ray(const struct ldc_store *store)
+static uint64_t ldc_rounds_of_a_ray(const struct ldc_store *store)
 {
     uint64_t rounds = 0;
     for (unsigned i = 0; i < LDC_CUBES_MAX; i++)

@@ -11,8 +11,6 @@
 
 #include <stdbool.h>
 
-/* The most rounds of the traversal's loops that a ray can take. */
-uint64_t ldc_rounds_of_a_ray(const struct ldc_store *store);
 /* Closest hits: intersections, of which `instance` is HIT_NO_PRIMITIVE - 1 for a sample, whose number `primitive`
  * is, and HIT_NO_PRIMITIVE for a disc; ldc_surfaces() makes hits of them. Any hits: transmittances. Cubes with
  * resolution 0 are passed over. */

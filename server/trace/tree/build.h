@@ -129,13 +129,10 @@ bool bvh_is_packed(const struct bvh_form *settings);
 uint32_t bvh_element_words(const struct bvh_form *settings); /* uint32_t of one element of one copy */
 size_t bvh_element_bytes(const struct bvh_form *settings);   /* of one element in all copies */
 
-/* Bounds are padded outward by BVH_PAD_RELATIVE of their magnitude, so that the rounding of the traversal's
- * arithmetic cannot lose a hit (shaders/tree/slack.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
-bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
-                    struct error *error);
-/* The same in two steps, between which it is known how large the arrays are: all but these; then both, to where
- * the caller says, which may be the device's memory: nothing is read there. Stopped, the second one writes a part.
- */
+/* Two steps, between which it is known how large the arrays are: all but these; then both, to where the caller
+ * says, which may be the device's memory: nothing is read there. Stopped, the second one writes a part. Bounds are
+ * padded outward by BVH_PAD_RELATIVE of their magnitude, so that the rounding of the traversal's arithmetic cannot
+ * lose a hit (shaders/tree/slack.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
 bool bvh_tree_plan(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                    struct error *error);
 void bvh_tree_write(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,

@@ -409,20 +409,6 @@ bool bvh_tree_alloc(struct bvh_tree *tree, const struct bvh_form *settings)
     return tree->elements && tree->primitives;
 }
 
-bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
-                    struct error *error)
-{
-    if (!bvh_tree_plan(tree, shape, settings, error))
-        return false;
-    if (bvh_tree_alloc(tree, settings)) {
-        bvh_tree_write(tree, shape, settings, tree->elements, tree->primitives);
-        return true;
-    }
-    bvh_tree_finish(tree);
-    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tree over %u primitives",
-                     shape->primitive_count);
-}
-
 void bvh_tree_finish(struct bvh_tree *tree)
 {
     free_draft(tree);

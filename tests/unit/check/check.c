@@ -5,6 +5,7 @@
 #include "check/tracers.h"
 #include "protocol/tracers.h"
 #include "tests/fixtures/device.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 #include "trace/tracer.h"
 

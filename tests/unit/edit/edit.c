@@ -9,7 +9,6 @@
 
 /* What the played daemon does, and what it has. */
 static struct {
-    bool old;              /* it knows no questions about objects */
     unsigned conflicts;    /* commits that come too late */
     uint32_t wrong_object; /* added to an identifier that is read */
     bool stuck;            /* its list comes to no end */
@@ -107,7 +106,7 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
 
 static void play(struct daemon *daemon)
 {
-    greet_with(daemon, world.old ? 0 : HANDSHAKE_CAN_READ_OBJECTS);
+    greet(daemon);
     while (take(daemon))
         answer(daemon, header.request, &asked);
 }
@@ -205,14 +204,6 @@ TEST(an_object_is_known_by_name_number_identifier_and_pattern)
     assert_int_equal(read.revision, 10);
     assert_false(fl_scene_read(scene, PROTOCOL_OBJECT_MESH, 1, &read, &error));
     check_error(FL_ERROR_ARGUMENT, "no fields");
-}
-
-TEST(an_older_daemon_is_reported_before_it_is_asked)
-{
-    world.old = true;
-    come();
-    assert_false(edit("material.steel.roughness=1", NULL));
-    check_error(FL_ERROR_REFUSED, "cannot say what a scene has");
 }
 
 TEST(a_daemon_that_says_what_makes_no_sense_is_reported)

@@ -3,6 +3,7 @@
 #include "engine/backend.h"
 #include "engine/view_wishes.h"
 #include "tests/fixtures/structure.h"
+#include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 #include "tests/fixtures/framing.h"
 

@@ -10,9 +10,9 @@
 #include <stdlib.h>
 
 typedef int fuzz_one_fn(const uint8_t *data, size_t size);
-fuzz_one_fn fuzz_one_aff, fuzz_one_assimp, fuzz_one_environment, fuzz_one_gltf, fuzz_one_nff, fuzz_one_obj,
-    fuzz_one_threemf, fuzz_one_coarse_depth, fuzz_one_codec, fuzz_one_frame, fuzz_one_framing, fuzz_one_handshake,
-    fuzz_one_request, fuzz_one_scene, fuzz_one_sealed, fuzz_one_session, fuzz_one_transaction, fuzz_one_warp;
+fuzz_one_fn fuzz_one_assimp, fuzz_one_environment, fuzz_one_gltf, fuzz_one_nff, fuzz_one_obj, fuzz_one_threemf,
+    fuzz_one_coarse_depth, fuzz_one_codec, fuzz_one_frame, fuzz_one_framing, fuzz_one_handshake, fuzz_one_request,
+    fuzz_one_scene, fuzz_one_sealed, fuzz_one_session, fuzz_one_transaction, fuzz_one_warp;
 
 /* In a block of its own size, so that a sanitizer sees a read beyond it. */
 static uint8_t *read_file(const char *path, size_t *size_bytes)
@@ -74,11 +74,6 @@ TEST(framing)
 TEST(obj)
 {
     run("obj", fuzz_one_obj);
-}
-
-TEST(aff)
-{
-    run("aff", fuzz_one_aff);
 }
 
 TEST(assimp)

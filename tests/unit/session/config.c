@@ -198,13 +198,14 @@ TEST(what_is_taken_at_the_start_stays_and_the_rest_is_read_again)
     struct error error = {0};
     config_defaults(&config);
     config_defaults(&next);
-    assert_true(read_text(&next,
-                          "[server]\nlisten = tcp:127.0.0.1:1\nlog_level = error\n[engine]\nqueue = 99\n[memory]\n"
-                          "scene = 2M\ndevice = 3M\n[limits]\nrequests = 3\n[network]\nidle = 7\n",
-                          &error));
+    assert_true(
+        read_text(&next,
+                  "[server]\nlisten = tcp:127.0.0.1:1\nlog_level = error\n[engine]\nencode_threads = 9\n[memory]\n"
+                  "scene = 2M\ndevice = 3M\n[limits]\nrequests = 3\n[network]\nidle = 7\n",
+                  &error));
     config_keep_start(&next, &config);
     assert_string_equal(next.listen, config.listen);
-    assert_int_equal(next.engine_queue, config.engine_queue);
+    assert_int_equal(next.encode_threads, config.encode_threads);
     assert_int_equal(next.device_bytes, config.device_bytes);
     assert_int_equal(next.log_level, LOG_ERROR);
     assert_int_equal(next.scene_bytes, 2 << 20);

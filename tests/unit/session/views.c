@@ -482,12 +482,6 @@ SESSION_TEST(a_frame_that_is_still_needed_is_not_abandoned)
     assert_true(is_abandoned(3, 8, ENCODING_JPEG, 9, true));
 }
 
-TEST_WITH(a_daemon_says_that_it_can_choose_first_hits_and_mark_what_sticks, set_up_ungreeted, tear_down)
-{
-    const uint64_t both = HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_MARK_STICKING;
-    assert_int_equal(greet_with(both), both);
-}
-
 TEST_WITH(a_client_that_does_not_allow_abandoned_frames_gets_complete_frames, set_up_ungreeted, tear_down)
 {
     assert_int_equal(greet_with(0) & HANDSHAKE_CAN_ABANDON, 0);
@@ -523,9 +517,8 @@ static void say_parts(uint32_t request, uint32_t number, uint64_t command, size_
     port_say(made);
 }
 
-static struct engine_command *start_view_in_parts(uint64_t capabilities, uint32_t credit)
+static struct engine_command *start_view_in_parts(uint32_t credit)
 {
-    assert_int_equal(greet_with(capabilities) & HANDSHAKE_CAN_SEND_PARTS, capabilities & HANDSHAKE_CAN_SEND_PARTS);
     open_scene(1, 1);
     struct message message = view_message(credit);
     message.render.parts = 1;
@@ -558,18 +551,10 @@ static size_t take_cut(uint32_t number)
     return came_bytes;
 }
 
-TEST_WITH(only_a_client_that_takes_parts_gets_them, set_up_ungreeted, tear_down)
-{
-    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_ABANDON, 8);
-    assert_false(start->job.parts); /* and what is no frame in parts begins as it ever did */
-    say_frame(2, 0, 1);
-    take_frame(2, 0);
-}
-
 /* It is shown, so that it uses credit; and the motion that it gives way to does not wait. */
-TEST_WITH(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come, set_up_ungreeted, tear_down)
+SESSION_TEST(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come)
 {
-    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_SEND_PARTS, 1);
+    struct engine_command *start = start_view_in_parts(1);
     assert_true(start->job.parts);
     say_parts(2, 0, 0, 10000);
     expect_parts(2, 0);
@@ -585,10 +570,10 @@ TEST_WITH(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come, 
 }
 
 /* The second colours are more than sockets and queues hold, so that they are under way. */
-TEST_WITH(a_picture_of_motion_that_a_newer_one_overtakes_ends_with_the_part_under_way, set_up_ungreeted, tear_down)
+SESSION_TEST(a_picture_of_motion_that_a_newer_one_overtakes_ends_with_the_part_under_way)
 {
     const size_t second_bytes = LARGE_FRAME_BYTES - (1 << 20);
-    start_view_in_parts(HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_SEND_PARTS, 8);
+    start_view_in_parts(8);
     say_parts(2, 0, 1, second_bytes);
     expect_parts(2, 0);
     say_frame(2, 1, 3);
@@ -608,18 +593,18 @@ TEST_WITH(a_picture_of_motion_that_a_newer_one_overtakes_ends_with_the_part_unde
 }
 
 /* Refinement that nothing better waits for is sent. */
-TEST_WITH(a_frame_in_parts_comes_whole_if_nothing_overtakes_it, set_up_ungreeted, tear_down)
+SESSION_TEST(a_frame_in_parts_comes_whole_if_nothing_overtakes_it)
 {
-    start_view_in_parts(HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_SEND_PARTS, 8);
+    start_view_in_parts(8);
     say_parts(2, 0, 1, 10000);
     expect_parts(2, 0);
     send_camera(5, true); /* no picture of it is there */
     assert_int_equal(take_cut(0), LARGE_FRAME_BYTES);
 }
 
-TEST_WITH(frames_are_wished_in_parts_where_the_link_takes_long_for_them, set_up_ungreeted, tear_down)
+SESSION_TEST(frames_are_wished_in_parts_where_the_link_takes_long_for_them)
 {
-    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_SEND_PARTS, 100);
+    struct engine_command *start = start_view_in_parts(100);
     clock_stop();
     say_frame(2, 0, 1);
     take_frame(2, 0);

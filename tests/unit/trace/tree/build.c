@@ -79,8 +79,10 @@ static struct bvh_tree build(const struct input *input, const struct bvh_form *s
 {
     struct bvh_tree tree;
     struct error error = {0};
-    if (!bvh_tree_build(&tree, &input->shape, settings, &error))
+    if (!bvh_tree_plan(&tree, &input->shape, settings, &error))
         fail_msg("not built: %s", error.text);
+    assert_true(bvh_tree_alloc(&tree, settings));
+    bvh_tree_write(&tree, &input->shape, settings, tree.elements, tree.primitives);
     return tree;
 }
 
@@ -587,7 +589,7 @@ TEST(a_shape_without_primitives_is_refused)
 {
     struct bvh_tree tree;
     struct error error = {0};
-    assert_false(bvh_tree_build(&tree, &(struct bvh_shape){0}, &(struct bvh_form){.threads = 1}, &error));
+    assert_false(bvh_tree_plan(&tree, &(struct bvh_shape){0}, &(struct bvh_form){.threads = 1}, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_null(tree.elements);
 }
