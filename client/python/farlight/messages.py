@@ -104,6 +104,14 @@ class Layer(Word):
     TRANSMISSION = 20  # light that comes through the first surface where that is glass
     EMISSION = 21  # light that the first surface sends out itself; also the colour of unlit ones
     BACKGROUND = 22
+    LIGHT_REST = 23
+    LIGHT_GROUP1 = 24
+    LIGHT_GROUP2 = 25  # likewise, 2
+    LIGHT_GROUP3 = 26  # likewise, 3
+    LIGHT_GROUP4 = 27  # likewise, 4
+    LIGHT_GROUP5 = 28  # likewise, 5
+    LIGHT_GROUP6 = 29  # likewise, 6
+    LIGHT_GROUP7 = 30  # likewise, 7
 
 
 class Attachment(Word):
@@ -1427,6 +1435,8 @@ class SetNode(Message):
     parent_from_node: 3x4 row-major
     skin: for a mesh with joints: the skin that moves it, which has every joint that the mesh refers to; the joints
         alone place its vertices, whatever the node's own transform. A mesh without joints is not moved. 0: none
+    light_group: of the layers light_group1 and so on, which lights and glowing surfaces here and below belong to; 0:
+        that of the parent, at the root none
     weights: of the mesh's morph targets, missing ones are 0, further ones do nothing; none at all: the mesh's own
     """
     TYPE: ClassVar[int] = 0x0130
@@ -1440,6 +1450,7 @@ class SetNode(Message):
         _f.whole("hidden", "I", 0, 1),
         _f.real("parent_from_node", -1e12, 1e12, 12),
         _f.whole("skin", "I", 0, 4294967295),
+        _f.whole("light_group", "I", 0, 7),
         _f.array("weights", MorphWeight, 1024),
         _f.text("name", 128),
     )
@@ -1450,6 +1461,7 @@ class SetNode(Message):
     hidden: int = 0
     parent_from_node: Sequence[float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     skin: int = 0
+    light_group: int = 0
     weights: Sequence[MorphWeight] = ()
     name: str = ""
 
@@ -1775,6 +1787,7 @@ class SetEnvironment(Message):
     display_values: 1: the colours of the scene are a display's values, and light is computed with them as they are:
         pictures of 8 bits show it without a tone map and a transfer function, floats are the light that a display emits
         for it
+    light_group: of the layers light_group1 and so on, which its light belongs to, also that of the default sky; 0: none
     arrays: 0: equirectangular image, width x height x 4 half floats (red, green, blue, unused); rows from +y down, the
         middle column is -z
     """
@@ -1789,6 +1802,7 @@ class SetEnvironment(Message):
         _f.whole("backdrop", "I", 0, 1),
         _f.whole("keeps_image", "I", 0, 1),
         _f.whole("display_values", "I", 0, 1),
+        _f.whole("light_group", "I", 0, 7),
         _f.array("arrays", BlobRef, 1),
     )
     colour: Sequence[float] = (0.0, 0.0, 0.0)
@@ -1798,6 +1812,7 @@ class SetEnvironment(Message):
     backdrop: int = 0
     keeps_image: int = 0
     display_values: int = 0
+    light_group: int = 0
     arrays: Sequence[BlobRef] = ()
 
 
@@ -2091,7 +2106,7 @@ class Render(Message):
         _f.real("ao_falloff", 0.0, 64.0),
         _f.whole("ao_rays", "I", 1, 256),
         _f.real("layer_opacity", 1e-6, 1.0),
-        _f.whole("layers", "I", 0, 268435455),
+        _f.whole("layers", "I", 0, 2147483647),
         _f.choice("bvh_form", TracerForm),
         _f.whole("ldc_resolution", "I", 16, 4096, zero=True),
         _f.choice("ldc_form", TracerForm),
@@ -2357,7 +2372,7 @@ class FrameBegin(Message):
         _f.real("aperture", 0.0, 1e6),
         _f.real("focus", 0.0, 1e12),
         _f.real("shutter_s", 0.0, 1e6),
-        _f.whole("layers", "I", 1, 268435455),
+        _f.whole("layers", "I", 1, 2147483647),
         _f.whole("command", "Q", 0, 18446744073709551615),
         _f.whole("received_ns", "Q", 0, 18446744073709551615),
         _f.whole("applied_ns", "Q", 0, 18446744073709551615),
