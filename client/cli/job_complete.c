@@ -456,7 +456,7 @@ static bool complete_scene(struct cli_job *job)
     if (job->light_group_count > 0) {
         cli_usage(job, "--light-group", "cannot go with --scene: it would change the scene of all its clients");
         return fl_error_remedy(&job->error, "'farlight edit' sets light_group of its nodes, and --layers "
-                                            "light_group1,light_rest and so on has them");
+                                            "beauty,light_group has all of them");
     }
     if (job->edit_count > 0) {
         cli_usage(job, "--edit", "cannot go with --scene: it would change the scene of all its clients");

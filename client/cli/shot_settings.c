@@ -118,7 +118,7 @@ static bool apply_groups(const struct shot_reader *reader, const struct shot_val
     json_object_foreach((json_t *)(uintptr_t)at->value, name, nodes)
     {
         char words[2048], text[2200];
-        if (!joined(nodes, words, sizeof(words)))
+        if (strchr(name, '=') || !joined(nodes, words, sizeof(words)))
             return wrong_type(reader, at, setting);
         snprintf(text, sizeof(text), "%s=%s", name, words);
         if (cli_job_set(reader->job, setting->option, text) != 0) {
