@@ -26,7 +26,8 @@
 #define LAYER_BIT_BACKGROUND (1u << 22)
 #define LAYER_BITS_LIGHT_PARTS (0x7fu << 16) /* parts of the beauty: render/light_layers.glsl */
 #define LAYER_BIT_LIGHT_REST (1u << 23)
-#define LAYER_BITS_LIGHT_GROUPS (0xffu << 23) /* the same by where light comes from: the rest, then groups from 1 on */
+#define LAYER_BITS_LIGHT_GROUPS                                                                                   \
+    (0xffu << 23) /* the same by where light comes from: the rest, then groups from 1 on */
 #define LAYER_BITS_LIGHT (LAYER_BITS_LIGHT_PARTS | LAYER_BITS_LIGHT_GROUPS)
 #define LAYER_BITS_ALL (LAYER_BITS_SEEN | LAYER_BITS_CRYPTO | LAYER_BITS_LIGHT)
 /* Of an attachment, which no layer beside the beauty goes with: no LAYER. */
