@@ -223,6 +223,8 @@ struct cli_clip {
 };
 #define CLI_CLIPS_MAX 15 /* the protocol's, and one of our own */
 #define CLI_EDITS_MAX 64
+#define CLI_LIGHT_GROUPS 7
+#define CLI_LIGHT_GROUP_NAME 32 /* bytes */
 
 /* Several views in a picture, as typed. */
 struct cli_views {
@@ -291,6 +293,8 @@ struct cli_job {
     const char *framed;                         /* node that it shows, name or number; NULL: all */
     bool float_pixels, half_pixels, dwaa, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
         is_orbit;
+    char light_groups[CLI_LIGHT_GROUPS][CLI_LIGHT_GROUP_NAME]; /* their names; their nodes are in `edits` */
+    unsigned light_group_count;
     const char *colour_space, *display_view, *ocio; /* NULL: none */
     bool has_samples, auto_samples;                 /* --samples auto */
     bool without_studio;                            /* --studio off */

@@ -75,23 +75,35 @@ static bool is_linear(enum cli_image image)
     return image == CLI_IMAGE_EXR || image == CLI_IMAGE_HDR;
 }
 
+/* Beside the layers of --layers, which are the picture where it is not given. */
+static void add_light_groups(struct cli_job *job)
+{
+    struct message_render *wanted = &job->options;
+    if (job->light_group_count == 0)
+        return;
+    wanted->layers |= wanted->layers == 0 ? 1u << PROTOCOL_LAYER_BEAUTY : 0;
+    wanted->layers |= ((2u << job->light_group_count) - 1) << PROTOCOL_LAYER_LIGHT_REST;
+}
+
 /* Of all formats only EXR has named channels; half floats are not precise enough for their contents. */
 static bool complete_layers(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
     const uint64_t bytes =
         (uint64_t)wanted->width * wanted->views_across * wanted->height * wanted->views_down * 16;
+    const char *option = wanted->layers == 0 ? "--light-group" : "--layers";
+    add_light_groups(job);
     if (wanted->layers == 0)
         return true;
     for (size_t i = 0; i < job->output_count; i++) {
         if (job->outputs[i].image == CLI_IMAGE_EXR)
             continue;
-        cli_usage(job, job->outputs[i].path, "%s files do not have the layers of --layers",
-                  cli_image_name(job->outputs[i].image));
-        return fl_error_remedy(&job->error, "write an .exr file, or leave out --layers");
+        cli_usage(job, job->outputs[i].path, "%s files do not have the layers of %s",
+                  cli_image_name(job->outputs[i].image), option);
+        return fl_error_remedy(&job->error, "write an .exr file, or leave out %s", option);
     }
     if (wanted->encoding == PROTOCOL_ENCODING_JPEG) {
-        cli_usage(job, "--encoding", "jpeg does not carry the layers of --layers");
+        cli_usage(job, "--encoding", "jpeg does not carry the layers of %s", option);
         return fl_error_remedy(&job->error, "choose raw, zstd or predicted");
     }
     if (bytes * (unsigned)__builtin_popcount(wanted->layers) > FRAME_BYTES_MAX) {
@@ -441,6 +453,11 @@ static bool complete_scene(struct cli_job *job)
         return job->model || cli_usage(job, "MODEL", "no model file is named") == 0;
     if (job->model)
         return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other", job->model) == 0;
+    if (job->light_group_count > 0) {
+        cli_usage(job, "--light-group", "cannot go with --scene: it would change the scene of all its clients");
+        return fl_error_remedy(&job->error, "'farlight edit' sets light_group of its nodes, and --layers "
+                                            "beauty,light_group has all of them");
+    }
     if (job->edit_count > 0) {
         cli_usage(job, "--edit", "cannot go with --scene: it would change the scene of all its clients");
         return fl_error_remedy(&job->error, "'farlight edit' does that");

@@ -54,6 +54,7 @@ enum key {
     KEY_CLIP_START,
     KEY_CLIP_SPEED,
     KEY_LAYERS,
+    KEY_LIGHT_GROUP,
     KEY_RETRY_FOR,
     KEY_RETRIES,
     KEY_METADATA,
@@ -138,6 +139,13 @@ static const struct argp_option special[] = {
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown, "
      "crypto-object and crypto-material (Cryptomatte, with names), motion (vectors to the next frame and the one "
      "before); light: the parts that add up to the beauty",
+     CLI_GROUP_OUTPUT},
+    {"light-group", KEY_LIGHT_GROUP, "NAME=NODE,..", 0,
+     "Give an EXR file the layer light_NAME: the light of these nodes and what is below them, lights and surfaces "
+     "that "
+     "glow, and of `environment`; * stands for any characters. May be repeated: up to 7 groups, which add up to "
+     "the "
+     "picture with light_rest, all other light",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",
@@ -276,6 +284,66 @@ static error_t add_edit(struct cli_job *job, const char *field, const char *valu
     if (job->edit_count == CLI_EDITS_MAX)
         return cli_usage(job, field, "more than %d assignments cannot be given", CLI_EDITS_MAX);
     return fl_assignment_parse(value, &job->edits[job->edit_count++], &job->error) ? 0 : EINVAL;
+}
+
+/* "key" of "key=Sun,Lamp*": the group's number, a new one if the name is new; 0: it cannot be. */
+static unsigned light_group_of(struct cli_job *job, const char *value, size_t length)
+{
+    char name[CLI_LIGHT_GROUP_NAME];
+    snprintf(name, sizeof(name), "%.*s", (int)(length < sizeof(name) ? length : sizeof(name)), value);
+    for (unsigned i = 0; i < job->light_group_count; i++)
+        if (strcmp(job->light_groups[i], name) == 0)
+            return i + 1;
+    if (job->light_group_count == CLI_LIGHT_GROUPS)
+        return 0;
+    memcpy(job->light_groups[job->light_group_count++], name, sizeof(name));
+    return job->light_group_count;
+}
+
+static error_t add_to_group(struct cli_job *job, const char *field, unsigned group, const char *node)
+{
+    if (job->edit_count == CLI_EDITS_MAX)
+        return cli_usage(job, field, "with all of --edit more than %d names cannot be given", CLI_EDITS_MAX);
+    struct fl_assignment *edit = &job->edits[job->edit_count];
+    const bool is_environment = strcmp(node, "environment") == 0;
+    *edit = (struct fl_assignment){.kind = is_environment ? PROTOCOL_OBJECT_ENVIRONMENT : PROTOCOL_OBJECT_NODE,
+                                   .field = "light_group",
+                                   .count = 1,
+                                   .values = {group}};
+    if (node[0] == '\0' || strlen(node) >= sizeof(edit->which))
+        return cli_usage(job, field, "'%s' is no name of a node", node);
+    snprintf(edit->which, sizeof(edit->which), "%s", node);
+    job->edit_count++;
+    return 0;
+}
+
+/* Nodes are edited to be in the group once the scene is there; its name is for the file alone. */
+static error_t set_light_group(struct cli_job *job, const char *field, const char *value)
+{
+    static const char allowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
+    const size_t length = strspn(value, allowed);
+    if (value[length] != '=' || length == 0 || length >= CLI_LIGHT_GROUP_NAME) {
+        cli_usage(job, field, "'%s' is no light group, such as key=Sun,Lamp*", value);
+        return fl_error_remedy(&job->error, "name it with up to %d letters, digits and _, and after = its nodes",
+                               CLI_LIGHT_GROUP_NAME - 1)
+                   ? 0
+                   : EINVAL;
+    }
+    if (strncmp(value, "rest=", 5) == 0)
+        return cli_usage(job, field, "'rest' is the layer of all other light: choose another name");
+    const unsigned group = light_group_of(job, value, length);
+    if (group == 0)
+        return cli_usage(job, field, "'%s' is one group too many: there may be %d", value, CLI_LIGHT_GROUPS);
+    for (const char *at = value + length; *at != '\0';) {
+        char node[160];
+        const size_t bytes = strcspn(++at, ",");
+        snprintf(node, sizeof(node), "%.*s", (int)(bytes < sizeof(node) ? bytes : sizeof(node)), at);
+        const error_t status = add_to_group(job, field, group, node);
+        if (status != 0)
+            return status;
+        at += bytes;
+    }
+    return 0;
 }
 
 static error_t set_crop(struct cli_job *job, const char *field, const char *value)
@@ -495,6 +563,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return set_real(job, field, value, 0.001, 1000, &job->clip_speed);
     case KEY_LAYERS:
         return set_layers(job, field, value);
+    case KEY_LIGHT_GROUP:
+        return set_light_group(job, field, value);
     case KEY_METADATA:
         job->full_metadata = strcmp(value, "full") == 0;
         return job->full_metadata || strcmp(value, "stable") == 0
@@ -615,10 +685,10 @@ const struct argp *cli_job_argp(void)
 
 const struct argp *cli_picture_argp(void)
 {
-    static const char *const left_out[] = {"parents",  "output",   "format",     "tone-map",      "tracer",
-                                           "primary",  "timings",  "trace-file", "layers",        "retry-for",
-                                           "retries",  "metadata", "stereo",     "stereo-layout", "light-field",
-                                           "baseline", "views",    "lens",       "noise",         NULL};
+    static const char *const left_out[] = {
+        "parents",       "output",      "format",      "tone-map",  "tracer",  "primary",  "timings",
+        "trace-file",    "layers",      "light-group", "retry-for", "retries", "metadata", "stereo",
+        "stereo-layout", "light-field", "baseline",    "views",     "lens",    "noise",    NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -627,9 +697,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_views_argp(void)
 {
-    static const char *const left_out[] = {"parents", "output",    "format",  "timings",  "trace-file",
-                                           "layers",  "retry-for", "retries", "metadata", "stereo-layout",
-                                           "noise",   "crop",      NULL};
+    static const char *const left_out[] = {"parents",       "output",      "format",    "timings", "trace-file",
+                                           "layers",        "light-group", "retry-for", "retries", "metadata",
+                                           "stereo-layout", "noise",       "crop",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -639,9 +709,10 @@ const struct argp *cli_views_argp(void)
 const struct argp *cli_thumbnail_argp(void)
 {
     static const char *const left_out[] = {
-        "output",     "timings", "trace-file", "layers",      "retry-for", "retries", "metadata",  "stereo-layout",
-        "noise",      "stereo",  "baseline",   "light-field", "views",     "lens",    "clip-once", "clip-start",
-        "clip-speed", "clip",    "at",         "variant",     "frame",     NULL};
+        "output",      "timings",  "trace-file",    "layers",    "light-group", "retry-for",
+        "retries",     "metadata", "stereo-layout", "noise",     "stereo",      "baseline",
+        "light-field", "views",    "lens",          "clip-once", "clip-start",  "clip-speed",
+        "clip",        "at",       "variant",       "frame",     NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -650,10 +721,10 @@ const struct argp *cli_thumbnail_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {"parents",  "output",     "format",   "samples",     "integrator",
-                                           "timings",  "trace-file", "layers",   "clip-once",   "clip-start",
-                                           "encoding", "retries",    "metadata", "light-field", "baseline",
-                                           "views",    "crop",       NULL};
+    static const char *const left_out[] = {"parents",    "output",     "format",  "samples",     "integrator",
+                                           "timings",    "trace-file", "layers",  "light-group", "clip-once",
+                                           "clip-start", "encoding",   "retries", "metadata",    "light-field",
+                                           "baseline",   "views",      "crop",    NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -662,11 +733,12 @@ const struct argp *cli_view_argp(void)
 
 const struct argp *cli_web_argp(void)
 {
-    static const char *const left_out[] = {"parents",     "output",     "format",        "samples",   "integrator",
-                                           "timings",     "trace-file", "layers",        "clip-once", "retry-for",
-                                           "clip-start",  "clip-speed", "clip",          "encoding",  "retries",
-                                           "light-field", "metadata",   "stereo-layout", "baseline",  "views",
-                                           "crop",        "stereo",     "lens",          "size",      NULL};
+    static const char *const left_out[] = {"parents",   "output",      "format",     "samples",       "integrator",
+                                           "timings",   "trace-file",  "layers",     "light-group",   "clip-once",
+                                           "retry-for", "clip-start",  "clip-speed", "clip",          "encoding",
+                                           "retries",   "light-field", "metadata",   "stereo-layout", "baseline",
+                                           "views",     "crop",        "stereo",     "lens",          "size",
+                                           NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

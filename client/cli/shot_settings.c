@@ -7,10 +7,11 @@
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-enum type { WORD, WHOLE, REAL, SIZE, FLAG, WHOLE_OR_WORD, WORDS };
+enum type { WORD, WHOLE, REAL, SIZE, FLAG, WHOLE_OR_WORD, WORDS, GROUPS };
 
 /* Those that are no field of `render`. */
 static const struct setting {
@@ -24,6 +25,7 @@ static const struct setting {
     {"size", "size", SIZE, "[1920, 1080]"},
     {"denoise", "denoise", WORD, "\"on\""},
     {"layers", "layers", WORDS, "[\"beauty\", \"depth\"]"},
+    {"light_groups", "light-group", GROUPS, "{\"key\": [\"Sun\", \"Lamp*\"]}"},
     {"format", "format", WORD, "\"exr\""},
     {"half", "half", FLAG, "true"},
     {"float", "float", FLAG, "true"},
@@ -50,7 +52,8 @@ static bool wrong_type(const struct shot_reader *reader, const struct shot_value
                                          [SIZE] = "an array of two whole numbers",
                                          [FLAG] = "true or false",
                                          [WHOLE_OR_WORD] = "a whole number or a word",
-                                         [WORDS] = "an array of strings"};
+                                         [WORDS] = "an array of strings",
+                                         [GROUPS] = "an object of arrays of strings"};
     char remedy[80];
     snprintf(remedy, sizeof(remedy), "such as \"%s\": %s", setting->name, setting->example);
     return shot_wrong(reader, at, remedy, "must be %s", wanted[setting->type]);
@@ -104,10 +107,34 @@ static const char *typed(const struct setting *setting, const json_t *value, cha
     }
 }
 
+/* Each as "key=Sun,Lamp*". */
+static bool apply_groups(const struct shot_reader *reader, const struct shot_value *at,
+                         const struct setting *setting)
+{
+    const char *name;
+    json_t *nodes;
+    if (!json_is_object(at->value))
+        return wrong_type(reader, at, setting);
+    json_object_foreach((json_t *)(uintptr_t)at->value, name, nodes)
+    {
+        char words[2048], text[2200];
+        if (strchr(name, '=') || !joined(nodes, words, sizeof(words)))
+            return wrong_type(reader, at, setting);
+        snprintf(text, sizeof(text), "%s=%s", name, words);
+        if (cli_job_set(reader->job, setting->option, text) != 0) {
+            const struct fl_error why = reader->job->error;
+            return shot_wrong(reader, at, why.remedy, "%s", why.text);
+        }
+    }
+    return true;
+}
+
 static bool apply_setting(const struct shot_reader *reader, const struct shot_value *at,
                           const struct setting *setting)
 {
     char text[256], remedy[sizeof(reader->job->error.remedy)];
+    if (setting->type == GROUPS)
+        return apply_groups(reader, at, setting);
     const char *value = typed(setting, at->value, text, sizeof(text));
     if (!value)
         return wrong_type(reader, at, setting);

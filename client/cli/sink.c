@@ -161,11 +161,16 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
         return start_video(sink, error);
     const struct cli_job *job = sink->job;
     const struct message_render *wanted = &job->options;
+    char names[CLI_LIGHT_GROUPS * CLI_LIGHT_GROUP_NAME] = "";
+    for (size_t i = 0, used = 0; i < job->light_group_count; i++)
+        used +=
+            (size_t)snprintf(names + used, sizeof(names) - used, "%s%s", i > 0 ? "," : "", job->light_groups[i]);
     /* An interruption is the normal end of progressive pictures: a file that has begun is finished. */
     const struct fl_exporter_options options = {
         .folder = sink->folder,
         .model = model_name(job),
         .full_metadata = job->full_metadata,
+        .light_groups = names[0] != '\0' ? names : NULL,
         .dwaa = job->dwaa,
         .colour_space = job->colour_space,
         .display_view = job->display_view,

@@ -129,7 +129,8 @@ static size_t node_fields(struct fl_field fields[FL_FIELDS_MAX])
     fields[3] = of_wire(struct_field(message_describe(MESSAGE_SET_NODE)->body(), "hidden"));
     fields[4] = made("matrix", EDIT_MATRIX, 12, COORDINATE_MAX);
     fields[4].doc = "the whole transform: 3x4, row by row";
-    return 5;
+    fields[5] = of_wire(struct_field(message_describe(MESSAGE_SET_NODE)->body(), "light_group"));
+    return 6;
 }
 
 static struct fl_field intensity(double max, const char *doc)
@@ -151,7 +152,8 @@ static size_t environment_fields(struct fl_field fields[FL_FIELDS_MAX])
     fields[2].doc = "turn of the image about +y; 0: its middle column is +x";
     fields[3] = of_wire(struct_field(body, "backdrop"));
     fields[4] = of_wire(struct_field(body, "display_values"));
-    return 5;
+    fields[5] = of_wire(struct_field(body, "light_group"));
+    return 6;
 }
 
 /* What tells objects apart or points elsewhere is no field. */

@@ -45,7 +45,7 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     snprintf(window, sizeof(window), "%u,%u,%u,%u", options->window.x, options->window.y, options->window.width,
              options->window.height);
     snprintf(rate, sizeof(rate), "%.9g", (double)options->frames_per_second);
-    const char *arguments[19] = {/* ends with NULL */ "--folder", options->folder};
+    const char *arguments[21] = {/* ends with NULL */ "--folder", options->folder};
     size_t count = 2;
     if (options->frames_per_second > 0) {
         arguments[count++] = "--fps";
@@ -59,7 +59,8 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
         arguments[count++] = "--full-metadata";
     const char *const colours[][2] = {{"--ocio", options->ocio},
                                       {"--colour-space", options->colour_space},
-                                      {"--display-view", options->display_view}};
+                                      {"--display-view", options->display_view},
+                                      {"--light-groups", options->light_groups}};
     for (size_t i = 0; i < sizeof(colours) / sizeof(colours[0]); i++)
         if (colours[i][1]) {
             arguments[count++] = colours[i][0];

@@ -23,7 +23,7 @@ uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
 static size_t pixels_bytes_of(const struct message_frame_begin *begin)
 {
     const uint64_t layers =
-        (uint64_t)__builtin_popcount(begin->layers); /* at most 28, of 8192 x 8192 x 16 bytes */
+        (uint64_t)__builtin_popcount(begin->layers); /* at most 31, of 8192 x 8192 x 16 bytes */
     const uint64_t bytes = layers * begin->width * begin->height * fl_bytes_per_pixel(begin->format);
     return bytes <= SIZE_MAX ? (size_t)bytes : 0;
 }

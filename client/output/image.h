@@ -41,6 +41,7 @@ struct image {
     float frames_per_second;                 /* 0: unknown */
     bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */
     struct image_window window;              /* EXR; no width: pixels are the whole picture */
+    const char *light_groups;                /* EXR: "key,fill": names of their layers; NULL: none */
     const char *model;                       /* for the metadata; may be empty */
     const struct mattes *mattes;             /* EXR: names for the layers of Cryptomatte; NULL: none */
     const float *origin;                     /* for the metadata: subtracted from all places; NULL or 0: nothing */

@@ -91,7 +91,31 @@ const layer_channel known[] = {{PROTOCOL_LAYER_BEAUTY, 0, "R", content::colour},
                                {PROTOCOL_LAYER_EMISSION, 2, "emission.B", content::colour},
                                {PROTOCOL_LAYER_BACKGROUND, 0, "background.R", content::colour},
                                {PROTOCOL_LAYER_BACKGROUND, 1, "background.G", content::colour},
-                               {PROTOCOL_LAYER_BACKGROUND, 2, "background.B", content::colour}};
+                               {PROTOCOL_LAYER_BACKGROUND, 2, "background.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_REST, 0, "light_rest.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_REST, 1, "light_rest.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_REST, 2, "light_rest.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP1, 0, "light_group1.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP1, 1, "light_group1.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP1, 2, "light_group1.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP2, 0, "light_group2.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP2, 1, "light_group2.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP2, 2, "light_group2.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP3, 0, "light_group3.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP3, 1, "light_group3.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP3, 2, "light_group3.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP4, 0, "light_group4.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP4, 1, "light_group4.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP4, 2, "light_group4.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP5, 0, "light_group5.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP5, 1, "light_group5.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP5, 2, "light_group5.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP6, 0, "light_group6.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP6, 1, "light_group6.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP6, 2, "light_group6.B", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP7, 0, "light_group7.R", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP7, 1, "light_group7.G", content::colour},
+                               {PROTOCOL_LAYER_LIGHT_GROUP7, 2, "light_group7.B", content::colour}};
 
 constexpr float half_max = 65504.0f;
 constexpr int band_rows = 64; // a multiple of the rows that are compressed together
@@ -121,6 +145,18 @@ std::vector<layer_channel> channels_of(unsigned layers, enum exr_part part)
             (part == exr_part::whole || is_colour(each) == (part == exr_part::colours)))
             channels.push_back(each);
     return channels;
+}
+
+// In the file: groups of light may have been named.
+std::string name_of(const struct image &image, const layer_channel &channel)
+{
+    std::string names = image.light_groups ? image.light_groups : "";
+    for (int group = PROTOCOL_LAYER_LIGHT_GROUP1; group < channel.layer && !names.empty(); group++)
+        names = names.find(',') != std::string::npos ? names.substr(names.find(',') + 1) : "";
+    const std::string name = names.substr(0, names.find(','));
+    if (channel.layer < PROTOCOL_LAYER_LIGHT_GROUP1 || name.empty())
+        return channel.name;
+    return "light_" + name + std::strrchr(channel.name, '.');
 }
 
 // Images come in the order of their layers' numbers.
@@ -211,7 +247,7 @@ Imf::ChannelList channels_of_part(const struct image &image, enum exr_part part)
 {
     Imf::ChannelList channels;
     for (const layer_channel &channel : channels_of(image.begin->layers, part))
-        channels.insert(channel.name, Imf::Channel(type_of(channel.content, image.half)));
+        channels.insert(name_of(image, channel), Imf::Channel(type_of(channel.content, image.half)));
     return channels;
 }
 
@@ -231,7 +267,7 @@ template <typename output> void write_rows(output &file, const struct image &ima
             std::vector<char> plane(row_bytes * rows);
             for (size_t y = 0; y < rows; y++)
                 put_row(image, (first_row + y) * width, channel, type, plane.data() + y * row_bytes);
-            buffer.insert(channel.name,
+            buffer.insert(name_of(image, channel),
                           Imf::Slice::Make(type, plane.data(),
                                            Imath::V2i(static_cast<int>(whole.x), static_cast<int>(whole.y + top)),
                                            static_cast<int64_t>(width), rows, size_of(type), row_bytes));

@@ -34,6 +34,7 @@ enum {
     KEY_TEXT,
     KEY_WINDOW,
     KEY_DWAA,
+    KEY_LIGHT_GROUPS,
     KEY_OCIO,
     KEY_COLOUR_SPACE,
     KEY_DISPLAY_VIEW
@@ -87,6 +88,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_DWAA:
         options->serve.dwaa = true;
+        return 0;
+    case KEY_LIGHT_GROUPS:
+        options->serve.light_groups = value;
         return 0;
     case KEY_OCIO:
         options->serve.colour.config = value;
@@ -195,6 +199,7 @@ int main(int argc, char **argv)
         {"text", KEY_TEXT, NULL, 0, "Text may be drawn into pictures", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
         {"window", KEY_WINDOW, "X,Y,W,H", 0, "Pictures are the part from X, Y on of W x H pixels", 0},
+        {"light-groups", KEY_LIGHT_GROUPS, "NAME,..", 0, "Name the layers of light groups in EXR files", 0},
         {"dwaa", KEY_DWAA, NULL, 0, "Compress colours of EXR files with loss", 0},
         {"ocio", KEY_OCIO, "FILE", 0, "Configuration of OpenColorIO", 0},
         {"colour-space", KEY_COLOUR_SPACE, "NAME", 0, "Convert the colours of EXR files to this space", 0},

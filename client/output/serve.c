@@ -112,6 +112,7 @@ static void write_image(struct exporter *exporter, const struct message_frame_en
     const struct image image = {.format = image_format_of(request->path, request->format),
                                 .half = request->half,
                                 .dwaa = exporter->options->dwaa,
+                                .light_groups = exporter->options->light_groups,
                                 .quality = request->quality,
                                 .frames_per_second = exporter->options->frames_per_second,
                                 .full_metadata = exporter->options->full_metadata,

@@ -11,8 +11,9 @@
 #include <stddef.h>
 
 struct serve_options {
-    int fd;                  /* connected stream socket */
-    float frames_per_second; /* for the metadata of images; 0: none */
+    int fd;                   /* connected stream socket */
+    float frames_per_second;  /* for the metadata of images; 0: none */
+    const char *light_groups; /* NULL: they have no names */
     bool full_metadata, dwaa;
     struct colour_wanted colour; /* with it, the first answer says whether there is that, before any request */
     struct image_window window;  /* of EXR files */

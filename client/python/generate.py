@@ -186,9 +186,7 @@ def message_rows():
 def heads():
     """Of the methods with @takes(messages.NAME_keywords): their own arguments, by NAME."""
     found = {}
-    for path in sorted((HERE / "farlight").glob("*.py")):
-        if path == TARGET:
-            continue
+    for path in sorted((ROOT / "client/python/farlight").glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             for decorator in getattr(node, "decorator_list", ()):
                 match = re.fullmatch(r"takes\(messages\.(\w+)_keywords\)", ast.unparse(decorator))

@@ -81,8 +81,10 @@ static bool pack_lights(struct gpu_scene *gpu, const struct scene *scene, const 
     for (size_t i = 0; *packed && i < count; i++) {
         const struct scene_light *light = scene_light(scene, list[i].node->object);
         if (light &&
-            pack_light(scene_pose_light(pose, light), list[i].world_from_object, *packed + gpu->light_count))
-            gpu->light_count++;
+            pack_light(scene_pose_light(pose, light), list[i].world_from_object, *packed + gpu->light_count)) {
+            const float group = (float)scene_light_group(scene, list[i].node);
+            (*packed)[gpu->light_count++].position_kind[3] += group / LIGHT_GROUPS_MAX;
+        }
     }
     free(list);
     return *packed || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the lights of a scene");
@@ -145,7 +147,7 @@ static void find_bounds(struct gpu_scene *gpu, const struct light *lights)
     gpu_scene_all_instance_bounds(gpu, gpu->lower_world, gpu->upper_world);
     for (uint32_t i = 0; i < gpu->light_count; i++) {
         float radius = lights[i].colour[3] + length3(lights[i].half_u_inner) + length3(lights[i].half_v_outer);
-        if (lights[i].position_kind[3] != (float)LIGHT_KIND_DIRECTIONAL)
+        if ((int)lights[i].position_kind[3] != LIGHT_KIND_DIRECTIONAL)
             grow(gpu, lights[i].position_kind, radius);
     }
     for (uint32_t i = 0; gpu->lower_world[0] > gpu->upper_world[0] && i < gpu->disc_count; i++)

@@ -131,18 +131,23 @@ static bool is_black(const float colour[3])
     return colour[0] <= 0.0f && colour[1] <= 0.0f && colour[2] <= 0.0f;
 }
 
-static bool make_default_lights(struct environment *environment, struct gpu_device *device, struct error *error)
+/* They are of the environment's light group. */
+static bool make_default_lights(struct environment *environment, struct gpu_device *device, uint32_t group,
+                                struct error *error)
 {
-    static const struct light lights[SKY_LIGHTS] = {
-        {.position_kind = {0.0f, 0.0f, 0.0f, (float)LIGHT_KIND_DIRECTIONAL},
+    const float kind = (float)LIGHT_KIND_DIRECTIONAL + (float)group / LIGHT_GROUPS_MAX;
+    const struct light lights[SKY_LIGHTS] = {
+        {.position_kind = {0.0f, 0.0f, 0.0f, kind},
          .direction_range = {SKY_KEY_DIRECTION, 0.0f},
          .colour = {SKY_KEY_IRRADIANCE, 0.0f}},
-        {.position_kind = {0.0f, 0.0f, 0.0f, (float)LIGHT_KIND_DIRECTIONAL},
+        {.position_kind = {0.0f, 0.0f, 0.0f, kind},
          .direction_range = {SKY_RIM_DIRECTION, 0.0f},
          .colour = {SKY_RIM_IRRADIANCE, 0.0f}},
     };
-    return environment->default_lights.name ||
-           gpu_buffer_upload(device, &environment->default_lights, lights, sizeof(lights), error);
+    if (environment->default_lights.name && environment->default_light_group == group)
+        return true;
+    environment->default_light_group = group;
+    return gpu_buffer_upload(device, &environment->default_lights, lights, sizeof(lights), error);
 }
 
 bool environment_update(struct environment *environment, struct gpu_device *device, const struct gpu_scene *gpu,
@@ -158,7 +163,7 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
     else if (given->backdrop)
         kind = ENVIRONMENT_BACKDROP;
     environment->default_light = kind == ENVIRONMENT_SKY;
-    if (environment->default_light && !make_default_lights(environment, device, error))
+    if (environment->default_light && !make_default_lights(environment, device, given->light_group, error))
         return false;
     if (environment->known && environment->revision == given->revision && environment->kind == kind)
         return true;

@@ -19,6 +19,7 @@ struct environment {
     float irradiance[9][3]; /* of the environment itself; the colour that multiplies an image included */
     bool default_light;
     struct gpu_buffer default_lights; /* SKY_LIGHTS of struct light */
+    uint32_t default_light_group;     /* theirs */
     /* Of an image that is being integrated: */
     uint64_t summed_revision; /* 0: none is */
     uint32_t summed_rows;

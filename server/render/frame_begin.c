@@ -46,6 +46,30 @@ static bool check_request(const struct frame_renderer *renderer, const struct fr
            (!request->compare || frame_find_tracer(renderer, request->compare_with, "compare_with", error));
 }
 
+/* Whether a node of surfaces is in a light group. */
+static bool has_grouped_surfaces(const struct gpu_scene *copy)
+{
+    for (uint32_t i = 0; i < copy->instance_count; i++)
+        if (copy->instances[i].flags >> INSTANCE_LIGHT_GROUP_SHIFT & INSTANCE_LIGHT_GROUP_MASK)
+            return true;
+    return false;
+}
+
+/* What glows is in the group of its node, which stored samples do not hold. */
+static bool check_groups(const struct frame_renderer *renderer, struct error *error)
+{
+    const struct render_context *context = &renderer->work->context;
+    if (!(context->request.layers & LAYER_BITS_LIGHT_GROUPS) || !context->tracer->impl->sampled ||
+        !has_grouped_surfaces(context->scene))
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "layers",
+              "the samples of the tracer %s do not tell which node glows, and surfaces are in light groups",
+              context->tracer->impl->name);
+    return error_remedy(error,
+                        "choose bvh or another tracer of triangles, or put lights and the environment alone "
+                        "into groups");
+}
+
 /* A display's values are no light that adds up. */
 static bool check_light(const struct scene *scene, const struct frame_request *request, struct error *error)
 {
@@ -317,7 +341,7 @@ static bool size_frame(struct frame_renderer *renderer, struct error *error)
                                renderer->target->layers & 1u << LAYER_BEAUTY && !context->comparison &&
                                !renderer->key_tracer && !context->tile_samples && !denoise_is_wanted(context);
     layers_begin(&renderer->work->layers, context, !frame_is_eyes_pass(renderer));
-    return true;
+    return check_groups(renderer, error);
 }
 
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)

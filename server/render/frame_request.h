@@ -11,7 +11,7 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
 /* As bits, with that of the beauty where the request names none. */
 uint32_t frame_request_layers(const struct frame_request *request);
 /* The plane that an attachment alone is made of: a layer after all others. */
-#define LAYER_STICKING ((enum layer)28)
+#define LAYER_STICKING ((enum layer)31)
 /* All that there is a plane for in the picture: layers and those that attachments are made of. */
 uint32_t frame_request_planes(const struct frame_request *request);
 /* Of a plane's pixels on the host, that of the beauty where the request attaches what it is. */

@@ -13,7 +13,7 @@
 /* Of each hit, where each is chosen by its light: a ray brings its part or none, so one would make much noise. */
 #define SHADOW_RAYS 4u
 /* Those of emitters, of surfaces, and the rest. */
-#define DEFINES_MAX (4 + CONTEXT_SURFACE_DEFINES + 7)
+#define DEFINES_MAX (4 + CONTEXT_SURFACE_DEFINES + 6 + LAYERS_LIGHT_DEFINES)
 
 bool ground_is_shown(const struct render_context *context, const struct integrator *integrator)
 {
@@ -75,8 +75,7 @@ static const struct gpu_program *shade_program(struct render_context *context, c
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (uses_table(context, integrator) && context->environment_choice->rows > 0)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
-    if (layers_have_light(context->layers))
-        defines[n++] = (struct gpu_define){"LIGHT_LAYERS", "1"};
+    (void)layers_light_defines(context->layers, defines + n);
     return context_use_with(context, "render/ground.comp", defines, error);
 }
 

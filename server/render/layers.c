@@ -6,6 +6,7 @@
 #include "render/integrators/integrator.h"
 #include "render/wave_trace.h"
 #include "shared/layers.h"
+#include "shared/light.h"
 #include "shared/ray.h"
 
 #include <epoxy/gl.h>
@@ -25,7 +26,10 @@ _Static_assert(LAYER_BIT_DIFFUSE_DIRECT == 1u << LAYER_DIFFUSE_DIRECT &&
                    LAYER_BIT_SPECULAR_DIRECT == 1u << LAYER_SPECULAR_DIRECT &&
                    LAYER_BIT_SPECULAR_INDIRECT == 1u << LAYER_SPECULAR_INDIRECT &&
                    LAYER_BIT_TRANSMISSION == 1u << LAYER_TRANSMISSION &&
-                   LAYER_BIT_EMISSION == 1u << LAYER_EMISSION && LAYER_BIT_BACKGROUND == 1u << LAYER_BACKGROUND,
+                   LAYER_BIT_EMISSION == 1u << LAYER_EMISSION && LAYER_BIT_BACKGROUND == 1u << LAYER_BACKGROUND &&
+                   LAYER_BIT_LIGHT_REST == 1u << LAYER_LIGHT_REST &&
+                   LAYER_BITS_LIGHT_GROUPS == 0xffu << LAYER_LIGHT_REST &&
+                   LAYER_LIGHT_REST + LIGHT_GROUPS_MAX - 1 == LAYER_LIGHT_GROUP7,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)
@@ -42,6 +46,7 @@ void layers_begin(struct layers *layers, struct render_context *context, bool is
 {
     const struct frame_request *request = &context->request;
     layers->wanted = frame_request_planes(request) & ~LAYER_BIT_BEAUTY;
+    layers->environment_group = context->scene->scene->environment.light_group;
     layers->covers_by_shading = layers->wanted & LAYER_BITS_CRYPTO && is_shaded &&
                                 (context->features.blend || request->integrator == INTEGRATOR_RAYCAST);
     context->covers = layers->covers_by_shading ? &layers->covers : NULL;
@@ -98,6 +103,16 @@ bool layers_have_light(const struct layers *layers)
     return layers->wanted & LAYER_BITS_LIGHT;
 }
 
+size_t layers_light_defines(const struct layers *layers, struct gpu_define defines[LAYERS_LIGHT_DEFINES])
+{
+    size_t n = 0;
+    if (layers_have_light(layers))
+        defines[n++] = (struct gpu_define){"LIGHT_LAYERS", "1"};
+    if (layers->wanted & LAYER_BITS_LIGHT_GROUPS)
+        defines[n++] = (struct gpu_define){"LIGHT_GROUPS", "1"};
+    return n;
+}
+
 void layers_bind_light(struct layers *layers, const struct gpu_program *program)
 {
     if (!layers_have_light(layers))
@@ -105,6 +120,8 @@ void layers_bind_light(struct layers *layers, const struct gpu_program *program)
     gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
     gpu_uniform_uint(program, "light_layers", layers->wanted & ~LAYER_BITS_CRYPTO);
     gpu_uniform_uint(program, "plane_samples", layers->plane_samples);
+    if (layers->wanted & LAYER_BITS_LIGHT_GROUPS)
+        gpu_uniform_uint(program, "environment_group", layers->environment_group);
 }
 
 uint32_t layers_take_unknown(struct layers *layers)

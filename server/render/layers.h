@@ -14,7 +14,8 @@ struct layers {
     struct gpu_buffer sums; /* shared/layers.h */
     struct gpu_buffer covers;
     struct moves moves;
-    bool covers_by_shading; /* not by first hits: other surfaces show through some */
+    uint32_t environment_group; /* of the light groups; 0: none */
+    bool covers_by_shading;     /* not by first hits: other surfaces show through some */
     struct gpu_buffer ao_rays, ao_times, ao_visibility;
     uint32_t noting;        /* of the current slice: those that hits are noted in */
     bool noted;             /* of the current slice: properties of its hits */
@@ -45,8 +46,10 @@ bool layers_mark_unknown(struct layers *layers, struct render_context *context, 
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
                        struct error *error);
 /* Layers of light (shaders/render/light_layers.glsl): whether there are some, and the sums to a program that notes
- * them, with the define LIGHT_LAYERS. */
+ * them, with these defines. */
 bool layers_have_light(const struct layers *layers);
+#define LAYERS_LIGHT_DEFINES 2
+size_t layers_light_defines(const struct layers *layers, struct gpu_define defines[LAYERS_LIGHT_DEFINES]);
 void layers_bind_light(struct layers *layers, const struct gpu_program *program);
 bool layers_are_of_light(enum layer layer);
 /* Whether the layer holds the first sample of each pixel in place of the mean of all. */

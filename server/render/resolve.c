@@ -87,12 +87,14 @@ static const struct gpu_program *use_ycbcr(struct render_context *context, uint3
     return program;
 }
 
-/* Layers beside the picture have none, but for the one of what lies behind. */
-static void set_background(const struct gpu_program *program, const struct frame_request *request,
+/* Layers beside the picture have none, but for those of what lies behind. */
+static void set_background(const struct gpu_program *program, const struct render_context *context,
                            enum layer layer)
 {
-    const bool has_colour =
-        (layer == LAYER_BEAUTY || layer == LAYER_BACKGROUND) && request->background == BACKGROUND_COLOUR;
+    const struct frame_request *request = &context->request;
+    const bool is_behind =
+        layer == LAYER_BACKGROUND || layer == LAYER_LIGHT_REST + context->layers->environment_group;
+    const bool has_colour = (layer == LAYER_BEAUTY || is_behind) && request->background == BACKGROUND_COLOUR;
     const float *colour = request->background_colour;
     const float background[4] = {colour[0], colour[1], colour[2], 1.0f}, none[4] = {0};
     gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
@@ -150,7 +152,7 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
-        set_background(program, request, layer);
+        set_background(program, context, layer);
         if (counts_tiles(context, layer))
             set_tiles(program, picture, context, layer, band);
         gpu_dispatch(context->device, program, as_ycbcr ? picture->tiles_across * ((rows + 1) / 2) : pixel_count);

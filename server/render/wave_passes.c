@@ -15,7 +15,8 @@
 
 #include <epoxy/gl.h>
 
-#define DEFINES_MAX (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + 4) /* and what ends them */
+#define DEFINES_MAX                                                                                               \
+    (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + LAYERS_LIGHT_DEFINES + 3) /* and what ends them */
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
@@ -83,8 +84,7 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
-    if (layers_have_light(context->layers))
-        defines[n++] = (struct gpu_define){"LIGHT_LAYERS", "1"};
+    n += layers_light_defines(context->layers, defines + n);
     const struct gpu_program *program = context_use_with(context, integrator->shader, defines, error);
     if (!program)
         return NULL;
@@ -148,13 +148,13 @@ static const struct gpu_program *gather_program(const struct wave_passes *passes
         meets_lights ? "HAS_AREA_LIGHTS" : NULL,
         meets_lights && context_samples_emitters(context) ? "HAS_EMITTERS" : NULL,
         context->covers ? "COVERS" : NULL,
-        layers_have_light(context->layers) ? "LIGHT_LAYERS" : NULL,
     };
-    struct gpu_define defines[sizeof(names) / sizeof(names[0]) + 1] = {0};
+    struct gpu_define defines[sizeof(names) / sizeof(names[0]) + LAYERS_LIGHT_DEFINES + 1] = {0};
     size_t n = 0;
     for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
         if (names[i])
             defines[n++] = (struct gpu_define){names[i], "1"};
+    (void)layers_light_defines(context->layers, defines + n);
     return context_use_with(context, "render/gather.comp", defines, error);
 }
 

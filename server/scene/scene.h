@@ -60,6 +60,7 @@ struct scene_node {
                                    them in world space, whatever the node's transform */
     float *weights;             /* of the mesh's morph targets, owned; NULL: the mesh's own */
     uint32_t weight_count;
+    uint32_t light_group; /* of lights and glowing surfaces here and below, 1 .. 7; 0: that of the parent */
     uint32_t child_count; /* kept by the scene: how many nodes hang directly below */
 };
 
@@ -176,10 +177,11 @@ struct scene_environment {
     float colour[3];
     float rotation; /* radians, about +y */
     uint32_t width, height;
-    struct blob *texels; /* 4 half floats a texel; NULL: constant colour */
-    bool backdrop;       /* the constant colour is seen and lights nothing */
-    bool display_values; /* of the whole scene: colours and light are a display's values, not linear */
-    bool keeps_image;    /* of an edit: it gets the image that is there */
+    struct blob *texels;  /* 4 half floats a texel; NULL: constant colour */
+    bool backdrop;        /* the constant colour is seen and lights nothing */
+    bool display_values;  /* of the whole scene: colours and light are a display's values, not linear */
+    uint32_t light_group; /* 1 .. 7; 0: none */
+    bool keeps_image;     /* of an edit: it gets the image that is there */
 };
 
 /* One edit of a transaction. Its pointers (blobs, ranges) pass to the scene with a successful commit and stay with
@@ -251,6 +253,8 @@ uint64_t scene_edits_table_bytes(const struct scene_edit *edits, size_t edit_cou
 
 /* Objects by identifier, NULL if there is none. */
 const struct scene_node *scene_node(const struct scene *scene, uint32_t id);
+/* The light group of a node, its own or the nearest above it; 0: none. */
+uint32_t scene_light_group(const struct scene *scene, const struct scene_node *node);
 const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id);
 const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id);
 const struct scene_material *scene_material(const struct scene *scene, uint32_t id);

@@ -68,6 +68,7 @@ static bool from_node(const struct message_set_node *message, struct scene_edit 
     node->hidden = message->hidden;
     memcpy(node->parent_from_node, message->parent_from_node, sizeof(node->parent_from_node));
     node->skin = message->skin;
+    node->light_group = message->light_group;
     return take_weights(&node->weights, &node->weight_count, message->weights, message->weights_count, error);
 }
 
@@ -213,6 +214,7 @@ static bool from_environment(const struct edit_source *source, const struct mess
     environment->rotation = message->rotation;
     environment->backdrop = message->backdrop != 0;
     environment->display_values = message->display_values != 0;
+    environment->light_group = message->light_group;
     environment->keeps_image = message->keeps_image != 0;
     if (environment->keeps_image)
         return true;

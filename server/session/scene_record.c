@@ -124,6 +124,7 @@ static void put_node(struct sink *sink, const struct scene_node *node)
     set->hidden = node->hidden;
     memcpy(set->parent_from_node, node->parent_from_node, sizeof(set->parent_from_node));
     set->skin = node->skin;
+    set->light_group = node->light_group;
     set->weights_count = put_weights(sink, node->weights, node->weight_count);
     set->weights = sink->weights;
     set->name = node->base.name;
@@ -337,6 +338,7 @@ static void put_environment(struct sink *sink, const struct scene_environment *e
     set->backdrop = environment->backdrop ? 1 : 0;
     set->keeps_image = environment->keeps_image ? 1 : 0;
     set->display_values = environment->display_values ? 1 : 0;
+    set->light_group = environment->light_group;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &environment->texels, 1);
     put(sink, &message);

@@ -19,6 +19,7 @@ struct emitter_sample {
     float distance_;
     vec3 radiance;
     float probability; // per steradian; 0: there is no sample
+    uint instance;
 };
 
 emitter_starts find_emitters()
@@ -258,6 +259,7 @@ emitter_sample emitter_sample_at(vec3 position, vec3 normal, vec2 u, float time)
     result.direction = to_point / max(result.distance_, 1e-30);
     result.probability = probability * emitter_density(view, t.across, result.direction, result.distance_);
     result.radiance = emitter_radiance(t.indices_material, weights);
+    result.instance = leaf.instance;
     return result;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Lights seen from a point. Units as in the protocol: intensity, irradiance or radiance by kind.
-// Defines: HAS_AREA_LIGHTS some light is a rectangle or a sphere.
+// Defines: HAS_AREA_LIGHTS some light is a rectangle or a sphere. LIGHT_GROUPS see render/light_layers.glsl.
 
 #include "shared/bindings.h"
 #include "shared/light.h"
@@ -13,6 +13,15 @@ light light_at(uint index)
     int texel = int(index) * LIGHT_TEXELS;
     return light(texelFetch(lights, texel), texelFetch(lights, texel + 1), texelFetch(lights, texel + 2),
                  texelFetch(lights, texel + 3), texelFetch(lights, texel + 4));
+}
+
+uint group_of_light(uint index)
+{
+#ifdef LIGHT_GROUPS
+    return uint(fract(texelFetch(lights, int(index) * LIGHT_TEXELS).w) * LIGHT_GROUPS_MAX);
+#else
+    return 0u;
+#endif
 }
 
 struct light_sample {

@@ -196,7 +196,7 @@ bool ask_for_emitter(eye_hit e, shadow_choice c)
     else if (side * NoL > 0.0) // the chance is of that side
         sent = brdf_scattered(e.s, e.parts, e.view, e.NoV, sampled.direction) * abs(NoL);
 #ifdef LIGHT_LAYERS
-    ray_part = part_asked(e.p, vec3(mirrored ? 1.0 : 0.0));
+    ray_part = part_asked(e.p, vec3(mirrored ? 1.0 : 0.0), group_of_instance(sampled.instance));
 #endif
     vec3 arriving = vec3(0.0);
     if (sampled.probability > 0.0)
@@ -215,7 +215,7 @@ bool ask_for_environment(eye_hit e, shadow_choice c)
     probability *= c.environment;
     vec3 arriving = vec3(0.0), sent = mirrored_light(e, direction, found);
 #ifdef LIGHT_LAYERS
-    ray_part = part_asked(e.p, vec3(1.0));
+    ray_part = part_asked(e.p, vec3(1.0), group_of_environment());
 #endif
     if (probability > 0.0 && found > 0.0)
         arriving = e.weight * sent * environment_radiance(direction) * (heuristic(probability, found) / probability);
@@ -278,7 +278,8 @@ bool ask_for_light(eye_hit e, shadow_choice c)
     vec3 sent = reflected(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction, shine);
 #ifdef LIGHT_LAYERS
     vec3 scattered = brdf_scattered(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
-    ray_part = part_asked(e.p, share_mirrored(sent, scattered * abs(dot(e.s.normal, sampled.direction))));
+    vec3 mirrored = share_mirrored(sent, scattered * abs(dot(e.s.normal, sampled.direction)));
+    ray_part = part_asked(e.p, mirrored, group_of_light(c.light_number));
 #endif
     vec3 arriving = e.weight * (sent * sampled.irradiance / probability);
     return add_shadow_ray(e.j, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
@@ -354,10 +355,9 @@ void main()
     vec3 brought = limited(e.p, 1u, e.weight * sent);
     radiance[k] = vec4(brought, seen ? e.p.weight_r : 0.0);
 #ifdef LIGHT_LAYERS
-    // Over more bounces both are indirect.
-    ambient *= (e.p.flags & PATH_BOUNCES_MASK) > 1u ? vec3(0.0) : e.weight;
-    note_sent(e.p, h, part_asked(e.p, vec3(0.0)), ambient);
-    note_sent(e.p, h, part_met(e.p, LIGHT_EMITTED), brought - ambient);
+    ambient = brought * share_of(ambient, sent);
+    note_sent(e.p, h, part_asked(e.p, vec3(0.0), group_of_environment()), ambient);
+    note_sent(e.p, h, part_met(e.p, LIGHT_EMITTED, group_of_instance(h.instance)), brought - ambient);
 #endif
     note_children(j, true, asked ? 1u : 0u);
 }

@@ -77,10 +77,17 @@ vec4 radiance_of_hit(uint k, uint j)
 
 vec4 beyond(uint k)
 {
-    vec4 arrived = radiance_beyond(k);
+    vec3 of_light; // what comes from the area light that the path hit
+    vec4 arrived = radiance_beyond(k, of_light);
 #ifdef LIGHT_LAYERS
     path p = path_at(k);
-    note_part(p, part_met(p, LIGHT_BEHIND), arrived.rgb);
+    vec3 rest = arrived.rgb;
+#if defined(LIGHT_GROUPS) && defined(HAS_AREA_LIGHTS)
+    if (met_number(p) != 0u)
+        note_part(p, part_met(p, LIGHT_BEHIND, group_of_light(met_number(p) - 1u)), of_light);
+    rest -= of_light;
+#endif
+    note_part(p, part_met(p, LIGHT_BEHIND, group_of_environment()), rest);
 #endif
     return arrived;
 }
@@ -91,6 +98,11 @@ void note_coverage(uint slot, float coverage)
 #ifdef LIGHT_LAYERS
     if ((light_layers & LAYER_BIT_BACKGROUND) != 0u)
         light_sums[place_in_layer(LAYER_BIT_BACKGROUND, slot)].a = coverage;
+#ifdef LIGHT_GROUPS
+    uint behind = LAYER_BIT_LIGHT_REST << group_of_environment();
+    if ((light_layers & behind) != 0u)
+        light_sums[place_in_layer(behind, slot)].a = coverage;
+#endif
 #endif
 }
 

@@ -153,6 +153,9 @@ void main()
     uint sample_ = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
     float unshadowed = 0.0; // share of the light that has no shadows
     uint alive = 0u;
+#ifdef LIGHT_LAYERS
+    ray_part.group = group_of_environment(); // which it shows less of
+#endif
 #if defined(EVERY_LIGHT)
     float sum = mean_of(environment_irradiance(normal)), ambient = sum;
     for (uint i = 0u; i < frame.light_count; i++) {
@@ -204,7 +207,7 @@ void main()
         vec4 shown = mix(covered, uncovered, unshadowed);
         radiance[k] = shown;
 #ifdef LIGHT_LAYERS
-        note_part(p, light_part(vec3(0.0), LIGHT_BEHIND), shown.rgb); // as its rays are
+        note_part(p, ray_part, shown.rgb);
 #endif
     }
     child_counts[j] = alive << SHADOW_RAYS_SHIFT;

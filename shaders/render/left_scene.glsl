@@ -20,9 +20,22 @@ path path_at(uint k)
     return path_of_texels(texelFetch(paths, texel), texelFetch(paths, texel + 1), texelFetch(paths, texel + 2));
 }
 
-// Of the path of ray k.
-vec4 radiance_beyond(uint k)
+#ifdef HAS_AREA_LIGHTS
+// The area light that the ray hit, plus 1.
+uint met_number(path p)
 {
+#ifdef HAS_EMITTERS
+    return p.light_number & PATH_LIGHT_MASK;
+#else
+    return p.light_number;
+#endif
+}
+#endif
+
+// Of the path of ray k. `of_light`: the part of an area light that it hit.
+vec4 radiance_beyond(uint k, out vec3 of_light)
+{
+    of_light = vec3(0.0);
     path p = path_at(k);
     bool straight = (p.flags & PATH_STRAIGHT) != 0u, seen = straight && frame.environment_kind != ENVIRONMENT_NONE;
     if (straight && environment_is_hidden())
@@ -34,17 +47,18 @@ vec4 radiance_beyond(uint k)
 #ifdef SHARES
     arriving *= p.environment_share;
 #ifdef HAS_AREA_LIGHTS
-    uint met = p.light_number;
-#ifdef HAS_EMITTERS
-    met &= PATH_LIGHT_MASK;
-#endif
-    if (met != 0u)
-        arriving += light_at(met - 1u).colour.rgb * p.light_share;
+    if (met_number(p) != 0u)
+        of_light = light_at(met_number(p) - 1u).colour.rgb * p.light_share;
+    arriving += of_light;
+    vec3 share = of_light / max(arriving, vec3(1e-30));
 #endif
 #endif
     vec3 brought = vec3(p.weight_r, p.weight_g, p.weight_b) * arriving; // pixels beyond the picture's edge have no weight
 #ifdef SHARES
     brought = limited(p, 1u, brought);
+#ifdef HAS_AREA_LIGHTS
+    of_light = brought * share;
+#endif
 #endif
     return vec4(brought, seen ? p.weight_r : 0.0);
 }

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Layers of light: each contribution to a sample's radiance is noted in one of them, or in two by what the first surface
 // scatters and mirrors, so that their sum is the beauty. They follow the first surface that bends or scatters a path, and
-// whether light has come there directly. A sample has at most one path.
+// whether light has come there directly. A sample has at most one path. Light groups are the same sum by the lights and
+// glowing surfaces that the light comes from.
 //
 //   shading passes  note what they write to radiance[], by part_met() and part_asked(), and so does gather.comp of light beyond the scene
 //   shadow rays     have their part in `ray_part`, which the light sample's second vec4 brings to gather.comp
 //   first surfaces  tell what they do with the path, by note_first()
 //
-// Defines: LIGHT_LAYERS there are some; else nothing here costs anything.
+// Defines: LIGHT_LAYERS there are some; else nothing here costs anything. LIGHT_GROUPS with it: some are light groups.
 
+#include "shared/hit.h"
 #include "shared/layers.h"
 #include "shared/path.h"
 #include "render/finite.glsl"
@@ -16,6 +18,7 @@
 struct light_part {
     vec3 mirrored; // share of it that the first surface mirrors
     float kind;    // LIGHT_*
+    uint group;    // of what sends it; 0: none
 };
 
 #ifdef LIGHT_LAYERS
@@ -24,7 +27,20 @@ uniform uint plane_samples;
 
 layout(std430, binding = BIND_LAYER_SUMS) buffer light_sum_block { vec4 light_sums[]; };
 
-light_part ray_part = light_part(vec3(0.0), LIGHT_BEHIND); // of the shadow ray that is made next
+light_part ray_part = light_part(vec3(0.0), LIGHT_BEHIND, 0u); // of the shadow ray that is made next
+
+#ifdef LIGHT_GROUPS
+uniform uint environment_group;
+#endif
+
+uint group_of_environment()
+{
+#ifdef LIGHT_GROUPS
+    return environment_group;
+#else
+    return 0u;
+#endif
+}
 
 uint place_in_layer(uint layer_bit, uint slot)
 {
@@ -42,11 +58,21 @@ void add_to_layer(uint layer_bit, uint slot, vec3 light)
         light_sums[place_in_layer(layer_bit, slot)].rgb += light;
 }
 
-// `mirrored`: of the light.
-void add_parts(uint slot, vec3 light, vec3 mirrored, float kind)
+// Kind and group of a part in one number.
+float code_of(light_part part)
 {
+    return part.kind + LIGHT_KINDS * float(part.group);
+}
+
+// `mirrored`: of the light.
+void add_parts(uint slot, vec3 light, vec3 mirrored, float code)
+{
+    float group = floor(code / LIGHT_KINDS), kind = code - LIGHT_KINDS * group;
     light = finite(vec4(light, 0.0)).rgb;
     mirrored = min(finite(vec4(mirrored, 0.0)).rgb, light);
+#ifdef LIGHT_GROUPS
+    add_to_layer(LAYER_BIT_LIGHT_REST << uint(group), slot, light);
+#endif
     if (kind <= LIGHT_INDIRECT) {
         bool direct = kind == LIGHT_DIRECT;
         add_to_layer(direct ? LAYER_BIT_DIFFUSE_DIRECT : LAYER_BIT_DIFFUSE_INDIRECT, slot, light - mirrored);
@@ -57,28 +83,31 @@ void add_parts(uint slot, vec3 light, vec3 mirrored, float kind)
     }
 }
 
-light_part part_behind(path p, float kind)
+light_part part_behind(path p, float kind, uint group)
 {
     vec4 first = light_sums[place_of_first(p.sample_slot)];
-    return light_part(first.rgb, first.w > 0.0 ? LIGHT_TRANSMITTED : kind);
+    return light_part(first.rgb, first.w > 0.0 ? LIGHT_TRANSMITTED : kind, group);
 }
 
 // Of light that the path's ray meets. `seen`: its kind where the eye does.
-light_part part_met(path p, float seen)
+light_part part_met(path p, float seen, uint group)
 {
     uint bounces = p.flags & PATH_BOUNCES_MASK;
-    return bounces == 0u ? light_part(vec3(0.0), seen) : part_behind(p, bounces == 1u ? LIGHT_DIRECT : LIGHT_INDIRECT);
+    if (bounces == 0u)
+        return light_part(vec3(0.0), seen, group);
+    return part_behind(p, bounces == 1u ? LIGHT_DIRECT : LIGHT_INDIRECT, group);
 }
 
 // Of light that comes to where the path's ray ends. `mirrored`: the share of it that is mirrored there.
-light_part part_asked(path p, vec3 mirrored)
+light_part part_asked(path p, vec3 mirrored, uint group)
 {
-    return (p.flags & PATH_BOUNCES_MASK) == 0u ? light_part(mirrored, LIGHT_DIRECT) : part_behind(p, LIGHT_INDIRECT);
+    bool first = (p.flags & PATH_BOUNCES_MASK) == 0u;
+    return first ? light_part(mirrored, LIGHT_DIRECT, group) : part_behind(p, LIGHT_INDIRECT, group);
 }
 
 void note_part(path p, light_part part, vec3 light)
 {
-    add_parts(p.sample_slot, light, light * part.mirrored, part.kind);
+    add_parts(p.sample_slot, light, light * part.mirrored, code_of(part));
 }
 
 void note_first(path p, vec3 mirrored, bool transmitted)
@@ -91,5 +120,11 @@ void note_first(path p, vec3 mirrored, bool transmitted)
 vec3 share_mirrored(vec3 sent, vec3 scattered)
 {
     return clamp(1.0 - scattered / max(sent, vec3(1e-30)), 0.0, 1.0);
+}
+
+// The share that a part has of a sum.
+vec3 share_of(vec3 part, vec3 sum)
+{
+    return clamp(part / max(sum, vec3(1e-30)), 0.0, 1.0);
 }
 #endif

@@ -74,12 +74,12 @@ void choose_light(inout eye_hit e, uvec2 seed, uint index)
 #endif
 }
 
-// For the shadow ray that is made next.
+// For the shadow ray that is made next, whose group is to be told.
 vec3 evaluate(eye_hit e, vec3 direction, out float found)
 {
     vec3 sent = bsdf_evaluate(e.b, e.s, direction, found);
 #ifdef LIGHT_LAYERS
-    ray_part = part_asked(e.p, share_mirrored(sent, evaluated_scattered));
+    ray_part = part_asked(e.p, share_mirrored(sent, evaluated_scattered), 0u);
 #endif
     return sent;
 }
@@ -95,6 +95,9 @@ bool ask_for_emitter(eye_hit e, uint place, vec2 u)
     if (sampled.probability > 0.0 && side * dot(sampled.direction, e.s.normal) > 0.0) // the chance is of that side
         arriving = e.weight * sent * sampled.radiance / (sampled.probability * chance);
     arriving = limited(e.p, 0u, arriving * emitter_share_asked(sampled, chance, found));
+#ifdef LIGHT_LAYERS
+    ray_part.group = group_of_instance(sampled.instance);
+#endif
     return add_shadow_ray_from(place, e.p, from, sampled.direction, RAY_STOPS_T_MIN, sampled.distance_, arriving);
 }
 #endif
@@ -122,6 +125,9 @@ bool ask_for_light(eye_hit e, uint place)
     float probability = chance * light_probability(light_at(e.light_number), sampled);
     if (!e.last && probability > 0.0)
         arriving *= heuristic(probability, found);
+#endif
+#ifdef LIGHT_LAYERS
+    ray_part.group = group_of_light(e.light_number);
 #endif
     return add_shadow_ray(place, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
@@ -152,6 +158,9 @@ bool ask_for_environment(eye_hit e, uint place, uvec2 seed, uint index)
     if (!e.last)
         arriving *= heuristic(probability, found);
     vec3 from = origin_towards(e.s, e.origin, e.distance_, direction);
+#ifdef LIGHT_LAYERS
+    ray_part.group = group_of_environment();
+#endif
     return add_shadow_ray(place, e.p, from, direction, FAR, limited(e.p, 0u, arriving));
 }
 
@@ -201,7 +210,7 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
     uint place = e.j, alive = 0u;
     vec3 origin = off_surface(e.s, e.distance_, -e.s.geometric), carried = e.weight * through;
 #ifdef LIGHT_LAYERS
-    ray_part = part_met(e.p, LIGHT_EMITTED);
+    ray_part = part_met(e.p, LIGHT_EMITTED, met_number(e.p) != 0u ? group_of_light(met_number(e.p) - 1u) : 0u);
 #endif
     if (asks_lights != 0u) {
         vec3 arriving = vec3(0.0);
@@ -216,6 +225,9 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
     }
     if (asks_environment != 0u) {
         vec3 arriving = carried * environment_radiance(direction) * e.p.environment_share;
+#ifdef LIGHT_LAYERS
+        ray_part.group = group_of_environment();
+#endif
         if (add_shadow_ray(place, e.p, origin, direction, FAR, limited(e.p, 1u, arriving)))
             alive++;
     }
@@ -334,7 +346,10 @@ void main()
     e.receiver = light_receiver_of(e.s, e.b.parts, e.origin, view, NoV);
     float choice = sequence_number(seed, numbers_of(SEQUENCE_PATH_LOBE), index);
     bool straight = choice >= e.s.alpha;
-    vec3 sent = met_light(e.p, h.distance);
+    vec3 met = met_light(e.p, h.distance), sent = met;
+#ifdef LIGHT_LAYERS
+    uint met_group = met_number(e.p) != 0u ? group_of_light(met_number(e.p) - 1u) : 0u;
+#endif
     bool asks = !straight && !e.s.unlit && !e.b.leaves;
     uint alive = 0u;
 #ifdef HAS_EMITTERS
@@ -371,7 +386,13 @@ void main()
     vec3 brought = limited(e.p, 1u, e.weight * sent);
     radiance[k] = vec4(brought, seen ? e.p.weight_r : 0.0);
 #ifdef LIGHT_LAYERS
-    note_sent(e.p, h, part_met(e.p, LIGHT_EMITTED), brought);
+    vec3 own = brought;
+#if defined(LIGHT_GROUPS) && defined(HAS_AREA_LIGHTS)
+    vec3 of_light = brought * share_of(met, sent);
+    note_sent(e.p, h, part_met(e.p, LIGHT_EMITTED, met_group), of_light);
+    own -= of_light;
+#endif
+    note_sent(e.p, h, part_met(e.p, LIGHT_EMITTED, group_of_instance(h.instance)), own);
 #endif
     note_children(j, true, alive);
 }

@@ -177,6 +177,15 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
 }
 
 #ifdef LIGHT_LAYERS
+uint group_of_instance(uint instance_index)
+{
+#ifdef LIGHT_GROUPS
+    if (instance_index != HIT_NO_PRIMITIVE)
+        return instance_at(instance_index).flags >> INSTANCE_LIGHT_GROUP_SHIFT & INSTANCE_LIGHT_GROUP_MASK;
+#endif
+    return 0u;
+}
+
 // What an integrator writes to radiance[]; ground.comp replaces it where the hit is the ground's.
 void note_sent(path p, hit h, light_part part, vec3 light)
 {
@@ -189,7 +198,7 @@ void put_light_sample(uint place, vec4 light)
 {
 #ifdef LIGHT_LAYERS
     light_samples[2u * place] = light;
-    light_samples[2u * place + 1u] = vec4(light.rgb * ray_part.mirrored, ray_part.kind);
+    light_samples[2u * place + 1u] = vec4(light.rgb * ray_part.mirrored, code_of(ray_part));
 #else
     light_samples[place] = light;
 #endif

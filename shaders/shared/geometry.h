@@ -20,6 +20,8 @@ SHARED_SIZE(instance, 112)
 #define INSTANCE_MIRRORED 1u    /* negative determinant: winding is reversed */
 #define INSTANCE_POSES_SHIFT 8u /* bits 8..11: number of those matrices, at even distances of time */
 #define INSTANCE_POSES_MASK 15u
+#define INSTANCE_LIGHT_GROUP_SHIFT 12u /* bits 12..14: of what glows; 0: none */
+#define INSTANCE_LIGHT_GROUP_MASK 7u
 
 /* A mesh or a set of spheres, stored once however many instances show it. */
 struct geometry {

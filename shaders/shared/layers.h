@@ -25,10 +25,14 @@
 #define LAYER_BIT_TRANSMISSION (1u << 20)
 #define LAYER_BIT_EMISSION (1u << 21)
 #define LAYER_BIT_BACKGROUND (1u << 22)
-#define LAYER_BITS_LIGHT (0x7fu << 16) /* parts of the beauty: render/light_layers.glsl */
+#define LAYER_BITS_LIGHT_PARTS (0x7fu << 16) /* parts of the beauty: render/light_layers.glsl */
+#define LAYER_BIT_LIGHT_REST (1u << 23)
+#define LAYER_BITS_LIGHT_GROUPS                                                                                   \
+    (0xffu << 23) /* the same by where light comes from: the rest, then groups from 1 on */
+#define LAYER_BITS_LIGHT (LAYER_BITS_LIGHT_PARTS | LAYER_BITS_LIGHT_GROUPS)
 #define LAYER_BITS_ALL (LAYER_BITS_SEEN | LAYER_BITS_CRYPTO | LAYER_BIT_MOTION | LAYER_BITS_LIGHT)
 /* Of an attachment, which no layer beside the beauty goes with: no LAYER. */
-#define LAYER_BIT_STICKING (1u << 28)
+#define LAYER_BIT_STICKING (1u << 31)
 
 /* How light reaches the eye: directly, if the first surface sends on what a light has sent to it. */
 #define LIGHT_DIRECT 0.0f
@@ -36,6 +40,7 @@
 #define LIGHT_TRANSMITTED 2.0f
 #define LIGHT_EMITTED 3.0f
 #define LIGHT_BEHIND 4.0f
+#define LIGHT_KINDS 8.0f /* a kind, plus this times a light group: one number */
 
 /* Storage buffer: a plane for each layer of the frame but the beauty and those of Cryptomatte, in their order; in
  * it a vec4 for each sample of the slice. With layers of light another: what the first surface did with the light

@@ -63,7 +63,7 @@ def decode(kind, payload):
     if kind == SET_NODE:
         node, parent, node_kind, thing, hidden = f.take("5I")
         return dict(id=node, parent=parent, kind=node_kind, object=thing, hidden=hidden, matrix=f.take("12f"),
-                    skin=f.take("I"), weights=f.array("f"), name=f.string())
+                    skin=f.take("I"), light_group=f.take("I"), weights=f.array("f"), name=f.string())
     if kind == SET_MESH:
         mesh, vertices, triangles, influences, targets, closed = f.take("6I")
         return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets, closed=closed,
@@ -95,7 +95,7 @@ def decode(kind, payload):
         return dict(id=f.take("I"), fov_y=f.take("f"), height=f.take("f"), near=f.take("f"), name=f.string())
     if kind == SET_ENVIRONMENT:
         return dict(id=0, colour=f.take("3f"), rotation=f.take("f"), size=f.take("2I"), backdrop=f.take("I"), keeps_image=f.take("I"),
-                    display_values=f.take("I"), arrays=blob_refs(f))
+                    display_values=f.take("I"), light_group=f.take("I"), arrays=blob_refs(f))
     if kind == SET_SKIN:
         return dict(id=f.take("I"), joints=f.take("I"), arrays=blob_refs(f), name=f.string())
     if kind == SET_CLIP:

@@ -75,6 +75,31 @@ class Layers(OneDaemon):
         result = self.render("--layers", "light", "--integrator", "whitted", status=1)[1]
         self.assertIn("choose distributed or path", result.stderr)
 
+    def test_light_groups_are_layers_of_their_names(self):
+        """Sums of some tens of floats in two orders: a few roundings of 2^-24, of values up to 4."""
+        got = self.read("--light-group", "panel=light", "--light-group", "sky=environment", "--light-group", "panel=mirror*",
+                        "--float", "--samples", "2", "--integrator", "path")
+        self.assertEqual(set(got), {*"RGBA", *(f"light_{name}.{channel}" for name in ("panel", "rest", "sky") for channel in "RGB")})
+        self.assertGreater(max(got["light_panel.G"]), 0.5)
+        for channel in "RGB":
+            for whole, *parts in zip(got[channel], *(got[f"light_{name}.{channel}"] for name in ("panel", "rest", "sky"))):
+                self.assertAlmostEqual(sum(parts), whole, delta=2e-6 * max(whole, 1))
+
+    def test_wrong_light_groups_are_refused(self):
+        many = [word for n in range(8) for word in ("--light-group", f"g{n}=light")]
+        for options, status, text in ((["--light-group", "a=lihgt"], 2, "did you mean 'light'?"),
+                                      (["--light-group", "a=no such node"], 2, "'glass sphere', 'block'"),
+                                      (["--light-group", "a.b=light"], 2, "letters, digits and _"),
+                                      (["--light-group", "rest=light"], 2, "choose another name"),
+                                      (["--light-group", "a=light,"], 2, "no name of a node"),
+                                      (many, 2, "there may be 7"),
+                                      (["--light-group", "a=light", "--integrator", "whitted"], 1, "choose distributed or path"),
+                                      (["--light-group", "a=light", "--integrator", "path", "--tracer", "ldc"], 1, "which node glows")):
+            with self.subTest(options=options):
+                self.assertIn(text, self.render(*options, status=status)[1].stderr)
+        result = farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", "--light-group", "a=light")
+        self.assertIn("png files do not have the layers of --light-group", self.expect(result, 2).stderr)
+
     def test_dwaa_loses_nothing_but_of_colours(self):
         """Y of a position or a normal too, which the library takes for a luminance by its name."""
         options = ["--layers", "albedo,ao,beauty,depth,id,normal,position", "--samples", "1"]

@@ -56,7 +56,7 @@ CHOICES = {
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",),
-        "HAS_ANISOTROPY_MAP": ("HAS_ANISOTROPY",)}
+        "HAS_ANISOTROPY_MAP": ("HAS_ANISOTROPY",), "LIGHT_GROUPS": ("LIGHT_LAYERS",)}
 # Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
 WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE")}
 # Of a sample a pixel, without a lens and other layers of the picture.
@@ -64,10 +64,10 @@ WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
 WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
 # And in programs of a folder, but for some: what moves is met by tracers, and shaded where it was met; emitters alone are
 # looked for. Light is noted where it is shaded and gathered.
-WITHOUT_IN = {"render": ("HAS_MOTION", "LIGHT_LAYERS")}
+WITHOUT_IN = {"render": ("HAS_MOTION", "LIGHT_LAYERS", "LIGHT_GROUPS")}
 MAY_MOVE = ("render/path.comp", "render/distributed.comp", "render/ground.comp", "render/wireframe.comp")
 NOTES_LIGHT = ("render/path.comp", "render/distributed.comp", "render/ground.comp", "render/gather.comp")
-IN_ALL_THE_SAME = {"HAS_MOTION": MAY_MOVE, "LIGHT_LAYERS": NOTES_LIGHT}
+IN_ALL_THE_SAME = {"HAS_MOTION": MAY_MOVE, "LIGHT_LAYERS": NOTES_LIGHT, "LIGHT_GROUPS": NOTES_LIGHT}
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
           "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"]}

@@ -30,7 +30,8 @@ def pixels_bytes(begin: FrameBegin) -> int:
 
 def _layers_of(name: Union[str, Layer]) -> "list[Layer]":
     """A name without its digit stands for all that have it: "crypto-object"."""
-    whole = [layer for layer in Layer if isinstance(name, str) and layer.word.rstrip("0123456789") == name.replace("_", "-").lower()]
+    wanted = name.replace("_", "-").lower() if isinstance(name, str) else ""
+    whole = [layer for layer in Layer if wanted and layer.word.rstrip("0123456789").replace("_", "-") == wanted]
     return whole or [Layer(Layer.of(name))]
 
 

@@ -338,6 +338,27 @@ TEST(lights_go_along_minus_z_of_their_nodes)
     fixture_finish(&fixture);
 }
 
+TEST(a_light_is_in_the_group_of_the_nearest_node_that_has_one)
+{
+    struct fixture fixture;
+    struct light back[3];
+    const float groups[3] = {5, 2, 0};
+    fixture_init(&fixture, test_scene_create());
+    test_add(&fixture.edits, OBJECT_LIGHT)->set.light =
+        (struct scene_light){.base.id = 1, .kind = LIGHT_SPHERE, .size = {1}};
+    test_node(&fixture.edits, 1, 4, NODE_LIGHT, 1, NULL)->light_group = 5;
+    test_node(&fixture.edits, 2, 4, NODE_LIGHT, 1, NULL);
+    test_node(&fixture.edits, 3, 0, NODE_LIGHT, 1, NULL);
+    test_node(&fixture.edits, 4, 5, NODE_GROUP, 0, NULL);
+    test_node(&fixture.edits, 5, 0, NODE_GROUP, 0, NULL)->light_group = 2;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    gpu_buffer_read(device, &fixture.gpu.lights, 0, back, sizeof(back));
+    for (int i = 0; i < 3; i++)
+        assert_float_equal(back[i].position_kind[3], LIGHT_KIND_SPHERE + groups[i] / LIGHT_GROUPS_MAX, 0);
+    fixture_finish(&fixture);
+}
+
 TEST(the_radius_of_a_sphere_light_is_scaled_by_the_mean_of_its_node)
 {
     struct fixture fixture;

@@ -113,6 +113,7 @@ static void add_looks(struct draft_list *list)
     edit->set.environment.colour[0] = 2;
     edit->set.environment.rotation = 1.5f;
     edit->set.environment.display_values = true;
+    edit->set.environment.light_group = 7;
     edit->set.environment.width = 2;
     edit->set.environment.height = 1;
     edit->set.environment.texels = make_blob(half_floats, sizeof(half_floats));
@@ -126,6 +127,7 @@ static void add_nodes(struct draft_list *list)
     shown->parent = 2;
     shown->hidden = true;
     shown->skin = 70;
+    shown->light_group = 3;
     shown->weights = weights_of(0.5f, 0);
     shown->weight_count = 1;
     struct scene_skin *skin = &add_set(list, OBJECT_SKIN, 70)->set.skin;
@@ -229,7 +231,8 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
         assert_true(mesh->arrays[i] == scene_mesh(scene, 10)->arrays[i]);
     assert_true(scene_light(again, 50)->outer_cone == 0.5f && scene_light(again, 50)->kind == LIGHT_SPOT);
     assert_true(scene_camera(again, 60)->near == 0.125f && scene_texture(again, 40)->nearest);
-    assert_true(again->environment.display_values);
+    assert_true(again->environment.display_values && again->environment.light_group == 7 &&
+                node->light_group == 3);
     assert_true(again->environment.rotation == 1.5f && again->environment.texels == scene->environment.texels);
     struct store_record second = record_of(again);
     assert_int_equal(second.content_bytes, first.content_bytes);
