@@ -3,6 +3,7 @@
 #include "gltf.hpp"
 #include "points.hpp"
 #include "protocol/common/srgb.h"
+#include "splats.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -82,6 +83,48 @@ uint32_t add_points(reader &r, const tinygltf::Primitive &primitive, const std::
                                  &colours[size_t(corner) * 3] + 3);
     }
     return points::add(r, cloud, name, where);
+}
+
+// ---- Gaussians
+
+std::vector<float> floats_of(reader &r, const tinygltf::Primitive &primitive, const char *name, size_t count,
+                             int components, const std::string &where)
+{
+    const std::string attribute_name = std::string("KHR_gaussian_splatting:") + name;
+    const int accessor = attribute(primitive.attributes, attribute_name.c_str());
+    std::vector<float> values(count * size_t(components));
+
+    if (accessor < 0)
+        fail(r, where, "Gaussians lack the attribute %s", attribute_name.c_str());
+    read_floats(r, accessor, components, 0, values.data(), where + "." + attribute_name);
+    return values;
+}
+
+uint32_t add_gaussians(reader &r, const tinygltf::Primitive &primitive, const tinygltf::Value &description,
+                       const std::string &name, const std::string &where)
+{
+    const std::vector<float> places = places_of(r, primitive, where);
+    const size_t count = places.size() / 3;
+    splats::cloud cloud;
+
+    check_room(r, where, count, 11 * sizeof(float) + sizeof(splats::gaussian));
+    const std::vector<float> turns = floats_of(r, primitive, "ROTATION", count, 4, where),
+                             scales = floats_of(r, primitive, "SCALE", count, 3, where),
+                             opacities = floats_of(r, primitive, "OPACITY", count, 1, where),
+                             colours = floats_of(r, primitive, "SH_DEGREE_0_COEF_0", count, 3, where);
+    cloud.is_linear = text_of(description, "colorSpace").rfind("lin_", 0) == 0;
+    for (size_t i = 0; i < count; i++) {
+        splats::gaussian one = {};
+        for (size_t c = 0; c < 3; c++) {
+            one.place[c] = places[i * 3 + c];
+            one.deviations[c] = scales[i * 3 + c];
+            one.colour[c] = splats::colour_of(double(colours[i * 3 + c]));
+        }
+        std::copy_n(&turns[i * 4], 4, one.rotation.begin());
+        one.opacity = opacities[i];
+        cloud.all.push_back(one);
+    }
+    return splats::add(r, cloud, name, where);
 }
 
 // ---- lines
@@ -275,6 +318,13 @@ std::vector<shown_part> add_points_and_lines(reader &r, const tinygltf::Mesh &so
         if (skinned || !primitive.targets.empty())
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, here.c_str(),
                         "no skin and no morph target moves points and lines: they stay at rest");
+        const tinygltf::Value *gaussians = extension(primitive.extensions, "KHR_gaussian_splatting");
+        if (primitive.mode == TINYGLTF_MODE_POINTS && gaussians) {
+            const uint32_t id = add_gaussians(r, primitive, *gaussians, source.name, here);
+            if (id != 0)
+                parts.push_back({PROTOCOL_NODE_MESH, id});
+            continue;
+        }
         if (primitive.mode == TINYGLTF_MODE_POINTS) {
             const uint32_t id = add_points(r, primitive, source.name, here);
             if (id != 0)
