@@ -86,7 +86,21 @@ class Obj(importer.Written):
         spheres, = result.of(SET_SPHERES)
         self.assertEqual(spheres["count"], 3)
         self.assertEqual({material["base"][:3] for material in result.of(SET_MATERIAL)}, {(1, 0, 0), (0, 1, 0), (0, 0, 1)})
-        self.assertIn("lines cannot be shown", self.import_text("model.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", 1).text())
+
+    def test_lines_are_tubes_in_their_colours_and_materials(self):
+        """Also beside a face; by numbers from either end, with texture coordinates or without; each tube has 8 vertices."""
+        self.write("m.mtl", "newmtl a\nKd 1 0 0\n")
+        corners = "v 0 0 0 1 1 1\nv 1 0 0 0 0 0\nv 1 1 0 1 0 0\nvt 0 0\n"
+        for text, tubes, triangles in (("l 1 2 3 1\n", 3, 0), ("usemtl a \nl -3/1 -2/1\nf 1 2 3\n", 1, 1)):
+            result = self.import_text("model.obj", "mtllib m.mtl\n" + corners + text)
+            mesh = result.of(SET_MESH)[0]
+            self.assertEqual((mesh["vertices"], sum(one["triangles"] for one in result.of(SET_MESH)) - 12 * tubes), (8 * tubes, triangles))
+            self.assertEqual(result.data(mesh["arrays"][6])[:8], bytes((255, 255, 255, 255, 0, 0, 0, 255)))
+            self.assertIn(f"{tubes} lines are shown as tubes", result.text())
+        names = {material["id"]: material["name"] for material in result.of(SET_MATERIAL)}
+        self.assertEqual([names[material] for _, _, material in mesh["ranges"]], ["a"])
+        for text in ("l 1 4\n", "l 0 1\n", "l -4 1\n"):
+            self.assertRegex(self.import_text("model.obj", corners + text, 1).text(), "line 5: vertex -?[0-9] does not exist; there are 3 so far")
 
 
 class Gltf(importer.Written):
