@@ -135,7 +135,7 @@ void add_lines(tubes::set &t, reader &r, const tinygltf::Primitive &primitive, c
     const std::vector<float> places = places_of(r, primitive, where);
     const std::vector<uint32_t> ends = ends_of(r, primitive, places.size() / 3, where);
     const int accessor = attribute(primitive.attributes, "COLOR_0");
-    std::vector<uint8_t> colours;
+    std::vector<uint16_t> colours;
 
     if (accessor >= 0) {
         colours.resize(places.size() / 3 * 4);

@@ -212,9 +212,9 @@ template <typename type> type *allocate(size_t count)
     return static_cast<type *>(memory);
 }
 
-uint8_t linear_byte(float srgb)
+uint16_t linear(float srgb)
 {
-    return uint8_t(std::lround(linear_from_srgb_f(std::min(std::max(srgb, 0.0f), 1.0f)) * 255)); // NaN becomes 0
+    return reading::wide(linear_from_srgb_f(std::min(std::max(0.0f, srgb), 1.0f))); // NaN becomes 0
 }
 
 // Arrays of the mesh, a vertex for each triple. OBJ's v runs upwards, ours downwards.
@@ -233,7 +233,7 @@ void fill_mesh(const state &s, const std::vector<float> &colours, import_mesh &m
     if (std::any_of(triples.begin(), triples.end(), [](const triple &t) { return t.vt != none; }))
         mesh.texcoords[0] = allocate<float>(count * 2);
     if (!colours.empty())
-        mesh.colours = allocate<uint8_t>(count * 4);
+        mesh.colours = allocate<uint16_t>(count * 4);
     for (size_t i = 0; i < count; i++) {
         const triple &t = triples[i];
         memcpy(mesh.positions + i * 3, &s.positions[size_t(t.v) * 3], 12);
@@ -244,7 +244,7 @@ void fill_mesh(const state &s, const std::vector<float> &colours, import_mesh &m
             mesh.texcoords[0][i * 2 + 1] = 1 - s.texcoords[size_t(t.vt) * 2 + 1];
         }
         for (size_t c = 0; mesh.colours && c < 4; c++)
-            mesh.colours[i * 4 + c] = c < 3 ? linear_byte(colours[size_t(t.v) * 3 + c]) : 255;
+            mesh.colours[i * 4 + c] = c < 3 ? linear(colours[size_t(t.v) * 3 + c]) : 65535;
     }
 }
 
@@ -295,7 +295,7 @@ void add_lines(state &s, const std::vector<uint32_t> &ids, const std::vector<flo
     tubes::set t = {r, ""};
     tubes::box all;
     std::vector<float> used;
-    std::vector<uint8_t> bytes;
+    std::vector<uint16_t> linears;
 
     for (const line_run &run : s.text.lines)
         for (uint32_t end : run.ends) {
@@ -308,12 +308,12 @@ void add_lines(state &s, const std::vector<uint32_t> &ids, const std::vector<flo
     tubes::choose_radius(t, all, 1);
     t.has_colours = !colours.empty();
     for (size_t i = 0; i < colours.size(); i++) {
-        bytes.push_back(linear_byte(colours[i]));
+        linears.push_back(linear(colours[i]));
         if (i % 3 == 2)
-            bytes.push_back(255);
+            linears.push_back(65535);
     }
     for (const line_run &run : s.text.lines)
-        tubes::add_lines(t, s.positions, run.ends, bytes,
+        tubes::add_lines(t, s.positions, run.ends, linears,
                          run.material.empty() ? 0 : ids[name_number(s, run.material.c_str())], "");
     add_node(s, PROTOCOL_NODE_MESH, tubes::add_mesh(t, s.r.scene->file), parent);
 }

@@ -44,7 +44,7 @@ bool axes_of(const gaussian &of, std::array<std::array<double, 3>, 3> &axes)
 }
 
 void add_body(const gaussian &of, const std::array<std::array<double, 3>, 3> &axes, bool is_linear,
-              std::vector<float> &positions, std::vector<uint8_t> &colours, std::vector<uint32_t> &indices)
+              std::vector<float> &positions, std::vector<uint16_t> &colours, std::vector<uint32_t> &indices)
 {
     const uint32_t first = uint32_t(positions.size() / 3);
 
@@ -53,9 +53,9 @@ void add_body(const gaussian &of, const std::array<std::array<double, 3>, 3> &ax
             positions.push_back(float(double(of.place[c]) + (corner % 2 == 0 ? 1 : -1) * axes[corner / 2][c]));
         for (size_t c = 0; c < 3; c++) {
             const float value = std::min(std::max(0.0f, of.colour[c]), 1.0f); // NaN becomes 0
-            colours.push_back(uint8_t(std::lround((is_linear ? value : linear_from_srgb_f(value)) * 255)));
+            colours.push_back(reading::wide(is_linear ? value : linear_from_srgb_f(value)));
         }
-        colours.push_back(255);
+        colours.push_back(65535);
     }
     for (const auto &face : face_corners)
         for (uint32_t corner : face)
@@ -85,14 +85,14 @@ float colour_of(double coefficient)
 uint32_t add(reading::base &r, const cloud &from, const std::string &name, const std::string &where)
 {
     std::vector<float> positions;
-    std::vector<uint8_t> colours;
+    std::vector<uint16_t> colours;
     std::vector<uint32_t> indices;
     std::array<std::array<double, 3>, 3> axes;
     import_mesh mesh = {};
 
     if (from.all.size() > gaussians_max)
         fail(r, where, "%zu Gaussians; up to %zu are allowed", from.all.size(), gaussians_max);
-    check_room(r, where, from.all.size(), corners * 16 + faces * 12);
+    check_room(r, where, from.all.size(), corners * 20 + faces * 12);
     for (const gaussian &one : from.all)
         if (axes_of(one, axes))
             add_body(one, axes, from.is_linear, positions, colours, indices);

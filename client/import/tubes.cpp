@@ -12,7 +12,7 @@ namespace
 {
 constexpr uint32_t sides = 4, tube_vertices = 2 * sides, tube_triangles = 2 * sides + 2 * (sides - 2);
 constexpr uint64_t tubes_max = 1u << 26;
-constexpr uint64_t tube_bytes = tube_vertices * (6 * sizeof(float) + 4) + tube_triangles * 3 * sizeof(uint32_t);
+constexpr uint64_t tube_bytes = tube_vertices * (6 * sizeof(float) + 8) + tube_triangles * 3 * sizeof(uint32_t);
 constexpr double share_of_box = 200; // its diagonal, in diameters: three pixels of a picture that shows it all
 
 using place3 = std::array<float, 3>;
@@ -107,7 +107,7 @@ void choose_radius(set &t, const box &all, double metres)
 }
 
 void add_lines(set &t, const std::vector<float> &places, const std::vector<uint32_t> &ends,
-               const std::vector<uint8_t> &colours, uint32_t material, const std::string &where)
+               const std::vector<uint16_t> &colours, uint32_t material, const std::string &where)
 {
     const uint64_t count = t.positions.size() / 3 / tube_vertices + ends.size() / 2;
     const uint32_t first = uint32_t(t.indices.size() / 3);
@@ -124,7 +124,7 @@ void add_lines(set &t, const std::vector<float> &places, const std::vector<uint3
         }
         for (size_t vertex = 0; vertex < tube_vertices && t.has_colours; vertex++)
             for (size_t c = 0; c < 4; c++)
-                t.colours.push_back(colours.empty() ? 255 : colours[size_t(ends[i + vertex % 2]) * 4 + c]);
+                t.colours.push_back(colours.empty() ? 65535 : colours[size_t(ends[i + vertex % 2]) * 4 + c]);
     }
     const uint32_t triangles = uint32_t(t.indices.size() / 3) - first;
     if (triangles > 0)

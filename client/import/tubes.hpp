@@ -24,7 +24,7 @@ struct set {
     double radius = 0, metres = 1; // of a unit
     bool has_colours = false;
     std::vector<float> positions = {}, normals = {};
-    std::vector<uint8_t> colours = {};
+    std::vector<uint16_t> colours = {};
     std::vector<uint32_t> indices = {};
     std::vector<record_material_range> ranges = {};
 };
@@ -34,7 +34,7 @@ void extend(box &of, const std::vector<float> &places);
 void choose_radius(set &t, const box &all, double metres);
 // `places`: 3 a vertex; `ends`: two vertices a line; `colours`: 4 a vertex, linear, or empty.
 void add_lines(set &t, const std::vector<float> &places, const std::vector<uint32_t> &ends,
-               const std::vector<uint8_t> &colours, uint32_t material, const std::string &where);
+               const std::vector<uint16_t> &colours, uint32_t material, const std::string &where);
 // Returns the identifier of the mesh, with a note; 0: there are none.
 uint32_t add_mesh(set &t, const std::string &name);
 } // namespace tubes

@@ -65,8 +65,8 @@ class Obj(importer.Written):
 
     def test_colours_of_vertices_are_srgb(self):
         result = self.import_text("model.obj", "v 0 0 0 0.5 0.5 0.5\nv 1 0 0 1 1 1\nv 1 1 0 0 0 0\nf 1 2 3\n")
-        colours = result.data(result.of(SET_MESH)[0]["arrays"][6])
-        self.assertEqual(list(colours), [55, 55, 55, 255, 255, 255, 255, 255, 0, 0, 0, 255])
+        full = 65535
+        self.assertEqual(result.colours(result.of(SET_MESH)[0]), [14027, 14027, 14027, full, full, full, full, full, 0, 0, 0, full])
 
     def test_textures_are_found_by_their_name_alone(self):
         """Paths of the machine where the model was made, quotes and letters in another case; not where nothing is beside the model."""
@@ -179,7 +179,7 @@ class Gltf(importer.Written):
         rows = ((0, 0, 0, 1), (1, 2, 3), (1,), (0, 0, 0))
         names = ("ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0")
         data = struct.pack("<14f", 5, 6, 7, *(one for row in rows for one in row))
-        for space, wanted in (("srgb_rec709_display", 55), ("lin_rec709_display", 128)):
+        for space, wanted in (("srgb_rec709_display", 14027), ("lin_rec709_display", 32768)):
             model = {"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_gaussian_splatting"], "extensionsRequired": ["KHR_gaussian_splatting"],
                      "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "buffers": [{
                          "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii"), "byteLength": len(data)}],
@@ -195,7 +195,7 @@ class Gltf(importer.Written):
             halves = [(max(places[c::3]) - min(places[c::3])) / 2 for c in range(3)]
             for c in range(3):
                 self.assertAlmostEqual(halves[c], (1 + c) * halves[0], 5)
-            self.assertEqual(result.data(mesh["arrays"][6])[:4], bytes((wanted, wanted, wanted, 255)))
+            self.assertEqual(result.colours(mesh)[:4], [wanted, wanted, wanted, 65535])
             self.assertIn("3D Gaussians (3DGS) are not blended", result.text())
 
     def test_images_of_formats_that_are_not_read_are_named(self):
@@ -264,7 +264,7 @@ class Scanned(importer.Written):
         for full in (1, 255):
             rows = [f"{place} {full} {full / 2} 0" for place in self.QUAD]
             result = self.import_ply(self.XYZ + [f"float {name}" for name in ("red", "green", "blue")], rows, face, ["3 0 1 2", "3 1 3 2"])
-            self.assertEqual(tuple(result.data(result.of(SET_MESH)[0]["arrays"][6])[:4]), (255, 55, 0, 255))
+            self.assertEqual(result.colours(result.of(SET_MESH)[0])[:4], [65535, 14027, 0, 65535])
 
     def test_gaussians_are_bodies_in_their_colours_as_large_and_turned_as_they_say(self):
         """A long red one, turned from x to y, a flat green one, and one that is too faint. The file is cut within a fourth."""
