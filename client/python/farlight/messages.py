@@ -1464,10 +1464,10 @@ class SetMesh(Message):
         equally often in both directions, and no triangle occurs with both orientations. Only sampled structures depend
         on it
     arrays: by position: 0 positions 3 f32; 1 indices 3 u32 per triangle; 2 normals 3 f32; 3 tangents 4 f32; 4, 5
-        texture coordinate sets 2 f32; 6 colours 4 u8 linear; 7 joints influence_count u16, indices into the skin; 8
-        their weights influence_count f32, not negative, normalised to a sum of 1; 9, 10, 11 offsets of the morph
-        targets for positions, normals and tangents, 3 f32 per vertex, target after target. All but 0 and 1 may be
-        missing (0 bytes, or the array is shorter); 7 and 8 come together, 9 comes with target_count
+        texture coordinate sets 2 f32; 6 colours 4 u8, or 4 u16 of which 65535 is 1, linear; 7 joints influence_count
+        u16, indices into the skin; 8 their weights influence_count f32, not negative, normalised to a sum of 1; 9, 10,
+        11 offsets of the morph targets for positions, normals and tangents, 3 f32 per vertex, target after target. All
+        but 0 and 1 may be missing (0 bytes, or the array is shorter); 7 and 8 come together, 9 comes with target_count
     ranges: ascending, without overlap; triangles outside have the default material
     weights: of the morph targets, if a node has none of its own; missing ones are 0
     """
