@@ -113,11 +113,12 @@ bool cli_check_not_input(const char *path, const char *option, const char *const
 /* Whether a comparison of the inputs can write its picture to the path: PNG or JPEG, and not one of them. Makes
  * its folder. NULL: there is no picture. */
 bool cli_check_error_picture(const char *picture, const char *const *inputs, size_t count, struct fl_error *error);
-/* A folder in $TMPDIR for a file that is then copied to standard output. */
+/* A folder in $TMPDIR for a file that is then copied to standard output or a device. */
 bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error);
 /* A terminal is refused; `what` would be written: "an image". */
 bool cli_check_stdout(const char *what, struct fl_error *error);
-bool cli_copy_to_stdout(const char *path, struct fl_error *error);
+/* Copies a file to a device; NULL: standard output. */
+bool cli_copy_to(const char *device, const char *path, struct fl_error *error);
 
 /* ---- models.c: the models of a command line ---- */
 

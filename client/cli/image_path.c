@@ -221,26 +221,36 @@ bool cli_check_stdout(const char *what, struct fl_error *error)
     return fl_error_remedy(error, "redirect it, or name a file");
 }
 
-bool cli_copy_to_stdout(const char *path, struct fl_error *error)
+static bool write_all(int to, const char *bytes, size_t count)
+{
+    while (count > 0) {
+        const ssize_t wrote = write(to, bytes, count);
+        if (wrote < 0 && errno != EINTR)
+            return false;
+        bytes += wrote > 0 ? wrote : 0;
+        count -= wrote > 0 ? (size_t)wrote : 0;
+    }
+    return true;
+}
+
+bool cli_copy_to(const char *device, const char *path, struct fl_error *error)
 {
     static char piece[65536];
     const int fd = open(path, O_RDONLY | O_CLOEXEC);
     if (fd < 0)
         return fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %s", strerror(errno));
+    const int to = device ? open(device, O_WRONLY | O_NOCTTY | O_CLOEXEC) : STDOUT_FILENO;
     ssize_t got = 0;
-    bool good = true;
-    while (good && (got = read(fd, piece, sizeof(piece))) > 0) {
-        for (ssize_t put = 0; good && put < got;) {
-            const ssize_t wrote = write(STDOUT_FILENO, piece + put, (size_t)(got - put));
-            if (wrote >= 0)
-                put += wrote;
-            else if (errno != EINTR)
-                good = fl_error_set(error, FL_ERROR_FILE, "standard output", "cannot be written: %s",
-                                    strerror(errno));
-        }
-    }
-    if (good && got < 0)
+    bool good = to >= 0;
+    while (good && (got = read(fd, piece, sizeof(piece))) > 0)
+        good = write_all(to, piece, (size_t)got);
+    if (!good)
+        fl_error_set(error, FL_ERROR_FILE, device ? device : "standard output", "cannot be written: %s",
+                     strerror(errno));
+    else if (got < 0)
         good = fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %s", strerror(errno));
     close(fd);
+    if (device && to >= 0)
+        close(to);
     return good;
 }

@@ -17,6 +17,16 @@
 
 /* ---- what can be known before ---- */
 
+/* What cannot be replaced by a rename is written elsewhere, and copied when it is complete. */
+static bool prepare_temporary(struct cli_sink *sink, struct fl_error *error)
+{
+    if (!cli_temporary_folder(sink->folder, sizeof(sink->folder), error))
+        return false;
+    sink->has_temporary = true;
+    snprintf(sink->path, sizeof(sink->path), "%s/image.%s", sink->folder, cli_image_name(sink->output.image));
+    return true;
+}
+
 static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
 {
     sink->to_stdout = true;
@@ -27,13 +37,14 @@ static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
     const bool is_video = cli_image_is_video(sink->output.image);
     if (!cli_check_stdout(is_video ? "a video" : "an image", error))
         return is_video && fl_error_remedy(error, "pipe it into a program, for example 'ffmpeg -i - movie.webm'");
-    if (sink->output.image == CLI_IMAGE_Y4M)
-        return true;
-    if (!cli_temporary_folder(sink->folder, sizeof(sink->folder), error))
-        return false;
-    sink->has_temporary = true;
-    snprintf(sink->path, sizeof(sink->path), "%s/image.%s", sink->folder, cli_image_name(sink->output.image));
-    return true;
+    return sink->output.image == CLI_IMAGE_Y4M || prepare_temporary(sink, error);
+}
+
+/* Of a character device, such as /dev/null. */
+static bool is_device(const char *path)
+{
+    struct stat status;
+    return stat(path, &status) == 0 && S_ISCHR(status.st_mode);
 }
 
 static bool prepare(struct cli_sink *sink, struct fl_error *error)
@@ -41,6 +52,10 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     const char *path = sink->output.path;
     if (strcmp(path, "-") == 0)
         return prepare_stdout(sink, error);
+    if (is_device(path) && sink->output.image != CLI_IMAGE_Y4M) {
+        sink->device = path;
+        return prepare_temporary(sink, error);
+    }
     if (!sink->is_series || cli_image_is_video(sink->output.image))
         return cli_check_output(path, sink->folder, sizeof(sink->folder), error) &&
                cli_check_folder(path, sink->folder, sink->job->parents, error) &&
@@ -316,14 +331,19 @@ static bool finish_y4m(struct cli_sink *sink, struct fl_error *error)
     return good || fl_text_write_error(error, sink->output.path, "cannot be written", failure);
 }
 
+static bool copy_out(const struct cli_sink *sink, struct fl_error *error)
+{
+    return sink->to_stdout ? cli_copy_to(NULL, sink->path, error)
+                           : !sink->device || cli_copy_to(sink->device, sink->path, error);
+}
+
 static bool finish(struct cli_sink *sink, struct fl_error *error)
 {
     if (sink->video)
-        return fl_video_finish(sink->video, error) && (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
+        return fl_video_finish(sink->video, error) && copy_out(sink, error);
     if (sink->y4m)
         return sink->to_stdout || finish_y4m(sink, error);
-    return fl_exporter_wait(sink->exporter, error) && write_digest(sink, error) &&
-           (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
+    return fl_exporter_wait(sink->exporter, error) && write_digest(sink, error) && copy_out(sink, error);
 }
 
 bool cli_sinks_finish(struct cli_sinks *sinks, struct fl_error *error)

@@ -18,6 +18,7 @@ struct cli_sink {
     struct fl_pattern pattern;     /* of a series */
     char folder[4096], path[4352]; /* the image's path; of a series, that of the current frame */
     char undigested[4352];         /* the path of an image that is being written, and gets a digest; or empty */
+    const char *device;            /* to be written to when all is complete; NULL: none */
     bool has_temporary;            /* `folder` is to be removed */
     struct fl_exporter *exporter;  /* of images */
     struct fl_video *video;

@@ -289,7 +289,7 @@ static bool finish(struct thumbnails *wanted, const struct cli_job *sheet_job, s
         return false;
     snprintf(path, sizeof(path), "%s/sheet.%s", folder, cli_image_name(output->image));
     const bool done = start_exporter(wanted, folder, output->image, error) && write_sheet(wanted, path, error) &&
-                      cli_copy_to_stdout(path, error);
+                      cli_copy_to(NULL, path, error);
     remove(path);
     remove(folder);
     return done;

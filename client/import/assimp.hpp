@@ -50,8 +50,8 @@ void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes);
 // What the library is to read instead; of PLY and STL empty: the file itself.
 std::string mend_collada(reader &r, const unsigned char *bytes, size_t size_bytes);
 std::string mend_ply(reader &r, const unsigned char *bytes, size_t size_bytes);
-// Fails where the file ends too early.
-void check_ply_rows(reader &r, const unsigned char *bytes, size_t size_bytes);
+// Whether it is a file of Gaussians, which are added.
+bool add_ply_gaussians(reader &r, const unsigned char *bytes, size_t size_bytes);
 std::string mend_stl(reader &r, const unsigned char *bytes, size_t size_bytes);
 
 // ---- assimp_scene.cpp

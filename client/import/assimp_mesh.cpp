@@ -106,14 +106,14 @@ float full_colour(const reader &r, const aiMesh &from)
                : 1;
 }
 
-void read_colours(const aiColor4D *from, unsigned count, float full, uint8_t *to)
+void read_colours(const aiColor4D *from, unsigned count, float full, uint16_t *to)
 {
     for (unsigned i = 0; i < count; i++)
         for (unsigned c = 0; c < 4; c++) {
             const float value = !from   ? 1
                                 : c < 3 ? linear(from[i][c] / full)
                                         : std::min(std::max(from[i].a, 0.0f), 1.0f);
-            to[size_t(i) * 4 + c] = uint8_t(std::lround(value * 255));
+            to[size_t(i) * 4 + c] = reading::wide(value);
         }
 }
 
@@ -140,7 +140,7 @@ void read_vertices(builder &b, uint64_t count)
         if (any(b, [&](const aiMesh &from) { return from.mTextureCoords[set] != nullptr; }))
             mesh.texcoords[set] = reading::allocate<float>(b.r, b.where, count * 2);
     if (any(b, [](const aiMesh &from) { return from.mColors[0] != nullptr; }))
-        mesh.colours = reading::allocate<uint8_t>(b.r, b.where, count * 4);
+        mesh.colours = reading::allocate<uint16_t>(b.r, b.where, count * 4);
     for (const aiMesh *from : b.sources) {
         read_vectors(from->mVertices, from->mNumVertices, mesh.positions + first * 3);
         if (mesh.normals)

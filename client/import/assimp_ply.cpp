@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // PLY files that the library reads wrong are written anew: places far from the origin, of which floats lose the
-// most, strips of triangles, colours of faces, and Gaussians, whose colours have names of their own.
+// most, strips of triangles, colours of faces, and files that are cut off. Gaussians are read here.
 #include "assimp.hpp"
 #include "origin.h"
+#include "splats.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -29,9 +30,9 @@ struct element {
                 return i;
         return SIZE_MAX;
     }
-    bool has(const char *wanted) const
+    bool has(std::initializer_list<const char *> wanted) const
     {
-        return find(wanted) != SIZE_MAX;
+        return std::all_of(wanted.begin(), wanted.end(), [&](const char *one) { return find(one) != SIZE_MAX; });
     }
     bool has_lists() const
     {
@@ -150,85 +151,107 @@ void append(std::string &out, const std::string &type, double value)
 class data
 {
   public:
-    data(reader &of, const head &from, const unsigned char *bytes, size_t size_bytes)
-        : r(of), is_text(from.format == "ascii"), is_swapped(from.format == "binary_big_endian"),
+    data(const head &from, const unsigned char *bytes, size_t size_bytes)
+        : is_text(from.format == "ascii"), is_swapped(from.format == "binary_big_endian"),
           at(bytes + from.size_bytes), end(bytes + size_bytes)
     {
     }
-    row next(const element &of)
+    // False: the file ends before this one does.
+    bool next(const element &of, row &out)
     {
-        row out;
-        for (const property &p : of.properties) {
-            const double count = p.count_type.empty() ? 1 : next_number(p.count_type, of);
+        out.resize(of.properties.size());
+        for (size_t p = 0; p < out.size(); p++) {
+            double count = 1;
+            if (!of.properties[p].count_type.empty() && !next_number(of.properties[p].count_type, count))
+                return false;
             if (!(count >= 0 && count <= double(end - at) + 1))
-                fail(r, "", "the PLY file ends within its elements '%.60s'", of.name.c_str());
-            out.emplace_back();
-            for (size_t i = 0; i < size_t(count); i++)
-                out.back().push_back(next_number(p.type, of));
+                return false;
+            out[p].resize(size_t(count));
+            for (double &value : out[p])
+                if (!next_number(of.properties[p].type, value))
+                    return false;
         }
-        return out;
+        return true;
+    }
+    // Likewise, of all of them. Binary ones of one size are not looked at.
+    bool skip(const element &of)
+    {
+        size_t bytes = 0;
+        row one;
+        for (const property &p : of.properties)
+            bytes += bytes_of(p.type);
+        if (!is_text && !of.has_lists() && bytes > 0) {
+            const bool is_whole = of.count <= size_t(end - at) / bytes;
+            at = is_whole ? at + of.count * bytes : end;
+            return is_whole;
+        }
+        for (uint64_t i = 0; i < of.count && bytes > 0; i++)
+            if (!next(of, one))
+                return false;
+        return true;
     }
 
   private:
-    reader &r;
     const bool is_text, is_swapped;
     const unsigned char *at, *const end;
 
-    double next_number(const std::string &type, const element &of)
+    bool next_number(const std::string &type, double &out)
     {
         unsigned char bytes[8];
         const size_t size = bytes_of(type);
         if (is_text)
-            return next_word(of);
+            return next_word(out);
         if (size_t(end - at) < size)
-            fail(r, "", "the PLY file ends within its elements '%.60s'", of.name.c_str());
+            return false;
         std::copy(at, at + size, bytes);
         if (is_swapped)
             std::reverse(bytes, bytes + size);
         at += size;
-        return number_of(type, bytes);
+        out = number_of(type, bytes);
+        return true;
     }
-    double next_word(const element &of)
+    bool next_word(double &out)
     {
         char word[64];
         size_t length = 0;
         at = std::find_if(at, end, [](unsigned char c) { return c > ' '; });
         if (at == end)
-            fail(r, "", "the PLY file ends within its elements '%.60s'", of.name.c_str());
+            return false;
         for (; at<end && * at> ' '; at++)
             if (length + 1 < sizeof(word))
                 word[length++] = *at == ',' ? '.' : char(*at); // of countries with a decimal comma
         word[length] = '\0';
-        return strtod(word, nullptr);
+        out = strtod(word, nullptr);
+        return true;
     }
 };
 
 // ---- what is changed
 
 struct changes {
-    bool is_far = false, is_gaussians = false, has_strips = false, has_face_colours = false;
+    bool is_far = false, is_cut = false, has_strips = false, has_face_colours = false;
     double origin[3] = {0, 0, 0};
 };
 
 bool holds_places(const element &vertices)
 {
-    return vertices.has("x") && vertices.has("y") && vertices.has("z") && !vertices.has_lists();
+    return vertices.has({"x", "y", "z"}) && !vertices.has_lists();
 }
 
 // Whether floats lose something of the places, and the origin of these. The first one says whether the others are
 // looked at.
-void find_far(reader &r, const head &from, const unsigned char *bytes, size_t size_bytes, changes &out)
+void find_far(const head &from, const unsigned char *bytes, size_t size_bytes, changes &out)
 {
     constexpr double exact_max = 8192; // from there on floats are a millimetre apart
     const element &vertices = from.elements[0];
     const size_t axes[3] = {vertices.find("x"), vertices.find("y"), vertices.find("z")};
     double lower[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    data rows(r, from, bytes, size_bytes);
+    data rows(from, bytes, size_bytes);
+    row one;
 
     if (from.format != "ascii" && bytes_of(vertices.properties[axes[0]].type) < 8)
         return;
-    for (uint64_t i = 0; i < vertices.count; i++) {
-        const row one = rows.next(vertices);
+    for (uint64_t i = 0; i < vertices.count && rows.next(vertices, one); i++) {
         bool is_large = i > 0;
         for (size_t c = 0; c < 3; c++) {
             const double value = one[axes[c]][0];
@@ -242,19 +265,51 @@ void find_far(reader &r, const head &from, const unsigned char *bytes, size_t si
     out.is_far = import_find_origin(lower, upper, out.origin);
 }
 
-changes find_changes(reader &r, const head &from, const unsigned char *bytes, size_t size_bytes)
+// Whether the file ends early, of which the library says nothing: it shows zeros. Rows of text have a line each.
+bool is_short(const head &from, const unsigned char *bytes, size_t size_bytes)
 {
-    const element *vertices = from.find("vertex"), *faces = from.find("face");
+    const unsigned char *at = bytes + from.size_bytes, *const end = bytes + size_bytes, *last = at;
+    uint64_t stated = 0, lines = 0;
+    const element *last_element = nullptr;
+    head only = from;
+    row one;
+
+    for (const element &of : from.elements) {
+        if (of.count > size_bytes) // each takes a byte at least
+            return true;
+        stated += of.properties.empty() ? 0 : of.count;
+        last_element = of.properties.empty() || of.count == 0 ? last_element : &of;
+    }
+    if (from.format != "ascii") {
+        data rows(from, bytes, size_bytes);
+        return !std::all_of(from.elements.begin(), from.elements.end(),
+                            [&](const element &of) { return rows.skip(of); });
+    }
+    while (at < end && lines < stated) {
+        const unsigned char *stop = std::find(at, end, '\n');
+        lines += std::any_of(at, stop, [](unsigned char c) { return c > ' '; });
+        last = at;
+        at = stop + (stop < end);
+    }
+    only.size_bytes = size_t(last - bytes);
+    return last_element && (lines < stated || !data(only, bytes, size_bytes).next(*last_element, one));
+}
+
+bool can_be_written(const head &from)
+{
+    return !from.elements.empty() && from.elements[0].name == "vertex" && holds_places(from.elements[0]);
+}
+
+changes find_changes(const head &from, const unsigned char *bytes, size_t size_bytes)
+{
+    const element &vertices = from.elements[0], *faces = from.find("face");
     changes out;
 
-    if (!vertices || vertices != &from.elements[0] || !holds_places(*vertices))
-        return out;
-    find_far(r, from, bytes, size_bytes, out);
-    out.is_gaussians =
-        vertices->has("f_dc_0") && vertices->has("f_dc_1") && vertices->has("f_dc_2") && !vertices->has("red");
+    find_far(from, bytes, size_bytes, out);
+    out.is_cut = is_short(from, bytes, size_bytes);
     out.has_strips = from.find("tristrips") != nullptr;
-    out.has_face_colours = faces && faces->has("red") && faces->has("green") && faces->has("blue") &&
-                           !vertices->has("red") && !faces->has("texcoord");
+    out.has_face_colours =
+        faces && faces->has({"red", "green", "blue"}) && !vertices.has({"red"}) && !faces->has({"texcoord"});
     return out;
 }
 
@@ -266,6 +321,7 @@ struct writer {
     std::vector<row> vertices = {};
     std::string vertex_bytes = {}, face_bytes = {};
     uint64_t vertex_count = 0, face_count = 0;
+    bool has_ended = false; // before all was there
 
     bool splits() const
     {
@@ -275,8 +331,6 @@ struct writer {
 
 void write_vertex(writer &w, const row &from, const double *colour)
 {
-    // The first part of a Gaussian's spherical harmonics, which has the same value in all directions.
-    constexpr double constant_harmonic = 0.28209479177387814;
     const element &of = w.from.elements[0];
     const size_t axes[3] = {of.find("x"), of.find("y"), of.find("z")};
 
@@ -284,10 +338,6 @@ void write_vertex(writer &w, const row &from, const double *colour)
         const size_t axis = size_t(std::find(axes, axes + 3, i) - axes);
         append(w.vertex_bytes, axis < 3 ? "float" : of.properties[i].type,
                from[i][0] - (axis < 3 ? w.what.origin[axis] : 0));
-    }
-    for (size_t c = 0; w.what.is_gaussians && c < 3; c++) {
-        const double value = 0.5 + constant_harmonic * from[of.find(("f_dc_" + std::to_string(c)).c_str())][0];
-        append(w.vertex_bytes, "uchar", std::round(std::min(std::max(value, 0.0), 1.0) * 255));
     }
     for (size_t c = 0; colour && c < 3; c++)
         append(w.vertex_bytes, "uchar", colour[c]);
@@ -333,8 +383,16 @@ void write_element(reader &r, writer &w, const element &of, data &rows)
     const bool is_vertex = &of == &w.from.elements[0];
     const size_t colours[3] = {of.find("red"), of.find("green"), of.find("blue")};
 
-    for (uint64_t i = 0; i < of.count; i++) {
-        const row one = rows.next(of);
+    row one;
+    for (uint64_t i = 0; i < of.count && !of.properties.empty() && !w.has_ended; i++) {
+        w.has_ended = !rows.next(of, one);
+        if (w.has_ended) {
+            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "",
+                        "it is cut off: it states %llu elements '%.60s' and has %llu whole ones, which are shown",
+                        static_cast<unsigned long long>(of.count), of.name.c_str(),
+                        static_cast<unsigned long long>(i));
+            break;
+        }
         double colour[3] = {255, 255, 255};
         for (size_t c = 0; !is_vertex && w.splits() && c < 3 && colours[c] != SIZE_MAX && !one[colours[c]].empty();
              c++)
@@ -358,7 +416,7 @@ std::string written_head(const writer &w)
     for (const property &p : w.from.elements[0].properties)
         out += "property " + (p.name == "x" || p.name == "y" || p.name == "z" ? std::string("float") : p.type) +
                " " + p.name + "\n";
-    if (w.what.is_gaussians || w.splits())
+    if (w.splits())
         out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     if (w.face_count > 0)
         out += "element face " + std::to_string(w.face_count) + "\nproperty list int int vertex_indices\n";
@@ -366,34 +424,72 @@ std::string written_head(const writer &w)
 }
 } // namespace
 
-void check_ply_rows(reader &r, const unsigned char *bytes, size_t size_bytes)
-{
-    const head from = read_head(bytes, size_bytes);
-    data rows(r, from, bytes, size_bytes);
-
-    for (const element &one : from.elements)
-        for (uint64_t i = 0; i < one.count && !one.properties.empty(); i++)
-            rows.next(one);
-}
-
 std::string mend_ply(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
     const head from = read_head(bytes, size_bytes);
-    const changes what = find_changes(r, from, bytes, size_bytes);
 
-    if (!what.is_far && !what.is_gaussians && !what.has_strips && !what.has_face_colours)
+    if (!can_be_written(from)) {
+        if (is_short(from, bytes, size_bytes))
+            fail(r, "", "it is cut off, and its first elements are no vertices with x, y and z");
         return {};
-    if (what.is_gaussians)
-        import_note(
-            r.scene, PROTOCOL_SEVERITY_WARNING, "",
-            "it is a file of 3D Gaussians (3DGS), which are not rendered as such: their middles are shown as "
-            "points in their colours");
+    }
+    const changes what = find_changes(from, bytes, size_bytes);
+    if (!what.is_far && !what.is_cut && !what.has_strips && !what.has_face_colours)
+        return {};
     check_room(r, "", size_bytes, what.has_face_colours ? 32 : 4); // numbers of text are doubles here
     std::copy(what.origin, what.origin + 3, r.origin);
     writer w = {from, what};
-    data rows(r, from, bytes, size_bytes);
+    data rows(from, bytes, size_bytes);
     for (const element &one : from.elements)
         write_element(r, w, one, rows);
+    if (w.has_ended && w.vertex_count == 0 && w.vertices.empty())
+        fail(r, "", "it is cut off before the end of its first vertex");
     return written_head(w) + w.vertex_bytes + w.face_bytes;
+}
+
+bool add_ply_gaussians(reader &r, const unsigned char *bytes, size_t size_bytes)
+{
+    const head from = read_head(bytes, size_bytes);
+
+    if (!can_be_written(from) || !from.elements[0].has({"f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0",
+                                                        "scale_1", "rot_0", "rot_1", "rot_2", "rot_3"}))
+        return false;
+    const element &of = from.elements[0];
+    splats::cloud cloud;
+    data rows(from, bytes, size_bytes);
+    row one;
+    const auto place = [&](const char *name, size_t number) {
+        return of.find((name + std::to_string(number)).c_str());
+    };
+    const size_t at[3] = {of.find("x"), of.find("y"), of.find("z")}, opacity = of.find("opacity"),
+                 colours[3] = {place("f_dc_", 0), place("f_dc_", 1), place("f_dc_", 2)},
+                 scales[3] = {place("scale_", 0), place("scale_", 1), place("scale_", 2)}, // flat ones have two
+        turns[4] = {place("rot_", 1), place("rot_", 2), place("rot_", 3), place("rot_", 0)};
+
+    check_room(r, "", std::min<uint64_t>(of.count, size_bytes), sizeof(splats::gaussian));
+    for (uint64_t i = 0; i < of.count && rows.next(of, one); i++) {
+        splats::gaussian made = {};
+        for (size_t c = 0; c < 3; c++) {
+            made.place[c] = float(one[at[c]][0]);
+            made.colour[c] = splats::colour_of(one[colours[c]][0]);
+            made.deviations[c] = scales[c] == SIZE_MAX ? 0 : float(std::exp(one[scales[c]][0]));
+        }
+        for (size_t c = 0; c < 4; c++)
+            made.rotation[c] = float(one[turns[c]][0]);
+        made.opacity = float(1 / (1 + std::exp(-one[opacity][0])));
+        cloud.all.push_back(made);
+    }
+    if (cloud.all.size() < of.count)
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "",
+                    "it is cut off: it states %llu Gaussians and has %zu whole ones, which are shown",
+                    static_cast<unsigned long long>(of.count), cloud.all.size());
+    message_set_node set = {};
+    set.object = splats::add(r, cloud, r.scene->file, "");
+    set.kind = PROTOCOL_NODE_MESH;
+    set.name = r.scene->file;
+    import_identity(set.parent_from_node);
+    if (set.object != 0)
+        import_add_node(r.scene, &set);
+    return true;
 }
 } // namespace assimp

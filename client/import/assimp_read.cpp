@@ -80,10 +80,13 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
     if (!owner.library)
         fail(r, "", "%s", reason);
     check_bytes(r, bytes, size_bytes);
+    const bool is_ply = strcmp(r.format->ending, ".ply") == 0;
+    if (is_ply && add_ply_gaussians(r, bytes, size_bytes))
+        return;
     std::string mended;
     if (strcmp(r.format->ending, ".dae") == 0)
         mended = mend_collada(r, bytes, size_bytes);
-    else if (strcmp(r.format->ending, ".ply") == 0)
+    else if (is_ply)
         mended = mend_ply(r, bytes, size_bytes);
     else if (strcmp(r.format->ending, ".stl") == 0)
         mended = mend_stl(r, bytes, size_bytes);
@@ -92,8 +95,6 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
         size_bytes = mended.size();
     }
     r.source = owner.library->read(r.format->ending, r.format, bytes, size_bytes, &owner.keep, reason);
-    if ((!r.source || !r.source->mRootNode) && strcmp(r.format->ending, ".ply") == 0)
-        check_ply_rows(r, bytes, size_bytes);
     if (!r.source || !r.source->mRootNode)
         explain(r, reason, bytes, size_bytes);
     add_materials(r);

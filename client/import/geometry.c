@@ -240,6 +240,20 @@ static void add_bounds(struct import_scene *scene, const struct import_bounds *o
     scene->bounds[scene->bounds_count++] = box;
 }
 
+/* Colours of which bytes hold all, as most of glTF and plain ones, are sent as bytes. Returns the bytes of one. */
+static uint64_t narrow_colours(uint16_t *colours, uint64_t vertices)
+{
+    uint8_t *bytes = (uint8_t *)(void *)colours;
+    if (!colours)
+        return 4;
+    for (uint64_t i = 0; i < vertices * 4; i++)
+        if (colours[i] % 257 != 0)
+            return 4 * sizeof(*colours);
+    for (uint64_t i = 0; i < vertices * 4; i++)
+        bytes[i] = (uint8_t)(colours[i] / 257);
+    return 4;
+}
+
 uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
 {
     const char *where = mesh->where ? mesh->where : mesh->name;
@@ -281,7 +295,7 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->blobs[3] = add_array(scene, mesh->tangents, vertices, 16);
     edit->blobs[4] = add_array(scene, mesh->texcoords[0], vertices, 8);
     edit->blobs[5] = add_array(scene, mesh->texcoords[1], vertices, 8);
-    edit->blobs[6] = add_array(scene, mesh->colours, vertices, 4);
+    edit->blobs[6] = add_array(scene, mesh->colours, vertices, narrow_colours(mesh->colours, vertices));
     edit->blobs[7] = add_array(scene, mesh->joints, vertices * mesh->influence_count, 2);
     edit->blobs[8] = add_array(scene, mesh->joint_weights, vertices * mesh->influence_count, 4);
     for (uint32_t i = 0; i < 3; i++)

@@ -118,7 +118,7 @@ std::vector<uint32_t> corners_of(reader &r, const tinygltf::Primitive &primitive
 // Its material in the scene; 0: the default one.
 uint32_t material_id(reader &r, const tinygltf::Primitive &primitive, const std::string &where);
 // Four bytes each, linear.
-void read_colours(reader &r, int accessor, size_t count, uint8_t *out, const std::string &where);
+void read_colours(reader &r, int accessor, size_t count, uint16_t *out, const std::string &where);
 
 // ---- gltf_line.cpp
 // Adds the points and lines of a mesh, as spheres and as tubes; `skinned`: it has a skin, which does not move

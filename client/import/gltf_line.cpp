@@ -3,6 +3,8 @@
 #include "gltf.hpp"
 #include "points.hpp"
 #include "protocol/common/srgb.h"
+#include "splats.hpp"
+#include "tubes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,14 +15,6 @@ namespace gltf
 {
 namespace
 {
-constexpr uint32_t sides = 4, tube_vertices = 2 * sides, tube_triangles = 2 * sides + 2 * (sides - 2);
-constexpr uint64_t tubes_max = 1u << 26;
-constexpr uint64_t tube_bytes = tube_vertices * (6 * sizeof(float) + 4) + tube_triangles * 3 * sizeof(uint32_t);
-constexpr double share_of_box = 200; // its diagonal, in diameters: three pixels of a picture that shows it all
-
-using vector3 = std::array<double, 3>;
-using place3 = std::array<float, 3>;
-
 std::vector<float> places_of(reader &r, const tinygltf::Primitive &primitive, const std::string &where)
 {
     const size_t count = vertex_count(r, primitive, where);
@@ -29,16 +23,6 @@ std::vector<float> places_of(reader &r, const tinygltf::Primitive &primitive, co
     std::vector<float> places(count * 3);
     read_floats(r, attribute(primitive.attributes, "POSITION"), 3, 0, places.data(), where + ".POSITION");
     return places;
-}
-
-place3 place_at(const std::vector<float> &places, uint32_t vertex)
-{
-    return {places[size_t(vertex) * 3], places[size_t(vertex) * 3 + 1], places[size_t(vertex) * 3 + 2]};
-}
-
-bool is_usable(const place3 &p)
-{
-    return std::all_of(p.begin(), p.end(), [](float value) { return std::fabs(value) <= 1e12f; });
 }
 
 // Colours of vertices times that of the material, as points::cloud has them; empty: the vertices have none.
@@ -84,19 +68,49 @@ uint32_t add_points(reader &r, const tinygltf::Primitive &primitive, const std::
     return points::add(r, cloud, name, where);
 }
 
-// ---- lines
+// ---- Gaussians
 
-// Those of all primitives of a mesh.
-struct tubes {
-    reader &r;
-    std::string where;
-    double radius = 0;
-    bool has_colours = false;
-    std::vector<float> positions = {}, normals = {};
-    std::vector<uint8_t> colours = {};
-    std::vector<uint32_t> indices = {};
-    std::vector<record_material_range> ranges = {};
-};
+std::vector<float> floats_of(reader &r, const tinygltf::Primitive &primitive, const char *name, size_t count,
+                             int components, const std::string &where)
+{
+    const std::string attribute_name = std::string("KHR_gaussian_splatting:") + name;
+    const int accessor = attribute(primitive.attributes, attribute_name.c_str());
+    std::vector<float> values(count * size_t(components));
+
+    if (accessor < 0)
+        fail(r, where, "Gaussians lack the attribute %s", attribute_name.c_str());
+    read_floats(r, accessor, components, 0, values.data(), where + "." + attribute_name);
+    return values;
+}
+
+uint32_t add_gaussians(reader &r, const tinygltf::Primitive &primitive, const tinygltf::Value &description,
+                       const std::string &name, const std::string &where)
+{
+    const std::vector<float> places = places_of(r, primitive, where);
+    const size_t count = places.size() / 3;
+    splats::cloud cloud;
+
+    check_room(r, where, count, 11 * sizeof(float) + sizeof(splats::gaussian));
+    const std::vector<float> turns = floats_of(r, primitive, "ROTATION", count, 4, where),
+                             scales = floats_of(r, primitive, "SCALE", count, 3, where),
+                             opacities = floats_of(r, primitive, "OPACITY", count, 1, where),
+                             colours = floats_of(r, primitive, "SH_DEGREE_0_COEF_0", count, 3, where);
+    cloud.is_linear = text_of(description, "colorSpace").rfind("lin_", 0) == 0;
+    for (size_t i = 0; i < count; i++) {
+        splats::gaussian one = {};
+        for (size_t c = 0; c < 3; c++) {
+            one.place[c] = places[i * 3 + c];
+            one.deviations[c] = scales[i * 3 + c];
+            one.colour[c] = splats::colour_of(double(colours[i * 3 + c]));
+        }
+        std::copy_n(&turns[i * 4], 4, one.rotation.begin());
+        one.opacity = opacities[i];
+        cloud.all.push_back(one);
+    }
+    return splats::add(r, cloud, name, where);
+}
+
+// ---- lines
 
 // Ends of lines, two each.
 std::vector<uint32_t> ends_of(reader &r, const tinygltf::Primitive &primitive, size_t vertices,
@@ -116,141 +130,18 @@ std::vector<uint32_t> ends_of(reader &r, const tinygltf::Primitive &primitive, s
     return ends;
 }
 
-vector3 cross(const vector3 &a, const vector3 &b)
+void add_lines(tubes::set &t, reader &r, const tinygltf::Primitive &primitive, const std::string &where)
 {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-double length(const vector3 &a)
-{
-    return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-}
-
-vector3 unit(const vector3 &a)
-{
-    return {a[0] / length(a), a[1] / length(a), a[2] / length(a)};
-}
-
-void add_corners(tubes &t, uint32_t first, std::initializer_list<uint32_t> corners)
-{
-    for (uint32_t corner : corners)
-        t.indices.push_back(first + corner);
-}
-
-// A closed prism. Vertex 2 * side is at the line's begin, the next one at its end. False: the line has no length.
-bool add_tube(tubes &t, const place3 &begin, const place3 &end)
-{
-    const vector3 way = {double(end[0]) - double(begin[0]), double(end[1]) - double(begin[1]),
-                         double(end[2]) - double(begin[2])};
-    if (!(length(way) > 0))
-        return false;
-    const vector3 axis = unit(way);
-    const size_t smallest =
-        size_t(std::min_element(axis.begin(), axis.end(),
-                                [](double a, double b) { return std::fabs(a) < std::fabs(b); }) -
-               axis.begin());
-    vector3 other = {};
-    other[smallest] = 1;
-    const vector3 u = unit(cross(axis, other)), v = cross(axis, u);
-    const uint32_t first = uint32_t(t.positions.size() / 3);
-    const vector3 across[sides] = {u, v, {-u[0], -u[1], -u[2]}, {-v[0], -v[1], -v[2]}};
-
-    for (const vector3 &outwards : across)
-        for (const place3 &at : {begin, end})
-            for (size_t c = 0; c < 3; c++) {
-                t.positions.push_back(float(double(at[c]) + outwards[c] * t.radius));
-                t.normals.push_back(float(outwards[c]));
-            }
-    for (uint32_t side = 0; side < sides; side++) {
-        const uint32_t here = 2 * side, next = 2 * ((side + 1) % sides);
-        add_corners(t, first, {here, next, next + 1, here, next + 1, here + 1});
-    }
-    for (uint32_t side = 2; side < sides; side++) {
-        add_corners(t, first, {0, 2 * side, 2 * side - 2});
-        add_corners(t, first, {1, 2 * side - 1, 2 * side + 1});
-    }
-    return true;
-}
-
-void add_lines(tubes &t, const tinygltf::Primitive &primitive, const std::string &where)
-{
-    const std::vector<float> places = places_of(t.r, primitive, where);
-    const std::vector<uint32_t> ends = ends_of(t.r, primitive, places.size() / 3, where);
-    const uint64_t count = t.positions.size() / 3 / tube_vertices + ends.size() / 2;
+    const std::vector<float> places = places_of(r, primitive, where);
+    const std::vector<uint32_t> ends = ends_of(r, primitive, places.size() / 3, where);
     const int accessor = attribute(primitive.attributes, "COLOR_0");
-    const uint32_t first = uint32_t(t.indices.size() / 3);
-    std::vector<uint8_t> colours;
+    std::vector<uint16_t> colours;
 
-    if (count > tubes_max)
-        fail(t.r, where, "more than %llu lines", static_cast<unsigned long long>(tubes_max));
-    check_room(t.r, where, count, tube_bytes);
     if (accessor >= 0) {
         colours.resize(places.size() / 3 * 4);
-        read_colours(t.r, accessor, places.size() / 3, colours.data(), where + ".COLOR_0");
+        read_colours(r, accessor, places.size() / 3, colours.data(), where + ".COLOR_0");
     }
-    for (size_t i = 0; i < ends.size(); i += 2) {
-        const place3 begin = place_at(places, ends[i]), end = place_at(places, ends[i + 1]);
-        if (!is_usable(begin) || !is_usable(end) || !add_tube(t, begin, end)) {
-            import_note(t.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
-                        "lines without length, or with NaN or infinity, are left out");
-            continue;
-        }
-        for (size_t vertex = 0; vertex < tube_vertices && t.has_colours; vertex++)
-            for (size_t c = 0; c < 4; c++)
-                t.colours.push_back(colours.empty() ? 255 : colours[size_t(ends[i + vertex % 2]) * 4 + c]);
-    }
-    const uint32_t triangles = uint32_t(t.indices.size() / 3) - first;
-    if (triangles > 0)
-        t.ranges.push_back({first, triangles, material_id(t.r, primitive, where)});
-}
-
-uint32_t add_mesh(tubes &t, const std::string &name)
-{
-    import_mesh mesh = {};
-
-    if (t.indices.empty())
-        return 0;
-    mesh.name = name.c_str();
-    mesh.where = t.where.c_str();
-    mesh.vertex_count = uint32_t(t.positions.size() / 3);
-    mesh.triangle_count = uint32_t(t.indices.size() / 3);
-    mesh.range_count = uint32_t(t.ranges.size());
-    try {
-        mesh.positions = reading::copy_of(t.positions);
-        mesh.normals = reading::copy_of(t.normals);
-        mesh.colours = reading::copy_of(t.colours);
-        mesh.indices = reading::copy_of(t.indices);
-        mesh.ranges = reading::copy_of(t.ranges);
-    } catch (...) {
-        import_mesh_finish(&mesh);
-        throw;
-    }
-    const uint32_t id = import_add_mesh(t.r.scene, &mesh);
-    check(t.r);
-    import_note(t.r.scene, PROTOCOL_SEVERITY_INFO, t.where.c_str(),
-                "%zu lines are shown as tubes of diameter %.3g; --point-size sets it",
-                t.indices.size() / 3 / tube_triangles, 2 * t.radius);
-    return id;
-}
-
-struct box {
-    vector3 lower = {INFINITY, INFINITY, INFINITY}, upper = {-INFINITY, -INFINITY, -INFINITY};
-};
-
-void extend(box &of, const std::vector<float> &places)
-{
-    for (uint32_t vertex = 0; vertex < places.size() / 3; vertex++) {
-        const place3 at = place_at(places, vertex);
-        for (size_t c = 0; c < 3 && is_usable(at); c++) {
-            of.lower[c] = std::min(of.lower[c], double(at[c]));
-            of.upper[c] = std::max(of.upper[c], double(at[c]));
-        }
-    }
-}
-
-double diagonal(const box &of)
-{
-    return length({of.upper[0] - of.lower[0], of.upper[1] - of.lower[1], of.upper[2] - of.lower[2]});
+    tubes::add_lines(t, places, ends, colours, material_id(r, primitive, where), where);
 }
 } // namespace
 
@@ -259,8 +150,8 @@ std::vector<shown_part> add_points_and_lines(reader &r, const tinygltf::Mesh &so
 {
     std::vector<shown_part> parts;
     std::vector<size_t> lines;
-    tubes t = {r, where};
-    box all;
+    tubes::set t = {r, where};
+    tubes::box all;
 
     for (size_t i = 0; i < source.primitives.size(); i++) {
         const tinygltf::Primitive &primitive = source.primitives[i];
@@ -275,20 +166,27 @@ std::vector<shown_part> add_points_and_lines(reader &r, const tinygltf::Mesh &so
         if (skinned || !primitive.targets.empty())
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, here.c_str(),
                         "no skin and no morph target moves points and lines: they stay at rest");
+        const tinygltf::Value *gaussians = extension(primitive.extensions, "KHR_gaussian_splatting");
+        if (primitive.mode == TINYGLTF_MODE_POINTS && gaussians) {
+            const uint32_t id = add_gaussians(r, primitive, *gaussians, source.name, here);
+            if (id != 0)
+                parts.push_back({PROTOCOL_NODE_MESH, id});
+            continue;
+        }
         if (primitive.mode == TINYGLTF_MODE_POINTS) {
             const uint32_t id = add_points(r, primitive, source.name, here);
             if (id != 0)
                 parts.push_back({PROTOCOL_NODE_SPHERES, id});
             continue;
         }
-        extend(all, places_of(r, primitive, here));
+        tubes::extend(all, places_of(r, primitive, here));
         t.has_colours = t.has_colours || attribute(primitive.attributes, "COLOR_0") >= 0;
         lines.push_back(i);
     }
-    t.radius = (r.scene->point_size > 0 ? r.scene->point_size : diagonal(all) / share_of_box) / 2;
+    tubes::choose_radius(t, all, 1);
     for (size_t i : lines)
-        add_lines(t, source.primitives[i], where + "." + place("primitives", i));
-    const uint32_t id = add_mesh(t, source.name);
+        add_lines(t, r, source.primitives[i], where + "." + place("primitives", i));
+    const uint32_t id = tubes::add_mesh(t, source.name);
     if (id != 0)
         parts.push_back({PROTOCOL_NODE_MESH, id});
     return parts;

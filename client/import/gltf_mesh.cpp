@@ -159,7 +159,7 @@ void read_lot(builder &b, const vertex_lot &lot)
     if (a.colour >= 0)
         read_colours(b.r, a.colour, lot.count, b.mesh.colours + first * 4, b.where + ".COLOR_0");
     else if (b.mesh.colours)
-        memset(b.mesh.colours + first * 4, 255, size_t(lot.count) * 4);
+        std::fill_n(b.mesh.colours + first * 4, size_t(lot.count) * 4, uint16_t(65535));
 }
 
 bool any(const builder &b, int vertex_attributes::*member)
@@ -187,7 +187,7 @@ void read_vertices(builder &b)
                         [&](const vertex_lot &lot) { return lot.attributes.texcoord[set] >= 0; }))
             b.mesh.texcoords[set] = reading::allocate<float>(b.r, b.where, count * 2);
     if (any(b, &vertex_attributes::colour))
-        b.mesh.colours = reading::allocate<uint8_t>(b.r, b.where, count * 4);
+        b.mesh.colours = reading::allocate<uint16_t>(b.r, b.where, count * 4);
     for (const vertex_lot &lot : b.lots)
         read_lot(b, lot);
 }
@@ -317,7 +317,7 @@ uint32_t material_id(reader &r, const tinygltf::Primitive &primitive, const std:
     return material >= 0 ? r.material_ids[size_t(material)] : 0;
 }
 
-void read_colours(reader &r, int accessor, size_t count, uint8_t *out, const std::string &where)
+void read_colours(reader &r, int accessor, size_t count, uint16_t *out, const std::string &where)
 {
     const bool has_alpha = accessor_components(r, accessor, where) == 4;
     tinygltf::Accessor &from = r.model.accessors[size_t(accessor)];
@@ -328,8 +328,7 @@ void read_colours(reader &r, int accessor, size_t count, uint8_t *out, const std
 
     read_floats(r, accessor, 4, 1, colours.data(), where);
     for (size_t i = 0; i < colours.size(); i++) {
-        const float value = i % 4 == 3 && !has_alpha ? 1 : colours[i];
-        out[i] = uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255));
+        out[i] = reading::wide(i % 4 == 3 && !has_alpha ? 1 : colours[i]);
     }
 }
 

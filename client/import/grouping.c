@@ -85,7 +85,7 @@ static void copy_vertices(struct import_mesh *to, const struct import_mesh *from
     to->tangents = copy_array(from->tangents, count * 16);
     to->texcoords[0] = copy_array(from->texcoords[0], count * 8);
     to->texcoords[1] = copy_array(from->texcoords[1], count * 8);
-    to->colours = copy_array(from->colours, count * 4);
+    to->colours = copy_array(from->colours, count * 4 * sizeof(*from->colours));
 }
 
 static bool add_lot(struct import_scene *scene, uint32_t parent, const struct import_mesh *mesh,

@@ -155,7 +155,7 @@ struct import_mesh {
     float *normals;      /* 3 */
     float *tangents;     /* 4 */
     float *texcoords[2]; /* 2 */
-    uint8_t *colours;    /* 4, linear */
+    uint16_t *colours;   /* 4, linear; 65535 is 1 */
     uint32_t influence_count, target_count;
     uint16_t *joints;         /* influence_count a vertex: places in the skin, which are checked by the caller */
     float *joint_weights;     /* influence_count a vertex */

@@ -6,6 +6,7 @@
 #include "origin.h"
 #include "points.hpp"
 #include "protocol/common/srgb.h"
+#include "tubes.hpp"
 
 #include <algorithm>
 #include <array>
@@ -211,9 +212,9 @@ template <typename type> type *allocate(size_t count)
     return static_cast<type *>(memory);
 }
 
-uint8_t linear_byte(float srgb)
+uint16_t linear(float srgb)
 {
-    return uint8_t(std::lround(linear_from_srgb_f(std::min(std::max(srgb, 0.0f), 1.0f)) * 255)); // NaN becomes 0
+    return reading::wide(linear_from_srgb_f(std::min(std::max(0.0f, srgb), 1.0f))); // NaN becomes 0
 }
 
 // Arrays of the mesh, a vertex for each triple. OBJ's v runs upwards, ours downwards.
@@ -232,7 +233,7 @@ void fill_mesh(const state &s, const std::vector<float> &colours, import_mesh &m
     if (std::any_of(triples.begin(), triples.end(), [](const triple &t) { return t.vt != none; }))
         mesh.texcoords[0] = allocate<float>(count * 2);
     if (!colours.empty())
-        mesh.colours = allocate<uint8_t>(count * 4);
+        mesh.colours = allocate<uint16_t>(count * 4);
     for (size_t i = 0; i < count; i++) {
         const triple &t = triples[i];
         memcpy(mesh.positions + i * 3, &s.positions[size_t(t.v) * 3], 12);
@@ -243,7 +244,7 @@ void fill_mesh(const state &s, const std::vector<float> &colours, import_mesh &m
             mesh.texcoords[0][i * 2 + 1] = 1 - s.texcoords[size_t(t.vt) * 2 + 1];
         }
         for (size_t c = 0; mesh.colours && c < 4; c++)
-            mesh.colours[i * 4 + c] = c < 3 ? linear_byte(colours[size_t(t.v) * 3 + c]) : 255;
+            mesh.colours[i * 4 + c] = c < 3 ? linear(colours[size_t(t.v) * 3 + c]) : 65535;
     }
 }
 
@@ -275,13 +276,63 @@ uint32_t parent_of(const state &s)
     return s.text.places.empty() ? 0 : import_add_origin_node(s.r.scene, s.text.origin, 0);
 }
 
-void add_mesh(state &s, const prepared &text)
+void add_node(state &s, protocol_node_kind kind, uint32_t object, uint32_t parent)
 {
+    message_set_node set = {};
+
+    set.object = object;
+    set.kind = kind;
+    set.name = s.r.scene->file;
+    set.parent = parent;
+    import_identity(set.parent_from_node);
+    if (object != 0)
+        import_add_node(s.r.scene, &set);
+}
+
+void add_lines(state &s, const std::vector<uint32_t> &ids, const std::vector<float> &colours, uint32_t parent)
+{
+    reading::base r = {s.r.scene};
+    tubes::set t = {r, ""};
+    tubes::box all;
+    std::vector<float> used;
+    std::vector<uint16_t> linears;
+
+    for (const line_run &run : s.text.lines)
+        for (uint32_t end : run.ends) {
+            if (end >= s.positions.size() / 3) // the library may see fewer vertices than our own look at the text
+                reading::fail(r, "", "a line has the vertex %u, but there are %zu", end + 1,
+                              s.positions.size() / 3);
+            used.insert(used.end(), &s.positions[size_t(end) * 3], &s.positions[size_t(end) * 3] + 3);
+        }
+    tubes::extend(all, used);
+    tubes::choose_radius(t, all, 1);
+    t.has_colours = !colours.empty();
+    for (size_t i = 0; i < colours.size(); i++) {
+        linears.push_back(linear(colours[i]));
+        if (i % 3 == 2)
+            linears.push_back(65535);
+    }
+    for (const line_run &run : s.text.lines)
+        tubes::add_lines(t, s.positions, run.ends, linears,
+                         run.material.empty() ? 0 : ids[name_number(s, run.material.c_str())], "");
+    add_node(s, PROTOCOL_NODE_MESH, tubes::add_mesh(t, s.r.scene->file), parent);
+}
+
+void add_faces_and_lines(state &s, const prepared &text)
+{
+    for (const line_run &run : text.lines)
+        if (!run.material.empty())
+            name_number(s, run.material.c_str());
     const std::vector<uint32_t> ids = material_ids(s, text.libraries);
     std::vector<uint32_t> materials(s.names.size());
     import_mesh mesh = {};
 
     if (s.r.scene->failed)
+        return;
+    const uint32_t parent = parent_of(s);
+    if (!text.lines.empty())
+        add_lines(s, ids, text.colours, parent);
+    if (s.indices.empty())
         return;
     for (size_t i = 0; i < materials.size(); i++)
         materials[i] = s.names[i] == none ? 0 : ids[s.names[i]];
@@ -292,24 +343,18 @@ void add_mesh(state &s, const prepared &text)
         throw;
     }
     mesh.name = s.r.scene->file;
-    import_add_grouped_mesh(s.r.scene, parent_of(s), &mesh, materials.data());
+    import_add_grouped_mesh(s.r.scene, parent, &mesh, materials.data());
 }
 
 void add_points(state &s, prepared &text)
 {
     reading::base r = {s.r.scene};
     points::cloud cloud;
-    message_set_node set = {};
 
     cloud.places = std::move(s.positions);
     cloud.colours = std::move(text.colours);
-    set.object = points::add(r, cloud, s.r.scene->file, "");
-    set.kind = PROTOCOL_NODE_SPHERES;
-    set.name = s.r.scene->file;
-    set.parent = parent_of(s);
-    import_identity(set.parent_from_node);
-    if (set.object != 0)
-        import_add_node(s.r.scene, &set);
+    const uint32_t object = points::add(r, cloud, s.r.scene->file, "");
+    add_node(s, PROTOCOL_NODE_SPHERES, object, parent_of(s));
 }
 
 void import(reader &r, const unsigned char *bytes, size_t size_bytes)
@@ -326,17 +371,17 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
     if (r.scene->failed)
         return;
     text.colours.resize(text.colours.empty() ? 0 : s.positions.size(), 1);
-    if (s.indices.empty() && !s.positions.empty() && !text.has_lines) {
+    if (s.indices.empty() && text.lines.empty() && !s.positions.empty()) {
         add_points(s, text);
         return;
     }
-    if (s.indices.empty()) {
-        import_fail(r.scene, nullptr, "it contains no faces%s", text.has_lines ? "; lines cannot be shown" : "");
+    if (s.indices.empty() && text.lines.empty()) {
+        import_fail(r.scene, nullptr, "it contains no faces");
         return;
     }
-    if (text.has_points || text.has_lines)
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "points and lines beside faces cannot be shown");
-    add_mesh(s, text);
+    if (text.has_points)
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "points beside faces or lines cannot be shown");
+    add_faces_and_lines(s, text);
 }
 } // namespace
 } // namespace obj

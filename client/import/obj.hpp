@@ -37,6 +37,11 @@ class memory_stream : public std::streambuf
 };
 
 // ---- obj_text.cpp: what is done to the text before tinyobjloader sees it
+// Lines of one material, which the library does not tell of.
+struct line_run {
+    std::string material;       // empty: none
+    std::vector<uint32_t> ends; // two vertices each
+};
 struct prepared {
     const char *original;
     size_t original_bytes;
@@ -53,7 +58,8 @@ struct prepared {
     double origin[3];                   // to be subtracted from these
     std::vector<float> colours;         // 3 a vertex, sRGB, as the file has them; empty: it has none
     std::vector<std::string> libraries; // whole arguments of mtllib: several names, or one with spaces
-    bool has_points, has_lines;
+    bool has_points;
+    std::vector<line_run> lines; // of l statements
 };
 // UTF-16 becomes UTF-8, continued lines become one, decimal commas become points, and corners lose the slashes at
 // their end; numbers that are none are reported with their line.

@@ -108,6 +108,7 @@ struct scan {
     prepared &out;
     size_t line = 0;
     size_t vertices = 0;
+    std::string material = {};
 };
 
 // Floats are a millimetre apart from here on.
@@ -198,6 +199,30 @@ bool scan_face(scan &s, const char *at, const char *end)
                        "a polygon of %zu corners; 3 to %u are allowed", corners, POLYGON_CORNERS_MAX);
 }
 
+// Vertices, each with or without texture coordinates behind a slash: 1 2 3, 1/1 2/2, -2 -1.
+bool scan_polyline(scan &s, const char *at, const char *end)
+{
+    std::vector<line_run> &lines = s.out.lines;
+    uint32_t before = 0;
+
+    if (lines.empty() || lines.back().material != s.material)
+        lines.push_back({s.material, {}});
+    for (size_t count = 0;; count++) {
+        at = std::find_if_not(at, end, is_blank);
+        if (at == end)
+            return true;
+        const long long index = strtoll(at, nullptr, 10),
+                        vertex = index > 0 ? index - 1 : static_cast<long long>(s.vertices) + index;
+        if (index == 0 || vertex < 0 || vertex >= static_cast<long long>(s.vertices))
+            return import_fail(s.r.scene, ("line " + std::to_string(s.line)).c_str(),
+                               "vertex %lld does not exist; there are %zu so far", index, s.vertices);
+        if (count > 0)
+            lines.back().ends.insert(lines.back().ends.end(), {before, uint32_t(vertex)});
+        before = uint32_t(vertex);
+        at = std::find_if(at, end, is_blank);
+    }
+}
+
 bool scan_line(scan &s, const char *at, const char *end)
 {
     while (at < end && is_blank(*at))
@@ -209,7 +234,10 @@ bool scan_line(scan &s, const char *at, const char *end)
     if (at[0] == 'f' && is_blank(at[1]))
         return scan_face(s, at + 2, end);
     s.out.has_points = s.out.has_points || (at[0] == 'p' && is_blank(at[1]));
-    s.out.has_lines = s.out.has_lines || (at[0] == 'l' && is_blank(at[1]));
+    if (at[0] == 'l' && is_blank(at[1]))
+        return scan_polyline(s, at + 2, end);
+    if (end - at > 7 && memcmp(at, "usemtl", 6) == 0 && is_blank(at[6]))
+        s.material.assign(std::find_if_not(at + 7, end, is_blank), end);
     if (end - at > 7 && memcmp(at, "mtllib", 6) == 0 && is_blank(at[6])) {
         const char *from = at + 7, *to = end;
         while (from < to && is_blank(*from))
@@ -253,7 +281,7 @@ std::string memory_stream::place() const
 
 prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
-    prepared out = {reinterpret_cast<const char *>(bytes), size_bytes, {}, {}, {}, {}, {}, false, false};
+    prepared out = {reinterpret_cast<const char *>(bytes), size_bytes, {}, {}, {}, {}, {}, false, {}};
 
     if (size_bytes >= 2 && ((bytes[0] == 0xfe && bytes[1] == 0xff) || (bytes[0] == 0xff && bytes[1] == 0xfe)))
         out.mended = from_utf16(bytes, size_bytes, bytes[0] == 0xfe);

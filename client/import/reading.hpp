@@ -5,6 +5,8 @@
 
 #include "import.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
@@ -91,6 +93,12 @@ template <typename type> type *copy_of(const std::vector<type> &from)
         memcpy(copy, from.data(), from.size() * sizeof(type));
     return copy;
 }
+// Of linear light, as colours of vertices have it. NaN becomes 0.
+inline uint16_t wide(float value)
+{
+    return uint16_t(std::lround(std::min(std::max(0.0f, value), 1.0f) * 65535));
+}
+
 // -1: it is none.
 inline int hex_value(char c)
 {

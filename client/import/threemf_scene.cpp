@@ -25,12 +25,10 @@ float linear(uint8_t value)
     return linear_from_srgb_f(float(value) / 255);
 }
 
-colour linear_of(const colour &of)
+std::array<uint16_t, 4> linear_of(const colour &of)
 {
-    colour made = of;
-    for (size_t c = 0; c < 3; c++)
-        made[c] = uint8_t(std::lround(linear(of[c]) * 255));
-    return made;
+    return {reading::wide(linear(of[0])), reading::wide(linear(of[1])), reading::wide(linear(of[2])),
+            uint16_t(of[3] * 257)};
 }
 
 uint32_t add_material(reader &r, const std::string &name, const colour &of)
@@ -79,7 +77,7 @@ class meaning
     colour of_corner(const triangle &t, size_t corner) const
     {
         const group *g = group_of(t);
-        return g && !g->has_materials ? linear_of(g->colours[t.properties[corner]]) : white;
+        return g && !g->has_materials ? g->colours[t.properties[corner]] : white;
     }
 
   private:
@@ -102,7 +100,7 @@ class meaning
 struct parts {
     std::vector<float> positions;
     std::vector<uint32_t> indices;
-    std::vector<uint8_t> colours; // empty: there are none
+    std::vector<uint16_t> colours; // empty: there are none
     std::vector<record_material_range> ranges;
 };
 
@@ -122,7 +120,8 @@ void split_by_colour(const geometry &from, const std::vector<const triangle *> &
             if (entry.second) {
                 out.positions.insert(out.positions.end(), &from.positions[size_t(t->corners[i]) * 3],
                                      &from.positions[size_t(t->corners[i]) * 3] + 3);
-                out.colours.insert(out.colours.end(), c.begin(), c.end());
+                const std::array<uint16_t, 4> made_linear = linear_of(c);
+                out.colours.insert(out.colours.end(), made_linear.begin(), made_linear.end());
             }
             out.indices.push_back(entry.first->second);
         }

@@ -267,15 +267,19 @@ static void pack_texcoords(const struct gpu_scene_geometry *geometry, float *out
     }
 }
 
-static void pack_colours(const struct gpu_scene_geometry *geometry, uint32_t *out)
+/* Four of 16 bits: bytes of linear light would make steps of what is dark. */
+static void pack_colours(const struct gpu_scene_geometry *geometry, uint16_t *out)
 {
     const struct scene_mesh *mesh = geometry->mesh;
-    size_t bytes = (size_t)mesh->vertex_count * sizeof(*out);
-    out += geometry->device.first_vertex;
-    if (mesh->arrays[MESH_COLOURS])
-        memcpy(out, mesh->arrays[MESH_COLOURS]->data, bytes);
+    const size_t count = (size_t)mesh->vertex_count * 4;
+    out += (size_t)geometry->device.first_vertex * 4;
+    if (!mesh->arrays[MESH_COLOURS])
+        memset(out, 0, count * sizeof(*out));
+    else if (mesh_has_wide_colours(mesh))
+        memcpy(out, mesh->arrays[MESH_COLOURS]->data, count * sizeof(*out));
     else
-        memset(out, 0, bytes);
+        for (size_t i = 0; i < count; i++)
+            out[i] = (uint16_t)(mesh->arrays[MESH_COLOURS]->data[i] * 257);
 }
 
 /* What is written of each mesh. */
@@ -362,7 +366,7 @@ static void list_parts(struct gpu_scene *gpu, const struct totals *totals)
         {&gpu->tangents, PACKED_TANGENTS, moving * sizeof(uint32_t), GEOMETRY_HAS_TANGENTS},
         {&gpu->texcoords, PACKED_TEXCOORDS, resting * 4 * sizeof(float),
          GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1},
-        {&gpu->colours, PACKED_COLOURS, resting * sizeof(uint32_t), GEOMETRY_HAS_COLOURS},
+        {&gpu->colours, PACKED_COLOURS, resting * 4 * sizeof(uint16_t), GEOMETRY_HAS_COLOURS},
     };
     struct packing *packing = &gpu->state->packing;
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {

@@ -300,7 +300,7 @@ void gpu_scene_bind(struct gpu_scene *gpu)
     gpu_buffer_bind_texels(device, &gpu->normals, UNIT_NORMALS, GL_RGBA32F);
     gpu_buffer_bind_texels(device, &gpu->tangents, UNIT_TANGENTS, GL_R32UI);
     gpu_buffer_bind_texels(device, &gpu->texcoords, UNIT_TEXCOORDS, GL_RGBA32F);
-    gpu_buffer_bind_texels(device, &gpu->colours, UNIT_COLOURS, GL_RGBA8);
+    gpu_buffer_bind_texels(device, &gpu->colours, UNIT_COLOURS, GL_RGBA16);
     gpu_buffer_bind_texels(device, &gpu->spheres, UNIT_SPHERES, GL_RGBA32F);
     gpu_buffer_bind_texels(device, &gpu->sphere_materials, UNIT_SPHERE_MATERIALS, GL_R32UI);
     gpu_buffer_bind_texels(device, &gpu->texels, UNIT_TEXELS, GL_RGBA8);

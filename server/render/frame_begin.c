@@ -386,7 +386,7 @@ static void limit_samples(const struct frame_renderer *renderer, struct frame_re
 }
 
 static const struct gpu_texel_formats texel_formats = {.of_unit = {[UNIT_TANGENTS] = GL_R32UI,
-                                                                   [UNIT_COLOURS] = GL_RGBA8,
+                                                                   [UNIT_COLOURS] = GL_RGBA16,
                                                                    [UNIT_SPHERE_MATERIALS] = GL_R32UI,
                                                                    [UNIT_TEXELS] = GL_RGBA8,
                                                                    [UNIT_SHADE_ENVIRONMENT] = GL_R32F,

@@ -49,6 +49,12 @@ static const struct array_row array_rows[MESH_ARRAY_COUNT] = {
                               .max = COORDINATE_MAX},
 };
 
+bool mesh_has_wide_colours(const struct scene_mesh *mesh)
+{
+    return mesh->arrays[MESH_COLOURS] &&
+           mesh->arrays[MESH_COLOURS]->size_bytes == 4 * sizeof(uint16_t) * (uint64_t)mesh->vertex_count;
+}
+
 /* Elements of an array; neither product leaves 64 bits. */
 static uint64_t element_count(const struct scene_mesh *mesh, const struct array_row *row)
 {
@@ -99,6 +105,8 @@ static bool sizes_check(const struct scene_mesh *mesh, const struct edit_place *
             continue;
         }
         uint64_t element_bytes = row->components ? row->components * 4u : row->bytes;
+        if (i == MESH_COLOURS && mesh_has_wide_colours(mesh))
+            element_bytes = 4 * sizeof(uint16_t);
         if (!array_size_check(mesh->arrays[i], element_count(mesh, row), element_bytes, row->path, place))
             return false;
     }

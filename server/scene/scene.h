@@ -27,7 +27,7 @@ enum mesh_array {
     MESH_TANGENTS,    /* 4 f32, the last is the handedness */
     MESH_TEXCOORDS_0, /* 2 f32 */
     MESH_TEXCOORDS_1,
-    MESH_COLOURS,          /* 4 u8, linear */
+    MESH_COLOURS,          /* 4 u8, or 4 u16 where mesh_has_wide_colours(); linear */
     MESH_JOINTS,           /* influence_count u16, places in the skin */
     MESH_WEIGHTS,          /* influence_count f32, not negative; their sum counts as 1 */
     MESH_TARGET_POSITIONS, /* offsets of the morph targets: 3 f32 a vertex, target after target */
@@ -256,6 +256,8 @@ const struct scene_node *scene_node(const struct scene *scene, uint32_t id);
 /* The light group of a node, its own or the nearest above it; 0: none. */
 uint32_t scene_light_group(const struct scene *scene, const struct scene_node *node);
 const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id);
+/* Whether its colours have 16 bits each. */
+bool mesh_has_wide_colours(const struct scene_mesh *mesh);
 const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id);
 const struct scene_material *scene_material(const struct scene *scene, uint32_t id);
 /* What the body behind a material absorbs of a colour channel, 1 / metre. */

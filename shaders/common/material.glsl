@@ -17,6 +17,7 @@
 
 #include "shared/hit.h"
 #include "common/cone.glsl"
+#include "common/hit_colour.glsl"
 #include "common/sampled.glsl"
 #include "common/detail.glsl"
 #include "common/relief.glsl"
@@ -348,7 +349,7 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 #ifdef HAS_ANISOTROPY
     s.grain = vec3(cos(m.anisotropy_rotation), sin(m.anisotropy_rotation), m.anisotropy);
 #endif
-    vec4 colour = m.base_colour * unpackUnorm4x8(h.colour);
+    vec4 colour = m.base_colour * unpack_hit_colour(h.colour);
     bool is_stored = false;
     s.curvature = 0.0;
 #ifdef HAS_SAMPLED

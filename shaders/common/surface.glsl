@@ -5,6 +5,7 @@
 // Defines: those of common/attributes.glsl; NO_TANGENTS: no mesh has tangents, and no material asks for those that follow
 // from texture coordinates; NO_DISCS: there are none.
 #include "common/attributes.glsl"
+#include "common/hit_colour.glsl"
 #include "common/normals.glsl"
 #include "common/unit.glsl"
 
@@ -97,7 +98,7 @@ hit finish_hit(uint material_index, float distance, vec3 direction_world, vec3 g
         h.tangent = pack_tangent(normalize(tangent_world.xyz), tangent_world.w);
         h.material |= HIT_HAS_TANGENT;
     }
-    h.colour = packUnorm4x8(colour);
+    h.colour = pack_hit_colour(colour);
     return h;
 }
 

@@ -98,7 +98,7 @@ plain_surface plain_triangle(point p)
     found.colour = vec4(1.0);
 #ifdef HAS_COLOURS
     if ((p.flags & DRAWN_COLOURS) != 0u)
-        found.colour = unpackUnorm4x8(packUnorm4x8(triangle_colour(t.vertices, GEOMETRY_HAS_COLOURS, weights)));
+        found.colour = unpack_hit_colour(pack_hit_colour(triangle_colour(t.vertices, GEOMETRY_HAS_COLOURS, weights)));
 #endif
     return found;
 }
@@ -153,7 +153,7 @@ void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
     hit h = hit_at(p, origin, direction);
     s.geometric = unpack_unit(h.normal_geometric);
     s.normal = unpack_unit(h.normal_shading);
-    vec4 colour = unpackUnorm4x8(h.colour);
+    vec4 colour = unpack_hit_colour(h.colour);
     material m = material_at(h.material & HIT_MATERIAL_MASK);
     vec4 uv01 = uintBitsToFloat(h.uv01_or_sample);
 #ifdef HAS_TEXTURES

@@ -134,6 +134,11 @@ class Result:
     def integers(self, reference):
         return list(memoryview(self.data(reference)).cast("I"))
 
+    def colours(self, mesh):
+        """Of vertices, 4 each: linear, 65535 is 1. Those that bytes hold exactly are sent as bytes."""
+        data = memoryview(self.data(mesh["arrays"][6]))
+        return list(data.cast("H")) if len(data) == 8 * mesh["vertices"] else [257 * one for one in data]
+
     def channels(self):
         """{(node's name, path): (interpolation, times, values)} of the only clip."""
         names = {node["id"]: node["name"] for node in self.of(SET_NODE)}
@@ -333,7 +338,8 @@ def import_files(paths, **options):
 def array_widths(mesh):
     """Bytes of a vertex in each array; the second one has 12 a triangle."""
     influences, targets = mesh["influences"], mesh["targets"]
-    return (12, None, 12, 16, 8, 8, 4, 2 * influences, 4 * influences) + (12 * targets,) * 3
+    colours = 8 if len(mesh["arrays"]) > 6 and mesh["arrays"][6][0] == 8 * mesh["vertices"] else 4
+    return (12, None, 12, 16, 8, 8, colours, 2 * influences, 4 * influences) + (12 * targets,) * 3
 
 
 def animation_inconsistencies(result):

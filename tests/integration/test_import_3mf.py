@@ -50,7 +50,7 @@ class ThreeMf(importer.Written):
     def colours(self, result):
         """Of the corners of the only mesh, triangle after triangle."""
         mesh, = result.of(SET_MESH)
-        values = result.data(mesh["arrays"][6])
+        values = [value // 257 for value in result.colours(mesh)]
         return [tuple(values[i * 4:i * 4 + 3]) for i in result.integers(mesh["arrays"][1])]
 
     def names(self, result):

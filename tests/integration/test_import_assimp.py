@@ -226,9 +226,19 @@ class Formats(importer.Written):
     def test_colours_of_vertices_are_srgb(self):
         result = self.import_text("model.ply", ply(colours=(RED, GREEN, BLUE, (128, 128, 128))))
         mesh, = result.of(SET_MESH)
-        self.assertEqual(list(result.data(mesh["arrays"][6])), [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 55, 55, 55, 255],
-                         "128 of 255 is 0.2158 of the light")
+        full = 65535
+        self.assertEqual(result.colours(mesh), [full, 0, 0, full, 0, full, 0, full, 0, 0, full, full, 14146, 14146, 14146, full],
+                         "128 of 255 is 0.21586 of the light")
         self.assertEqual(result.of(SET_MATERIAL), [], "they are shown as they are")
+
+    def test_dark_colours_of_vertices_stay_apart(self):
+        """All 256 of sRGB: a step of the darkest is 20 of 65535. Those that bytes of linear light hold are sent as bytes."""
+        result = self.import_text("model.ply", ply([(i, i % 3, 0) for i in range(256)], ((0, 1, 2),), [(i, i, i) for i in range(256)]))
+        values = result.colours(result.of(SET_MESH)[0])[::4]
+        self.assertEqual(values[:3], [0, 20, 40])
+        self.assertEqual(len(set(values)), 256)
+        result = self.import_text("model.ply", ply(colours=(RED, GREEN, BLUE, (255, 255, 0))))
+        self.assertEqual(len(result.data(result.of(SET_MESH)[0]["arrays"][6])), 16)
 
     # ---- points
 
@@ -418,7 +428,7 @@ class Formats(importer.Written):
                 ("endless.ply", ply().replace("end_header", "comment"), "line 10: '0 0 0' is no statement"),
                 ("cut.ply", ply()[:150], "does not end within 150 bytes"),
                 ("word.ply", ply().replace("float z", "flow z"), "line 6: 'property flow z' is no statement"),
-                ("many.ply", ply().replace("vertex 4", "vertex 4000000000"), "line 3: it promises 4000000000 elements 'vertex'"),
+                ("many.ply", ply().replace("vertex 4", "vertex 4000000000").replace("float x", "float q"), "it is cut off, and its first elements are no"),
                 ("short.stl", stl_bytes(CORNERS)[:120], "is cut off before the end of the first"),
                 ("corners.ply", ply([(math.cos(i), math.sin(i), 0) for i in range(70000)], (range(70000),)).replace(
                     "list uchar", "list uint"), "a polygon of 70000 corners; 3 to 65536 are allowed"),

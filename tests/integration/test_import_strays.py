@@ -5,6 +5,7 @@ author meant it, or a note names what is left out and why."""
 import base64
 import io
 import json
+import math
 import struct
 import unittest
 import zipfile
@@ -64,8 +65,8 @@ class Obj(importer.Written):
 
     def test_colours_of_vertices_are_srgb(self):
         result = self.import_text("model.obj", "v 0 0 0 0.5 0.5 0.5\nv 1 0 0 1 1 1\nv 1 1 0 0 0 0\nf 1 2 3\n")
-        colours = result.data(result.of(SET_MESH)[0]["arrays"][6])
-        self.assertEqual(list(colours), [55, 55, 55, 255, 255, 255, 255, 255, 0, 0, 0, 255])
+        full = 65535
+        self.assertEqual(result.colours(result.of(SET_MESH)[0]), [14027, 14027, 14027, full, full, full, full, full, 0, 0, 0, full])
 
     def test_textures_are_found_by_their_name_alone(self):
         """Paths of the machine where the model was made, quotes and letters in another case; not where nothing is beside the model."""
@@ -85,7 +86,21 @@ class Obj(importer.Written):
         spheres, = result.of(SET_SPHERES)
         self.assertEqual(spheres["count"], 3)
         self.assertEqual({material["base"][:3] for material in result.of(SET_MATERIAL)}, {(1, 0, 0), (0, 1, 0), (0, 0, 1)})
-        self.assertIn("lines cannot be shown", self.import_text("model.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", 1).text())
+
+    def test_lines_are_tubes_in_their_colours_and_materials(self):
+        """Also beside a face; by numbers from either end, with texture coordinates or without; each tube has 8 vertices."""
+        self.write("m.mtl", "newmtl a\nKd 1 0 0\n")
+        corners = "v 0 0 0 1 1 1\nv 1 0 0 0 0 0\nv 1 1 0 1 0 0\nvt 0 0\n"
+        for text, tubes, triangles in (("l 1 2 3 1\n", 3, 0), ("usemtl a \nl -3/1 -2/1\nf 1 2 3\n", 1, 1)):
+            result = self.import_text("model.obj", "mtllib m.mtl\n" + corners + text)
+            mesh = result.of(SET_MESH)[0]
+            self.assertEqual((mesh["vertices"], sum(one["triangles"] for one in result.of(SET_MESH)) - 12 * tubes), (8 * tubes, triangles))
+            self.assertEqual(result.data(mesh["arrays"][6])[:8], bytes((255, 255, 255, 255, 0, 0, 0, 255)))
+            self.assertIn(f"{tubes} lines are shown as tubes", result.text())
+        names = {material["id"]: material["name"] for material in result.of(SET_MATERIAL)}
+        self.assertEqual([names[material] for _, _, material in mesh["ranges"]], ["a"])
+        for text in ("l 1 4\n", "l 0 1\n", "l -4 1\n"):
+            self.assertRegex(self.import_text("model.obj", corners + text, 1).text(), "line 5: vertex -?[0-9] does not exist; there are 3 so far")
 
 
 class Gltf(importer.Written):
@@ -160,6 +175,29 @@ class Gltf(importer.Written):
         result = self.run_gltf(primitives=[{"attributes": {"POSITION": 0, "COLOR_0": 2}}])
         self.assertEqual(result.data(result.of(SET_MESH)[0]["arrays"][6]), bytes((255, 51, 0, 0)) * 3)
 
+    def test_gaussians_of_a_file_that_requires_them_are_bodies_with_a_note(self):
+        rows = ((0, 0, 0, 1), (1, 2, 3), (1,), (0, 0, 0))
+        names = ("ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0")
+        data = struct.pack("<14f", 5, 6, 7, *(one for row in rows for one in row))
+        for space, wanted in (("srgb_rec709_display", 14027), ("lin_rec709_display", 32768)):
+            model = {"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_gaussian_splatting"], "extensionsRequired": ["KHR_gaussian_splatting"],
+                     "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "buffers": [{
+                         "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii"), "byteLength": len(data)}],
+                     "bufferViews": [{"buffer": 0, "byteLength": len(data)}],
+                     "accessors": [{"bufferView": 0, "byteOffset": at, "componentType": 5126, "count": 1, "type": kind} for at, kind in (
+                         (0, "VEC3"), (12, "VEC4"), (28, "VEC3"), (40, "SCALAR"), (44, "VEC3"))],
+                     "meshes": [{"primitives": [{"mode": 0, "extensions": {"KHR_gaussian_splatting": {"kernel": "ellipse", "colorSpace": space}},
+                                                 "attributes": {"POSITION": 0, **{f"KHR_gaussian_splatting:{name}": 1 + i
+                                                                                  for i, name in enumerate(names)}}}]}]}
+            result = self.import_text("model.gltf", json.dumps(model))
+            mesh, = result.of(SET_MESH)
+            places = result.floats(mesh["arrays"][0])
+            halves = [(max(places[c::3]) - min(places[c::3])) / 2 for c in range(3)]
+            for c in range(3):
+                self.assertAlmostEqual(halves[c], (1 + c) * halves[0], 5)
+            self.assertEqual(result.colours(mesh)[:4], [wanted, wanted, wanted, 65535])
+            self.assertIn("3D Gaussians (3DGS) are not blended", result.text())
+
     def test_images_of_formats_that_are_not_read_are_named(self):
         basisu = {"KHR_texture_basisu": {"source": 1}}
         for texture, wanted in (({"source": 1}, "a KTX2 image, which is not read; convert"), ({"extensions": basisu}, "left out; convert"),
@@ -226,19 +264,46 @@ class Scanned(importer.Written):
         for full in (1, 255):
             rows = [f"{place} {full} {full / 2} 0" for place in self.QUAD]
             result = self.import_ply(self.XYZ + [f"float {name}" for name in ("red", "green", "blue")], rows, face, ["3 0 1 2", "3 1 3 2"])
-            self.assertEqual(tuple(result.data(result.of(SET_MESH)[0]["arrays"][6])[:4]), (255, 55, 0, 255))
+            self.assertEqual(result.colours(result.of(SET_MESH)[0])[:4], [65535, 14027, 0, 65535])
 
-    def test_gaussians_are_points_in_their_colours_with_a_note(self):
-        red, green = (0.5 / 0.28209479177387814, -2, -2), (-2, 0.5 / 0.28209479177387814, -2)
-        rows = [f"0 0 0 {' '.join(map(str, red))}", f"1 0 0 {' '.join(map(str, green))}"]
-        result = self.import_ply(self.XYZ + [f"float f_dc_{i}" for i in range(3)], rows)
-        self.assertEqual({material["base"][:3] for material in result.of(SET_MATERIAL)}, {(1, 0, 0), (0, 1, 0)})
-        self.assertIn("3D Gaussians (3DGS), which are not rendered as such", result.text())
+    def test_gaussians_are_bodies_in_their_colours_as_large_and_turned_as_they_say(self):
+        """A long red one, turned from x to y, a flat green one, and one that is too faint. The file is cut within a fourth."""
+        full, none = 0.5 / 0.28209479177387814, -0.5 / 0.28209479177387814
+        turned = " ".join([str(math.sqrt(0.5)), "0 0", str(math.sqrt(0.5))])
+        rows = [f"5 0 0 {full} {none} {none} 20 {math.log(2)} {math.log(0.1)} {math.log(0.1)} {turned}",
+                f"0 0 0 {none} {full} {none} 20 0 0 -90 1 0 0 0", "0 0 9 0 0 0 -1.5 0 0 0 1 0 0 0", "0 0 20 0 0"]
+        result = self.import_ply(self.XYZ + [f"float {name}" for name in (
+            "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3")], rows)
+        mesh, = result.of(SET_MESH)
+        self.assertEqual((mesh["vertices"], mesh["triangles"]), (12, 16))
+        reach = math.sqrt(math.pi / 2) * math.sqrt(2 * math.log(5))  # to an opacity of 0.2, as wide as an ellipse of that area
+        places = result.floats(mesh["arrays"][0])
+        for first, middle, half in ((0, (5, 0, 0), (0.1, 2, 0.1)), (18, (0, 0, 0), (1, 1, 0))):
+            for c in range(3):
+                self.assertAlmostEqual(max(places[first + c:first + 18:3]), middle[c] + reach * half[c], 4)
+                self.assertAlmostEqual(min(places[first + c:first + 18:3]), middle[c] - reach * half[c], 4)
+        self.assertEqual(result.data(mesh["arrays"][6]), bytes((255, 0, 0, 255)) * 6 + bytes((0, 255, 0, 255)) * 6)
+        self.assertRegex(result.text(), "(?s)states 4 Gaussians and has 3 whole ones.*1 of 3 are fainter")
 
-    def test_a_cut_ply_file_says_so(self):
-        head = self.ply(self.XYZ, self.QUAD, "element face 2\nproperty list uchar int vertex_indices\n", "binary_little_endian").encode()
-        data = head + struct.pack("<12f", *(float(one) for row in self.QUAD for one in row.split())) + struct.pack("<B3i", 3, 0, 1, 2) + b"\3\0"
-        self.assertIn("ends within its elements 'face'", self.import_text("model.ply", data, 1).text())
+    def test_a_cut_ply_file_shows_what_is_whole_and_says_so(self):
+        face = "element face 2\nproperty list uchar int vertex_indices\n"
+        for form in ("ascii", "binary_little_endian"):
+            head = self.ply(self.XYZ, self.QUAD, face, form).encode()
+            if form == "ascii":
+                places, faces = "\n".join(self.QUAD).encode() + b"\n", (b"3 0 1 2\n", b"3 1 3 2\n")
+            else:
+                places = struct.pack("<12f", *(float(one) for row in self.QUAD for one in row.split()))
+                faces = [struct.pack("<B3i", 3, *corners) for corners in ((0, 1, 2), (1, 3, 2))]
+            for body, triangles, points, said in ((places + faces[0] + faces[1][:-2], 1, 0, "2 elements 'face' and has 1"),
+                                                  (places + faces[0], 1, 0, "2 elements 'face' and has 1"),
+                                                  (places[:-4], 0, 3, "4 elements 'vertex' and has 3"),
+                                                  (places + faces[0] + faces[1], 2, 0, "^$")):
+                with self.subTest(form, body=body):
+                    result = self.import_text("model.ply", head + body)
+                    self.assertEqual(sum(mesh["triangles"] for mesh in result.of(SET_MESH)), triangles)
+                    self.assertEqual(sum(one["count"] for one in result.of(SET_SPHERES)), points)
+                    self.assertRegex(result.text(), said)
+            self.assertIn("before the end of its first vertex", self.import_text("model.ply", head + places[:3], 1).text())
 
 
 class Far(importer.Written):

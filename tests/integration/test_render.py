@@ -133,6 +133,12 @@ class Outputs(OneDaemon):
             self.assertTrue(result.stdout.startswith(b"\x89PNG"), result.stdout[:40])
             self.assertTrue(result.stdout.endswith(b"IEND\xaeB`\x82"), "text after the picture")
 
+    def test_devices_are_written_to_and_stay(self):
+        for device, status in (("/dev/null", 0), ("/dev/full", 1)):
+            result = self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", device, "--format", "png", "--size", "8x6"), status)
+            self.assertEqual("/dev/full: cannot be written: No space left" in result.stderr, status == 1, result.stderr)
+            self.assertTrue(pathlib.Path(device).is_char_device())
+
     def test_timings_as_json_name_every_stage(self):
         path = self.folder / "picture.png"
         result = self.expect(render_picture("cornell", path, "--timings=json"), 0)

@@ -260,8 +260,10 @@ static void judge_hit(struct fault *fault, const struct fixture *fixture, const 
         const double uv = is_sampled ? 0.3 : 5e-3, colour = is_sampled ? 0.2 : 5e-3;
         expect_near(fault, "u", beside_seam((double)got_uv[0], expected->uv[0]), expected->uv[0], uv);
         expect_near(fault, "v", (double)got_uv[1], expected->uv[1], uv);
-        for (int k = 0; k < 4; k++)
-            expect_near(fault, "colour", (got->colour >> (8 * k) & 255) / 255.0, expected->colour[k], colour);
+        for (int k = 0; k < 4; k++) {
+            const double stored = (got->colour >> (8 * k) & 255) / 255.0;
+            expect_near(fault, "colour", k < 3 ? stored * stored : stored, expected->colour[k], colour);
+        }
     } else {
         expect_near(fault, "instance of a disc", got->instance, HIT_NO_PRIMITIVE, 0);
     }

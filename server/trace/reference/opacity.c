@@ -112,6 +112,7 @@ bool opacity_surface_init_mesh(struct opacity_surface *surface, const struct sce
         .indices = blob_ref(mesh->arrays[MESH_INDICES]),
         .texcoords = {blob_ref(mesh->arrays[MESH_TEXCOORDS_0]), blob_ref(mesh->arrays[MESH_TEXCOORDS_1])},
         .colours = blob_ref(mesh->arrays[MESH_COLOURS]),
+        .has_wide_colours = mesh_has_wide_colours(mesh),
     };
     return take_ranges(surface, mesh->ranges, mesh->range_count, mesh->triangle_count);
 }
@@ -206,6 +207,13 @@ static float finite_or_zero(float x)
     return isfinite(x) ? x : 0.0f;
 }
 
+static float colour_at(const struct opacity_surface *surface, size_t place)
+{
+    const uint8_t *data = surface->colours->data;
+    return surface->has_wide_colours ? (float)((const uint16_t *)(const void *)data)[place] / 65535.0f
+                                     : (float)data[place] / 255.0f;
+}
+
 static void triangle_attributes(const struct opacity_surface *surface, const struct opacity_point *point,
                                 struct attributes *out)
 {
@@ -224,7 +232,7 @@ static void triangle_attributes(const struct opacity_surface *surface, const str
     memset(out->colour, 0, sizeof(out->colour));
     for (int i = 0; i < 3; i++)
         for (size_t k = 0; k < 4; k++)
-            out->colour[k] += weights[i] * ((float)surface->colours->data[4 * (size_t)triangle[i] + k] / 255.0f);
+            out->colour[k] += weights[i] * colour_at(surface, 4 * (size_t)triangle[i] + k);
 }
 
 static void sphere_attributes(const struct opacity_surface *surface, const struct opacity_point *point,

@@ -49,6 +49,7 @@ struct opacity_surface {
     struct opacity_run *runs;
     uint32_t run_count;
     struct blob *indices, *texcoords[2], *colours; /* meshes; all but the indices may be missing */
+    bool has_wide_colours;                         /* of 16 bits */
     struct blob *centres_radii;                    /* spheres */
     struct disc *discs;                            /* discs: a copy */
 };

@@ -143,6 +143,8 @@ TEST(arrays_must_fit_their_counts)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
     add_mesh(&list, 1)->arrays[MESH_COLOURS] = make_blob(square, 15);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[6] (colours)");
+    add_mesh(&list, 1)->arrays[MESH_COLOURS] = make_blob(square, 31); /* of 16 bits 32 are wanted */
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[6] (colours)");
     add_mesh(&list, 1)->arrays[MESH_TANGENTS] = make_blob(square, 48);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[3] (tangents)");
     add_mesh(&list, 1)->vertex_count = 0;
