@@ -27,8 +27,8 @@ struct part {
 struct cli_timings {
     enum cli_timings_form form;
     FILE *out;
-    uint64_t frames, primary_rays, shadow_rays, secondary_rays, splits, wire_bytes, uploaded_bytes,
-        structure_bytes;
+    uint64_t frames, primary_rays, shadow_rays, secondary_rays, splits, dispatches, barriers, waits, wire_bytes,
+        uploaded_bytes, structure_bytes;
     uint64_t pixels_bytes, wait_ns, receive_ns, decode_ns;
     struct sum stages[STAGES][CLOCKS];
     struct sum waves[2][WAVES_SHOWN][CLOCKS]; /* trace, shade */
@@ -106,6 +106,9 @@ static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
     timings->shadow_rays += frame->shadow_rays;
     timings->secondary_rays += frame->secondary_rays;
     timings->splits += frame->splits;
+    timings->dispatches += frame->dispatches;
+    timings->barriers += frame->barriers;
+    timings->waits += frame->device_waits;
     timings->wire_bytes += frame->wire_bytes;
     timings->pixels_bytes += frame->pixels_bytes;
     timings->uploaded_bytes += frame->uploaded_bytes;
@@ -162,6 +165,8 @@ static void print_frame(struct cli_timings *timings, const struct fl_frame *fram
     set(object, "secondary_rays", frame->secondary_rays);
     set(object, "splits", frame->splits);
     set(object, "device_waits", frame->device_waits);
+    set(object, "dispatches", frame->dispatches);
+    set(object, "barriers", frame->barriers);
     set(object, "uploaded_bytes", frame->uploaded_bytes);
     set(object, "structure_bytes", frame->structure_bytes);
     set(object, "pixels_bytes", frame->pixels_bytes);
@@ -265,6 +270,9 @@ static void print_rays(const struct cli_timings *timings)
         fprintf(timings->out, "; %.2f Mray/s in primary and trace", (double)rays * 1e3 / (double)ns);
     if (timings->splits > 0)
         fprintf(timings->out, "; %" PRIu64 " slices repeated as halves", timings->splits);
+    fprintf(timings->out, "\n  %-16s%12.0f dispatches, %.0f barriers, %.0f waits for it", "device",
+            (double)timings->dispatches / frames, (double)timings->barriers / frames,
+            (double)timings->waits / frames);
     fprintf(timings->out, "\n  %-16s%12.3f MB of %.3f MB pixels; to the device %.3f MB; structure %.3f MB\n",
             "bytes sent", (double)timings->wire_bytes * 1e-6 / frames,
             (double)timings->pixels_bytes * 1e-6 / frames, (double)timings->uploaded_bytes * 1e-6 / frames,

@@ -466,9 +466,10 @@ struct fl_frame {
     float shutter_s;       /* how long the shutter was open, seconds */
     unsigned layers;       /* set of layers that `pixels` has, in the order of their numbers */
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
-    uint32_t device_waits; /* how often the daemon has waited for the device */
-    uint64_t wire_bytes;   /* of the encoded pixels and what is attached */
-    uint64_t depth_bytes;  /* the depths' share of it */
+    uint32_t device_waits;         /* how often the daemon has waited for the device */
+    uint32_t dispatches, barriers; /* that it has queued: compute passes; waits of a pass for those before it */
+    uint64_t wire_bytes;           /* of the encoded pixels and what is attached */
+    uint64_t depth_bytes;          /* the depths' share of it */
     /* A frame in parts comes coarse first, and may end after any: what is there is decoded. With fewer than all
      * colours are coarser, depths may be, and normals may be missing. */
     unsigned parts_come, parts;     /* 1 of 1: it came as a whole */

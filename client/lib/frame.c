@@ -303,6 +303,8 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     frame->secondary_rays = end->secondary_rays;
     frame->splits = end->splits;
     frame->device_waits = end->device_waits;
+    frame->dispatches = end->dispatches;
+    frame->barriers = end->barriers;
     frame->uploaded_bytes = end->uploaded_bytes;
     frame->structure_bytes = end->structure_bytes;
     frame->stages = copy(end->stages, end->stages_count * sizeof(*frame->stages));

@@ -115,6 +115,8 @@ static void describe_costs(struct message_frame_end *end, const struct fl_frame 
     end->secondary_rays = frame->secondary_rays;
     end->splits = frame->splits;
     end->device_waits = frame->device_waits;
+    end->dispatches = frame->dispatches;
+    end->barriers = frame->barriers;
     end->uploaded_bytes = frame->uploaded_bytes;
     end->structure_bytes = frame->structure_bytes;
     end->stages = frame->stages;

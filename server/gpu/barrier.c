@@ -99,8 +99,10 @@ bool gpu_accesses_check(const struct gpu_program *program, struct error *error)
 
 static void issue(struct gpu_device *device, unsigned accesses)
 {
-    if (accesses)
+    if (accesses) {
+        device->barriers++;
         glMemoryBarrier(accesses);
+    }
     device->unseen.before &= ~accesses;
     device->unseen.together &= ~accesses;
 }

@@ -111,6 +111,9 @@ static void ask_facts(struct gpu_facts *facts, const struct gpu_device_info *inf
      * scene is made to keep it. Software GL leaves a loop after 65535 rounds. */
     facts->ray_tests_max = facts->software ? 65000 : 1u << 16;
     facts->builds_on_host = facts->software;
+    /* Software GL takes some ten milliseconds for as many. A GPU has at least twice its number in a storage block.
+     */
+    facts->band_slots_max = facts->software ? 1u << 18 : 1u << 22;
     facts->axes_samples_max = (facts->software ? 1 : 8) * (4ull * 3 * 1024 * 1024);
     gpu_limits_ask(facts->limits);
     facts->texture_buffer_texels_max = facts->limits[GPU_MAX_TEXTURE_BUFFER_SIZE];

@@ -49,8 +49,9 @@ struct gpu_facts {
     uint32_t texture_size_max; /* texels along an edge of a 2D texture */
     uint32_t texture_layers_max;
     /* Numbers by which passes choose sizes. */
-    uint32_t packet_rays;      /* of a packet that bvh traverses where packets pay; 1: they never do */
-    uint32_t ray_tests_max;    /* elements or primitives that a ray may have of a dispatch */
+    uint32_t packet_rays;    /* of a packet that bvh traverses where packets pay; 1: they never do */
+    uint32_t band_slots_max; /* samples' places in a band of a picture, which is turned into pixels in one step */
+    uint32_t ray_tests_max;  /* elements or primitives that a ray may have of a dispatch */
     uint64_t axes_samples_max; /* of a structure of samples along axes: ldc, abuffer */
     bool builds_on_host;       /* where the host has a way to build a structure of its own */
     uint64_t limits[GPU_LIMIT_COUNT];
@@ -93,9 +94,10 @@ struct gpu_device {
     uint64_t reserve_until_ns;    /* see gpu_reserve_begin; 0: whenever */
     size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
     bool reserve_made, reserve_put_off;
-    uint64_t waits;          /* how often this thread has waited for the device to come to an end with something */
-    struct gpu_watch *watch; /* of dispatches; NULL: none is watched, see watch.h */
-    bool compiles;           /* see gpu_options */
+    uint64_t waits; /* how often this thread has waited for the device to come to an end with something */
+    uint64_t dispatches, barriers; /* that it has queued */
+    struct gpu_watch *watch;       /* of dispatches; NULL: none is watched, see watch.h */
+    bool compiles;                 /* see gpu_options */
     struct gpu_measured measured;
     bool lost; /* the context; nothing works any more, see gpu_note_loss */
 };

@@ -257,6 +257,7 @@ static void begin_pass(struct gpu_device *device, const struct gpu_program *prog
     glUseProgram(program->name);
     gpu_uniforms_bind(device, program->uniforms);
     gpu_await_pass(device, program, accesses);
+    device->dispatches += program->group_size > 0;
 }
 
 void gpu_program_use(struct gpu_device *device, const struct gpu_program *program)

@@ -532,7 +532,8 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
 
 enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
 {
-    const uint64_t waits_before = renderer->device->waits;
+    const struct gpu_device *device = renderer->device;
+    const uint64_t waits = device->waits, dispatches = device->dispatches, barriers = device->barriers;
     bool good = false;
     switch (renderer->phase) {
     case PHASE_IDLE:
@@ -578,7 +579,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
         good = read_band(renderer, error);
         break;
     }
-    renderer->result.device_waits += (uint32_t)(renderer->device->waits - waits_before);
+    renderer->result.device_waits += (uint32_t)(device->waits - waits);
+    renderer->result.dispatches += (uint32_t)(device->dispatches - dispatches);
+    renderer->result.barriers += (uint32_t)(device->barriers - barriers);
     if (!good) {
         frame_abandon(renderer);
         return FRAME_FAILED;

@@ -160,6 +160,7 @@ struct frame_result {
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
     uint32_t sorted_waves; /* whose rays were brought into the order of their directions */
     uint32_t device_waits; /* how often the host has waited for the device, bringing the scene there included */
+    uint32_t dispatches, barriers; /* of compute passes; between passes of any kind */
     uint64_t uploaded_bytes, structure_bytes;
     struct structure_rows structure; /* what the tracer says of it, and of its waves */
     struct stage_times times;

@@ -7,10 +7,6 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* Slots of a band: few enough that software GL turns them into pixels within some ten milliseconds, a step of the
- * frame. It takes 32 times as many as one storage block. */
-#define BAND_SLOTS_MAX (1u << 18)
-
 static void free_bands(struct picture *picture, struct gpu_device *device)
 {
     for (uint32_t i = 0; i < picture->band_count * picture->plane_count; i++)
@@ -107,10 +103,11 @@ uint32_t picture_band_end(const struct picture *picture, uint32_t slot)
     return end < all ? (uint32_t)end : all;
 }
 
-static bool list_bands(struct picture *picture, const struct frame_request *request, struct error *error)
+static bool list_bands(struct picture *picture, const struct gpu_facts *facts, const struct frame_request *request,
+                       struct error *error)
 {
     uint32_t row_slots = picture->tiles_across * 8;
-    picture->band_rows = BAND_SLOTS_MAX / row_slots & ~7u;
+    picture->band_rows = facts->band_slots_max / row_slots & ~7u;
     if (picture->band_rows == 0)
         picture->band_rows = 8;
     uint32_t padded_rows = (request->height + 7) & ~7u;
@@ -164,7 +161,7 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
         picture->width = request->width;
         picture->height = request->height;
         picture->tiles_across = (request->width + 7) / 8;
-        if (!list_bands(picture, request, error))
+        if (!list_bands(picture, &context->device->facts, request, error))
             return false;
     }
     set_crop(picture, request);

@@ -161,6 +161,8 @@ void frame_fill_end(struct message_frame_end *end, struct frame_end_records *rec
     end->secondary_rays = result->secondary_rays;
     end->splits = result->splits;
     end->device_waits = result->device_waits;
+    end->dispatches = result->dispatches;
+    end->barriers = result->barriers;
     end->uploaded_bytes = result->uploaded_bytes;
     end->structure_bytes = result->structure_bytes;
     end->stages = records->stages;

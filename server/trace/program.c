@@ -117,9 +117,10 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
         gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
     gpu_uniform_uint(program, "disc_count", scene->disc_count);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
+    const bool is_whole = wave->counts && source->rays_a_dispatch >= DISPATCH_RAYS_MAX;
     for (uint32_t first = rays->first, part; first < rays->end; first += part) {
         part = rays->end - first;
-        if (source->rays_a_dispatch && source->rays_a_dispatch < part)
+        if (source->rays_a_dispatch && source->rays_a_dispatch < part && !is_whole)
             part = source->rays_a_dispatch;
         dispatch_rays(program, scene, wave, first, first + part, rays_an_invocation);
         if (first + part < rays->end) /* a part of its own to the driver too, which may gather commands */

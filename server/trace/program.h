@@ -20,7 +20,10 @@ struct trace_program_source {
     const struct gpu_define *defines; /* of the tracer's own, ends with {0}; may be NULL; at most 12 */
     uint32_t packet_rays;             /* 0: 1 */
     bool ray_pairs;                   /* an invocation traverses two packets of one ray side by side */
-    uint32_t rays_a_dispatch;         /* 0: all; a multiple of packet_rays, and of 2 */
+    /* 0: all; a multiple of packet_rays, and of 2. Where the device alone knows how many rays there are, only a
+     * bound that is lower than others have is kept: nearly all parts of the most that there may be would be empty.
+     */
+    uint32_t rays_a_dispatch;
 };
 
 /* Whether rays of the wave meet things that move. */

@@ -10,5 +10,7 @@
 #define BIND_BVH_PLACES BIND_TRACER_1
 #define BIND_BVH_UNFINISHED BIND_PASS_4
 #define BVH_UNFINISHED WAVE_STOPPED_LONG
+/* Elements that a GPU visits in a dispatch, at most: a second's work of a slow one. */
+#define BVH_DISPATCH_ELEMENTS_MAX (1u << 31)
 
 #endif

@@ -58,10 +58,10 @@ uniform vec3 bvh_top_cells_per_unit;
 
 #ifdef BVH_BUDGET
 // A driver ends a dispatch that takes seconds, and a ray may meet every element of a scene.
-uniform uint bvh_budget;
+uniform uint bvh_budget_max; // elements of a ray, or a packet
 uniform uint unfinished_word; // set to BVH_UNFINISHED where a ray is not finished
 layout(std430, binding = BIND_BVH_UNFINISHED) buffer unfinished_block { uint unfinished[]; };
-uint budget_left = bvh_budget;
+uint budget_left = min(bvh_budget_max, BVH_DISPATCH_ELEMENTS_MAX / max(ray_end - first_ray, 1u));
 uvec4 place_of_ray; // bvh/layout.h
 #ifdef BVH_RESUMES
 #define RAYS_GO_ON

@@ -280,6 +280,36 @@ TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
     frame_result_finish(&got);
 }
 
+/* Of a picture in one slice, which is learnt from picture to picture. Its waves may have 2^19 rays, as mirrors and
+ * glass may send on several for each: few are there, and no dispatch is for those that are not. */
+static uint32_t dispatches_of(struct fixture *fixture, enum integrator_kind integrator)
+{
+    struct frame_result result = {0};
+    fixture->request.integrator = integrator;
+    for (int i = 0; i < 3; i++)
+        (void)steps_of(fixture, 4000000000u, &result);
+    const uint32_t dispatches = result.dispatches;
+    assert_in_range(result.barriers, 1, dispatches + 20); /* and what draws wait for */
+    frame_result_finish(&result);
+    return dispatches;
+}
+
+#define BOUNCES 8u
+#define PASSES_A_WAVE 16u /* 13 to 15, and the picture's own */
+
+TEST_LONG(a_slice_has_no_dispatches_but_those_of_its_passes)
+{
+    struct fixture *fixture = *state;
+    build(fixture);
+    fixture_commit(fixture);
+    fixture->request.width = fixture->request.height = 512;
+    fixture->request.depth = BOUNCES;
+    const uint32_t whitted = dispatches_of(fixture, INTEGRATOR_WHITTED);
+    const uint32_t path = dispatches_of(fixture, INTEGRATOR_PATH); /* which goes straight on as often, too */
+    if (whitted > PASSES_A_WAVE * (1 + BOUNCES) || path > PASSES_A_WAVE * (1 + 2 * BOUNCES))
+        fail_msg("whitted has %u dispatches, path %u", whitted, path);
+}
+
 /* Their waves' buffers take a part of the memory, and are buffer textures. */
 TEST(slices_are_no_larger_than_the_device_has_memory_and_texels_for)
 {

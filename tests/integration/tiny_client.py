@@ -309,7 +309,7 @@ def set_mesh(mesh, vertex_count, triangle_count, blobs, material):
 
 
 def set_node(node, kind, thing, parent_from_node=IDENTITY):
-    fixed = struct.pack("<5I12fI", node, 0, kind, thing, 0, *parent_from_node, 0)
+    fixed = struct.pack("<5I12f2I", node, 0, kind, thing, 0, *parent_from_node, 0, 0)
     return SET_NODE, payload(fixed, array([]), string(""))
 
 

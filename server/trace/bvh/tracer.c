@@ -12,8 +12,6 @@
 #define MINIMUM_RAYS 192u /* a multiple of all packets' sizes */
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX ((1u << 18) / MINIMUM_RAYS * MINIMUM_RAYS)
-/* Elements that a GPU visits in a dispatch, at most: a second's work of a slow one. */
-#define DISPATCH_ELEMENTS_MAX (1u << 31)
 
 static struct bvh_form settings_of(const struct gpu_device *device, const struct tracer_options *options)
 {
@@ -146,13 +144,6 @@ static enum budget budget_of(const struct bvh *bvh, const struct trace_state *st
     return state->wave.stopped && !state->patient ? BUDGET_STOPS : BUDGET_RESUMES;
 }
 
-/* Of an invocation; a packet has as many as each of its rays would have. */
-static uint32_t elements_of_a_ray(const struct bvh *bvh, uint32_t rays)
-{
-    const uint32_t fitting = DISPATCH_ELEMENTS_MAX / rays, maximum = bvh->base.device->facts.ray_tests_max;
-    return fitting < maximum ? fitting : maximum;
-}
-
 static uint32_t rays_of_a_dispatch(const struct ray_range *rays)
 {
     const uint32_t count = rays->end - rays->first;
@@ -164,7 +155,7 @@ static void run_and_stop(struct bvh *bvh, const struct gpu_program *program, con
 {
     gpu_buffer_bind_storage(rays->wave->stopped, BIND_BVH_UNFINISHED);
     gpu_uniform_uint(program, "unfinished_word", rays->wave->stopped_word);
-    gpu_uniform_uint(program, "bvh_budget", elements_of_a_ray(bvh, rays_of_a_dispatch(rays)));
+    gpu_uniform_uint(program, "bvh_budget_max", bvh->base.device->facts.ray_tests_max);
     trace_program_run(program, scene, rays, source);
 }
 
@@ -186,7 +177,7 @@ static bool run_once(struct bvh *bvh, const struct gpu_program *program, const s
     gpu_buffer_bind_storage(&own->places, BIND_BVH_PLACES);
     gpu_buffer_bind_storage(&own->depths, BIND_OPTICAL_DEPTHS);
     gpu_uniform_uint(program, "unfinished_word", 0);
-    gpu_uniform_uint(program, "bvh_budget", elements_of_a_ray(bvh, count));
+    gpu_uniform_uint(program, "bvh_budget_max", device->facts.ray_tests_max);
     gpu_uniform_uint(program, "is_first_part", is_new);
     gpu_uniform_uint(program, "resumes", !is_new);
     trace_program_run(program, scene, rays, source);

@@ -39,7 +39,7 @@ struct oracle_scene {
     uint32_t (*triangles)[4];
     float (*positions)[4];
     float (*normals)[4];
-    uint8_t (*colours)[4];
+    uint16_t (*colours)[4];
     float (*spheres)[4];
     uint32_t *sphere_materials;
     char *tables;
@@ -139,7 +139,7 @@ static inline void oracle_colour(double out[4], const struct oracle_scene *scene
     for (int c = 0; c < 4; c++) {
         out[c] = 0;
         for (int i = 0; i < 3; i++)
-            out[c] += sample->weights[i] * scene->colours[scene->triangles[sample->primitive][i]][c] / 255.0;
+            out[c] += sample->weights[i] * scene->colours[scene->triangles[sample->primitive][i]][c] / 65535.0;
     }
 }
 
