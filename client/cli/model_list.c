@@ -12,8 +12,8 @@
 #define DEPTH_MAX 16
 
 /* Those of farlight-import. */
-static const char *const endings[] = {".gltf", ".glb", ".obj", ".nff", ".3ds", ".3mf",
-                                      ".ac",   ".dae", ".fbx", ".off", ".ply", ".stl", ".x3d"};
+static const char *const endings[] = {".gltf", ".glb", ".obj", ".nff", ".3ds", ".3mf", ".ac",
+                                      ".dae",  ".fbx", ".off", ".ply", ".stl", ".x3d"};
 
 static bool is_model(const char *name)
 {

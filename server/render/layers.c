@@ -29,7 +29,7 @@ _Static_assert(LAYER_BIT_DIFFUSE_DIRECT == 1u << LAYER_DIFFUSE_DIRECT &&
                    LAYER_BIT_EMISSION == 1u << LAYER_EMISSION && LAYER_BIT_BACKGROUND == 1u << LAYER_BACKGROUND &&
                    LAYER_BIT_LIGHT_REST == 1u << LAYER_LIGHT_REST &&
                    LAYER_BITS_LIGHT_GROUPS == 0xffu << LAYER_LIGHT_REST &&
-                   LAYER_LIGHT_REST + LIGHT_GROUPS_MAX - 1 == LAYER_LIGHT_GROUP7,
+                   LAYER_LIGHT_REST + (int)LIGHT_GROUPS_MAX - 1 == LAYER_LIGHT_GROUP7,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)

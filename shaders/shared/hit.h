@@ -14,7 +14,7 @@ struct hit {
     uint normal_geometric; /* octahedral, 2 x 16 bit snorm, world space, on the side of the outside (winding) */
     uint normal_shading;   /* likewise, interpolated; same hemisphere as the geometric one */
     uint tangent;          /* likewise with 15 bits for y; lowest bit: handedness is negative */
-    uint colour;           /* vertex colour times what a sampled tracer stored, unorm 4x8: roots of linear light, alpha */
+    uint colour; /* vertex colour times what a sampled tracer stored, unorm 4x8: roots of linear light, alpha */
 };
 SHARED_SIZE(hit, 48)
 #define HIT_TEXELS 3u /* RGBA32UI */
