@@ -142,10 +142,8 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"light-group", KEY_LIGHT_GROUP, "NAME=NODE,..", 0,
      "Give an EXR file the layer light_NAME: the light of these nodes and what is below them, lights and surfaces "
-     "that "
-     "glow, and of `environment`; * stands for any characters. May be repeated: up to 7 groups, which add up to "
-     "the "
-     "picture with light_rest, all other light",
+     "that glow, and of `environment`; * stands for any characters. May be repeated: up to 7 groups, which add up "
+     "to the picture with light_rest, all other light",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",

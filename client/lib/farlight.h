@@ -625,8 +625,8 @@ struct fl_exporter_options {
     const char *format; /* of all files, as below: some start faster; NULL: any */
     bool full_metadata; /* date, times of stages and revision too: then no two files are the same */
     bool draws_text;    /* pictures come with text */
-    const char
-        *light_groups; /* EXR: "key,fill": names of the layers light_group1 and so on; NULL: light_group1.. */
+    /* EXR: "key,fill": names of the layers light_group1 and so on; NULL: light_group1.. */
+    const char *light_groups;
     bool dwaa; /* EXR: colours are compressed with loss (DWAA), all else by zip as a part of its own; else zip */
     /* The colours that are written. Frames of the format rgba32f are linear Rec. 709; all NULL: so are the files.
      */
