@@ -29,7 +29,7 @@ vec3 capped(vec3 colour, float cap)
 // spread over its neighbours it would be seen more. What is above stays where it is.
 float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
 {
-    float sum = 0.0, count = 0.0;
+    float highest = DENOISE_CAP * white / max(square(own.tone), DENOISE_ALBEDO_MIN), sum = 0.0, count = 0.0;
     for (int i = 0; i < 16; i++) {
         ivec2 side = ivec2((i & 3) - 2, -2), offset = i < 4 ? side : i < 8 ? -side : i < 12 ? ivec2(2, side.x) : ivec2(-2, -side.x);
         ivec2 next = pixel + offset;
@@ -37,10 +37,10 @@ float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
         int place = place_of(counts ? next : pixel);
         guide other = guide_of_words(texelFetch(guides, place).xy);
         float weight = !counts || other.nearness <= 0.0 ? 0.0 : is_alike(own, other) ? 1.0 : DENOISE_UNLIKE;
-        sum += weight * min(taken_of_words(texelFetch(light, place)).x, DENOISE_CAP * white);
+        sum += weight * min(taken_of_words(texelFetch(light, place)).x, highest);
         count += weight;
     }
-    return count > 0.0 ? min(DENOISE_CAP * sum / count, DENOISE_CAP * white) : DENOISE_CAP * white;
+    return count > 0.0 ? min(DENOISE_CAP * sum / count, highest) : highest;
 }
 
 float smaller(float a, float b)

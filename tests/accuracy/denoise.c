@@ -15,8 +15,8 @@ static const float FRONT[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
                    BACK[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 9};
 
 /* A wall that fills the picture, with a checker of a texel a pixel, 1 and 1/4; under a sky, next to a ball that
- * hides some of that. Scattered light is noise. */
-static void a_checker(struct fixture *fixture, const float place[12])
+ * hides some of that. Scattered light is noise. Returns what the wall is made of. */
+static struct scene_material *a_checker(struct fixture *fixture, const float place[12])
 {
     static uint8_t texels[TEXELS * TEXELS * 4];
     for (uint32_t i = 0; i < TEXELS * TEXELS; i++)
@@ -37,6 +37,7 @@ static void a_checker(struct fixture *fixture, const float place[12])
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 2.0f;
+    return material;
 }
 
 static struct frame_result rendered(struct fixture *fixture, enum denoise denoise, uint32_t samples, uint64_t seed)
@@ -95,6 +96,26 @@ TEST(a_texture_keeps_its_detail_while_its_noise_goes)
 {
     a_checker(*state, FRONT);
     expect_detail_without_noise(*state);
+}
+
+/* A dark wall's light, which is divided by the albedo, is far above what five stops make white; what is shown is
+ * not. */
+TEST(an_exposure_for_what_is_dark_filters_no_less)
+{
+    struct fixture *fixture = *state;
+    struct scene_material *wall = a_checker(fixture, FRONT);
+    wall->base_colour[0] = wall->base_colour[1] = wall->base_colour[2] = 1.0f / 32.0f;
+    struct frame_result noisy = rendered(fixture, DENOISE_OFF, 16, 1),
+                        usual = rendered(fixture, DENOISE_ON, 16, 1);
+    fixture->request.exposure_stops = 5.0f;
+    struct frame_result exposed = rendered(fixture, DENOISE_ON, 16, 1);
+    assert_true(distance(&noisy, &usual) > 0.001);
+    for (uint32_t i = 0; i < EDGE * EDGE; i++) /* halves hold a 2048th */
+        assert_near(fixture_pixel(&exposed, i % EDGE, i / EDGE)[1],
+                    32.0f * fixture_pixel(&usual, i % EDGE, i / EDGE)[1], 0.01);
+    frame_result_finish(&noisy);
+    frame_result_finish(&usual);
+    frame_result_finish(&exposed);
 }
 
 /* The same as the wall itself: of a mirror's own normal and albedo one sample would be left as it is. */

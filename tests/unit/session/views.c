@@ -551,8 +551,9 @@ static size_t take_cut(uint32_t number)
     return came_bytes;
 }
 
-/* It is shown, so that it uses credit; and the motion that it gives way to does not wait. */
-SESSION_TEST(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come)
+/* It is shown, so that it uses credit; and the motion that it gives way to does not wait. Where calls are cut
+ * short it is chance whether the first parts have left by then. */
+TEST_WITH(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come, set_up, tear_down)
 {
     struct engine_command *start = start_view_in_parts(1);
     assert_true(start->job.parts);
@@ -561,7 +562,7 @@ SESSION_TEST(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_com
     send_camera(7, true);
     told(ENGINE_VIEW_LOOK);
     wait_until_read();
-    assert_in_range(take_cut(0), 1000, LARGE_FRAME_BYTES - 1); /* the first part at least */
+    assert_in_range(take_cut(0), 1200, LARGE_FRAME_BYTES - 1);
     told_nothing();
     send_credit(2);
     told_credit(2, 2);
@@ -570,7 +571,7 @@ SESSION_TEST(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_com
 }
 
 /* The second colours are more than sockets and queues hold, so that they are under way. */
-SESSION_TEST(a_picture_of_motion_that_a_newer_one_overtakes_ends_with_the_part_under_way)
+TEST_WITH(a_picture_of_motion_that_a_newer_one_overtakes_ends_with_the_part_under_way, set_up, tear_down)
 {
     const size_t second_bytes = LARGE_FRAME_BYTES - (1 << 20);
     start_view_in_parts(8);
