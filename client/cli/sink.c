@@ -40,7 +40,7 @@ static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
     return sink->output.image == CLI_IMAGE_Y4M || prepare_temporary(sink, error);
 }
 
-/* Of a character device, such as /dev/null. */
+/* Whether it is a character device, such as /dev/null. */
 static bool is_device(const char *path)
 {
     struct stat status;

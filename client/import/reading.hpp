@@ -93,7 +93,7 @@ template <typename type> type *copy_of(const std::vector<type> &from)
         memcpy(copy, from.data(), from.size() * sizeof(type));
     return copy;
 }
-// Of linear light, as colours of vertices have it. NaN becomes 0.
+// A colour of vertices, as a share of white in linear light, in 16 bits. NaN becomes 0.
 inline uint16_t wide(float value)
 {
     return uint16_t(std::lround(std::min(std::max(0.0f, value), 1.0f) * 65535));

@@ -21,7 +21,7 @@ struct cloud {
     bool is_linear = false;
 };
 
-// Of the first coefficient of spherical harmonics, which has the same value in all directions.
+// The colour by the first coefficient of spherical harmonics, which has the same value in all directions.
 float colour_of(double coefficient);
 // Returns the identifier of a mesh; 0: none of them is opaque enough to be shown.
 uint32_t add(reading::base &r, const cloud &from, const std::string &name, const std::string &where);

@@ -32,7 +32,7 @@ uint met_number(path p)
 }
 #endif
 
-// Of the path of ray k. `of_light`: the part of an area light that it hit.
+// `of_light`: the part of an area light that it hit.
 vec4 radiance_beyond(uint k, out vec3 of_light)
 {
     of_light = vec3(0.0);

@@ -280,8 +280,8 @@ TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
     frame_result_finish(&got);
 }
 
-/* Of a picture in one slice, which is learnt from picture to picture. Its waves may have 2^19 rays, as mirrors and
- * glass may send on several for each: few are there, and no dispatch is for those that are not. */
+/* The number for a picture in one slice, which is learnt from picture to picture. Its waves may have 2^19 rays, as
+ * mirrors and glass may send on several for each: few are there, and no dispatch is for those that are not. */
 static uint32_t dispatches_of(struct fixture *fixture, enum integrator_kind integrator)
 {
     struct frame_result result = {0};

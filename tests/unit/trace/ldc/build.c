@@ -18,7 +18,7 @@
 /* A normal of 2 x 16 bits is exact to 0.003 degrees; that of a small triangle is rounded before it is packed. */
 #define NORMAL_COSINE 0.99999
 
-/* Of linear light. A colour's root is 8 bits in a hit, twice as wide where it is bright, then 8 bits of sRGB,
+/* In linear light: a colour's root is 8 bits in a hit, twice as wide where it is bright, then 8 bits of sRGB,
  * which are 2.3 as wide there; and it is taken from inside the triangle where rounding puts the middle out of it.
  */
 #define COLOUR_TOLERANCE ((0.5 * 2 + 0.5 * 2.3 + 0.5) / 255)
