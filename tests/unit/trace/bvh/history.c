@@ -144,7 +144,7 @@ ALL_TESTS(open_device, close_device)
 TEST(answers_do_not_depend_on_how_instances_came_to_where_they_are)
 {
     const uint32_t packet_rays = device->facts.packet_rays;
-    device->facts.packet_rays = 8;
+    device->facts.packet_rays = device->facts.software ? 8 : 1; /* packets look at rays where the host can */
     expect_same_answers(LOOK_CUTOUT, NULL);
     device->facts.packet_rays = 1;
     expect_same_answers(LOOK_TINTED, NULL);
