@@ -32,7 +32,7 @@ class Stacks(Case):
         paths = []
         for name, daemon in self.daemons.items():
             paths.append(self.folder / name / output)
-            result = farlight(command, bundled_scenes() / model, "--server", daemon.address, *SIZE, *options, "-o", paths[-1])
+            result = farlight(command, bundled_scenes() / model, "--server", daemon.address, *SIZE, *options, "--parents", "-o", paths[-1])
             if "libembree-dev" in result.stderr:
                 return None
             self.expect(result, 0)
