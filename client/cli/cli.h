@@ -117,6 +117,8 @@ bool cli_check_error_picture(const char *picture, const char *const *inputs, siz
 bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error);
 /* A terminal is refused; `what` would be written: "an image". */
 bool cli_check_stdout(const char *what, struct fl_error *error);
+/* False: errno says why. */
+bool cli_write_all(int fd, const char *bytes, size_t count);
 /* Copies a file to a device; NULL: standard output. */
 bool cli_copy_to(const char *device, const char *path, struct fl_error *error);
 
@@ -224,7 +226,7 @@ struct cli_clip {
 };
 #define CLI_CLIPS_MAX 15 /* the protocol's, and one of our own */
 #define CLI_EDITS_MAX 64
-#define CLI_LIGHT_GROUPS 7
+#define CLI_LIGHT_GROUPS (PROTOCOL_LAYER_LIGHT_GROUP7 - PROTOCOL_LAYER_LIGHT_REST)
 #define CLI_LIGHT_GROUP_NAME 32 /* bytes */
 
 /* Several views in a picture, as typed. */

@@ -221,7 +221,7 @@ bool cli_check_stdout(const char *what, struct fl_error *error)
     return fl_error_remedy(error, "redirect it, or name a file");
 }
 
-static bool write_all(int to, const char *bytes, size_t count)
+bool cli_write_all(int to, const char *bytes, size_t count)
 {
     while (count > 0) {
         const ssize_t wrote = write(to, bytes, count);
@@ -243,7 +243,7 @@ bool cli_copy_to(const char *device, const char *path, struct fl_error *error)
     ssize_t got = 0;
     bool good = to >= 0;
     while (good && (got = read(fd, piece, sizeof(piece))) > 0)
-        good = write_all(to, piece, (size_t)got);
+        good = cli_write_all(to, piece, (size_t)got);
     if (!good)
         fl_error_set(error, FL_ERROR_FILE, device ? device : "standard output", "cannot be written: %s",
                      strerror(errno));

@@ -129,20 +129,6 @@ bool cli_check_watch(struct cli_job *job)
 
 /* ---- standard input ---- */
 
-static bool write_all(int fd, const char *bytes, size_t count)
-{
-    while (count > 0) {
-        const ssize_t wrote = write(fd, bytes, count);
-        if (wrote < 0 && errno != EINTR)
-            return false;
-        if (wrote > 0) {
-            bytes += wrote;
-            count -= (size_t)wrote;
-        }
-    }
-    return true;
-}
-
 /* 0: the end, or *error is set. */
 static size_t read_some(char *bytes, size_t count, struct fl_error *error)
 {
@@ -172,7 +158,7 @@ static bool copy_input(int fd, struct fl_error *error)
         if (total + got > INPUT_BYTES_MAX)
             return fl_error_set(error, FL_ERROR_FILE, "standard input", "is larger than %llu MiB",
                                 (unsigned long long)(INPUT_BYTES_MAX >> 20));
-        if (!write_all(fd, piece, got))
+        if (!cli_write_all(fd, piece, got))
             return fl_error_set(error, FL_ERROR_MEMORY, "standard input", "cannot be kept: %s", strerror(errno));
     }
     if (error->code != FL_ERROR_NONE)

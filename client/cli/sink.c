@@ -17,7 +17,8 @@
 
 /* ---- what can be known before ---- */
 
-/* What cannot be replaced by a rename is written elsewhere, and copied when it is complete. */
+/* Standard output and devices cannot be replaced by a rename: the file is written elsewhere, and copied when it is
+ * complete. */
 static bool prepare_temporary(struct cli_sink *sink, struct fl_error *error)
 {
     if (!cli_temporary_folder(sink->folder, sizeof(sink->folder), error))

@@ -155,18 +155,36 @@ static json_t *member_json(const struct cli_field *member)
     return object;
 }
 
-/* Members of the object `properties`, one per line. */
+/* A member of the object `properties`, of which each has a line. */
+static void print_member(const char *name, json_t *object)
+{
+    char *text = json_dumps(object, 0);
+    printf("    \"%s\": %s,\n", name, text ? text : "{}");
+    free(text);
+    json_decref(object);
+}
+
+/* Words of --layers. */
+static json_t *layers_json(void)
+{
+    char list[512];
+    char *rest;
+    protocol_enum_list("layer", list, sizeof(list));
+    json_t *names = json_pack("[s]", "light"); /* all parts of it */
+    for (char *word = strtok_r(list, ", ", &rest); word; word = strtok_r(NULL, ", ", &rest))
+        json_array_append_new(names, json_string(word));
+    return json_pack("{s:s, s:s, s:i, s:{s:o}}", "description", "of an EXR file; default: beauty alone", "type",
+                     "array", "minItems", 1, "items", "enum", names);
+}
+
 static void print_schema(void)
 {
+    print_member("layers", layers_json());
     for (size_t i = 0; i < cli_field_count(); i++) {
         const struct cli_field *member = cli_field_at(i);
         if (!member->is_of_shot)
             continue;
-        json_t *object = member_json(member);
-        char *text = json_dumps(object, 0);
-        printf("    \"%s\": %s,\n", member->member, text ? text : "{}");
-        free(text);
-        json_decref(object);
+        print_member(member->member, member_json(member));
     }
 }
 

@@ -173,7 +173,7 @@ class data
         }
         return true;
     }
-    // Likewise, of all of them. Binary ones of one size are not looked at.
+    // False: the file ends before all of them do. Binary ones of one size are not looked at.
     bool skip(const element &of)
     {
         size_t bytes = 0;

@@ -206,7 +206,7 @@ static void leave_at_once(int status)
 #endif
 }
 
-/* Of all models, and that of the modules, which are loaded when they are needed. */
+/* The sandbox opens the folders of all models, and that of the modules, which are loaded when they are needed. */
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
     char *folders[SOURCES_MAX + 1] = {NULL};

@@ -93,6 +93,40 @@ template <typename type> type *copy_of(const std::vector<type> &from)
         memcpy(copy, from.data(), from.size() * sizeof(type));
     return copy;
 }
+
+// A mesh as readers gather it; what is empty is not there.
+struct mesh_parts {
+    std::vector<float> positions = {}, normals = {};
+    std::vector<uint16_t> colours = {};
+    std::vector<uint32_t> indices = {};
+    std::vector<record_material_range> ranges = {};
+};
+
+// Returns its identifier.
+inline uint32_t add_mesh(base &r, const mesh_parts &from, const std::string &name, const std::string &where)
+{
+    import_mesh mesh = {};
+
+    mesh.name = name.c_str();
+    mesh.where = where.c_str();
+    mesh.vertex_count = uint32_t(from.positions.size() / 3);
+    mesh.triangle_count = uint32_t(from.indices.size() / 3);
+    mesh.range_count = uint32_t(from.ranges.size());
+    try {
+        mesh.positions = copy_of(from.positions);
+        mesh.normals = copy_of(from.normals);
+        mesh.colours = copy_of(from.colours);
+        mesh.indices = copy_of(from.indices);
+        mesh.ranges = copy_of(from.ranges);
+    } catch (...) {
+        import_mesh_finish(&mesh);
+        throw;
+    }
+    const uint32_t id = import_add_mesh(r.scene, &mesh);
+    check(r);
+    return id;
+}
+
 // A colour of vertices, as a share of white in linear light, in 16 bits. NaN becomes 0.
 inline uint16_t wide(float value)
 {

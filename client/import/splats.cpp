@@ -44,22 +44,22 @@ bool axes_of(const gaussian &of, std::array<std::array<double, 3>, 3> &axes)
 }
 
 void add_body(const gaussian &of, const std::array<std::array<double, 3>, 3> &axes, bool is_linear,
-              std::vector<float> &positions, std::vector<uint16_t> &colours, std::vector<uint32_t> &indices)
+              reading::mesh_parts &out)
 {
-    const uint32_t first = uint32_t(positions.size() / 3);
+    const uint32_t first = uint32_t(out.positions.size() / 3);
 
     for (size_t corner = 0; corner < corners; corner++) {
         for (size_t c = 0; c < 3; c++)
-            positions.push_back(float(double(of.place[c]) + (corner % 2 == 0 ? 1 : -1) * axes[corner / 2][c]));
+            out.positions.push_back(float(double(of.place[c]) + (corner % 2 == 0 ? 1 : -1) * axes[corner / 2][c]));
         for (size_t c = 0; c < 3; c++) {
             const float value = std::min(std::max(0.0f, of.colour[c]), 1.0f); // NaN becomes 0
-            colours.push_back(reading::wide(is_linear ? value : linear_from_srgb_f(value)));
+            out.colours.push_back(reading::wide(is_linear ? value : linear_from_srgb_f(value)));
         }
-        colours.push_back(65535);
+        out.colours.push_back(65535);
     }
     for (const auto &face : face_corners)
         for (uint32_t corner : face)
-            indices.push_back(first + corner);
+            out.indices.push_back(first + corner);
 }
 
 // Their light is in their colours.
@@ -84,19 +84,16 @@ float colour_of(double coefficient)
 
 uint32_t add(reading::base &r, const cloud &from, const std::string &name, const std::string &where)
 {
-    std::vector<float> positions;
-    std::vector<uint16_t> colours;
-    std::vector<uint32_t> indices;
+    reading::mesh_parts mesh;
     std::array<std::array<double, 3>, 3> axes;
-    import_mesh mesh = {};
 
     if (from.all.size() > gaussians_max)
         fail(r, where, "%zu Gaussians; up to %zu are allowed", from.all.size(), gaussians_max);
     check_room(r, where, from.all.size(), corners * 20 + faces * 12);
     for (const gaussian &one : from.all)
         if (axes_of(one, axes))
-            add_body(one, axes, from.is_linear, positions, colours, indices);
-    const size_t shown = positions.size() / 3 / corners;
+            add_body(one, axes, from.is_linear, mesh);
+    const size_t shown = mesh.positions.size() / 3 / corners;
     import_note(
         r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
         "3D Gaussians (3DGS) are not blended: each is shown as a body out to where its opacity is %.1f, in "
@@ -104,23 +101,7 @@ uint32_t add(reading::base &r, const cloud &from, const std::string &name, const
         opacity_min, from.all.size() - shown, from.all.size());
     if (shown == 0)
         return 0;
-    mesh.name = name.c_str();
-    mesh.where = where.c_str();
-    mesh.vertex_count = uint32_t(shown * corners);
-    mesh.triangle_count = uint32_t(shown * faces);
-    mesh.range_count = 1;
-    const std::vector<record_material_range> ranges = {{0, mesh.triangle_count, add_material(r)}};
-    try {
-        mesh.positions = reading::copy_of(positions);
-        mesh.colours = reading::copy_of(colours);
-        mesh.indices = reading::copy_of(indices);
-        mesh.ranges = reading::copy_of(ranges);
-    } catch (...) {
-        import_mesh_finish(&mesh);
-        throw;
-    }
-    const uint32_t id = import_add_mesh(r.scene, &mesh);
-    check(r);
-    return id;
+    mesh.ranges = {{0, uint32_t(shown * faces), add_material(r)}};
+    return reading::add_mesh(r, mesh, name, where);
 }
 } // namespace splats

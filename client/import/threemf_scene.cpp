@@ -97,16 +97,9 @@ class meaning
     }
 };
 
-struct parts {
-    std::vector<float> positions;
-    std::vector<uint32_t> indices;
-    std::vector<uint16_t> colours; // empty: there are none
-    std::vector<record_material_range> ranges;
-};
-
 // Corners at one place of one colour are one vertex.
 void split_by_colour(const geometry &from, const std::vector<const triangle *> &order, const meaning &means,
-                     parts &out)
+                     reading::mesh_parts &out)
 {
     std::unordered_map<uint64_t, uint32_t> made;
 
@@ -127,12 +120,12 @@ void split_by_colour(const geometry &from, const std::vector<const triangle *> &
         }
 }
 
-parts make_parts(reader &r, const geometry &from, std::map<uint32_t, group> &groups)
+reading::mesh_parts make_parts(reader &r, const geometry &from, std::map<uint32_t, group> &groups)
 {
     meaning means(r, groups);
     std::vector<std::pair<uint32_t, const triangle *>> sorted;
     std::vector<const triangle *> order;
-    parts out;
+    reading::mesh_parts out;
 
     for (const triangle &t : from.triangles)
         sorted.emplace_back(means.material(t), &t);
@@ -192,25 +185,7 @@ void place(placing &p, uint32_t parent, const instance &from, unsigned depth)
 
 uint32_t add_mesh(reader &r, const std::string &name, const geometry &from, std::map<uint32_t, group> &groups)
 {
-    const parts made = make_parts(r, from, groups);
-    import_mesh mesh = {};
-
-    mesh.name = name.c_str();
-    mesh.vertex_count = uint32_t(made.positions.size() / 3);
-    mesh.triangle_count = uint32_t(made.indices.size() / 3);
-    mesh.range_count = uint32_t(made.ranges.size());
-    try {
-        mesh.positions = reading::copy_of(made.positions);
-        mesh.indices = reading::copy_of(made.indices);
-        mesh.colours = reading::copy_of(made.colours);
-        mesh.ranges = reading::copy_of(made.ranges);
-    } catch (...) {
-        import_mesh_finish(&mesh);
-        throw;
-    }
-    const uint32_t id = import_add_mesh(r.scene, &mesh);
-    check(r);
-    return id;
+    return reading::add_mesh(r, make_parts(r, from, groups), name, "");
 }
 
 // The scene has y up, and metres.

@@ -45,7 +45,7 @@ vector3 unit(const vector3 &a)
 void add_corners(set &t, uint32_t first, std::initializer_list<uint32_t> corners)
 {
     for (uint32_t corner : corners)
-        t.indices.push_back(first + corner);
+        t.mesh.indices.push_back(first + corner);
 }
 
 // A closed prism. Vertex 2 * side is at the line's begin, the next one at its end. False: the line has no length.
@@ -63,14 +63,14 @@ bool add_tube(set &t, const place3 &begin, const place3 &end)
     vector3 other = {};
     other[smallest] = 1;
     const vector3 u = unit(cross(axis, other)), v = cross(axis, u);
-    const uint32_t first = uint32_t(t.positions.size() / 3);
+    const uint32_t first = uint32_t(t.mesh.positions.size() / 3);
     const vector3 across[sides] = {u, v, {-u[0], -u[1], -u[2]}, {-v[0], -v[1], -v[2]}};
 
     for (const vector3 &outwards : across)
         for (const place3 &at : {begin, end})
             for (size_t c = 0; c < 3; c++) {
-                t.positions.push_back(float(double(at[c]) + outwards[c] * t.radius));
-                t.normals.push_back(float(outwards[c]));
+                t.mesh.positions.push_back(float(double(at[c]) + outwards[c] * t.radius));
+                t.mesh.normals.push_back(float(outwards[c]));
             }
     for (uint32_t side = 0; side < sides; side++) {
         const uint32_t here = 2 * side, next = 2 * ((side + 1) % sides);
@@ -109,8 +109,8 @@ void choose_radius(set &t, const box &all, double metres)
 void add_lines(set &t, const std::vector<float> &places, const std::vector<uint32_t> &ends,
                const std::vector<uint16_t> &colours, uint32_t material, const std::string &where)
 {
-    const uint64_t count = t.positions.size() / 3 / tube_vertices + ends.size() / 2;
-    const uint32_t first = uint32_t(t.indices.size() / 3);
+    const uint64_t count = t.mesh.positions.size() / 3 / tube_vertices + ends.size() / 2;
+    const uint32_t first = uint32_t(t.mesh.indices.size() / 3);
 
     if (count > tubes_max)
         fail(t.r, where, "more than %llu lines", static_cast<unsigned long long>(tubes_max));
@@ -124,39 +124,21 @@ void add_lines(set &t, const std::vector<float> &places, const std::vector<uint3
         }
         for (size_t vertex = 0; vertex < tube_vertices && t.has_colours; vertex++)
             for (size_t c = 0; c < 4; c++)
-                t.colours.push_back(colours.empty() ? 65535 : colours[size_t(ends[i + vertex % 2]) * 4 + c]);
+                t.mesh.colours.push_back(colours.empty() ? 65535 : colours[size_t(ends[i + vertex % 2]) * 4 + c]);
     }
-    const uint32_t triangles = uint32_t(t.indices.size() / 3) - first;
+    const uint32_t triangles = uint32_t(t.mesh.indices.size() / 3) - first;
     if (triangles > 0)
-        t.ranges.push_back({first, triangles, material});
+        t.mesh.ranges.push_back({first, triangles, material});
 }
 
 uint32_t add_mesh(set &t, const std::string &name)
 {
-    import_mesh mesh = {};
-
-    if (t.indices.empty())
+    if (t.mesh.indices.empty())
         return 0;
-    mesh.name = name.c_str();
-    mesh.where = t.where.c_str();
-    mesh.vertex_count = uint32_t(t.positions.size() / 3);
-    mesh.triangle_count = uint32_t(t.indices.size() / 3);
-    mesh.range_count = uint32_t(t.ranges.size());
-    try {
-        mesh.positions = reading::copy_of(t.positions);
-        mesh.normals = reading::copy_of(t.normals);
-        mesh.colours = reading::copy_of(t.colours);
-        mesh.indices = reading::copy_of(t.indices);
-        mesh.ranges = reading::copy_of(t.ranges);
-    } catch (...) {
-        import_mesh_finish(&mesh);
-        throw;
-    }
-    const uint32_t id = import_add_mesh(t.r.scene, &mesh);
-    check(t.r);
+    const uint32_t id = reading::add_mesh(t.r, t.mesh, name, t.where);
     import_note(t.r.scene, PROTOCOL_SEVERITY_INFO, t.where.c_str(),
                 "%zu lines are shown as tubes of diameter %.3g; --point-size sets it",
-                t.indices.size() / 3 / tube_triangles, 2 * t.radius * t.metres);
+                t.mesh.indices.size() / 3 / tube_triangles, 2 * t.radius * t.metres);
     return id;
 }
 

@@ -23,10 +23,7 @@ struct set {
     std::string where;
     double radius = 0, metres = 1; // of a unit
     bool has_colours = false;
-    std::vector<float> positions = {}, normals = {};
-    std::vector<uint16_t> colours = {};
-    std::vector<uint32_t> indices = {};
-    std::vector<record_material_range> ranges = {};
+    reading::mesh_parts mesh = {};
 };
 
 void extend(box &of, const std::vector<float> &places);

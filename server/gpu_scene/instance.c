@@ -140,7 +140,7 @@ static void pack_instances(const struct gpu_scene *gpu, struct posed *posed, boo
         struct instance *instance = &fresh->instances[fresh->count++];
         *instance = (struct instance){.geometry = geometry, .node = in->node->base.id};
         instance->flags = determinant(in->world_from_object) < 0.0 ? INSTANCE_MIRRORED : 0;
-        instance->flags |= scene_light_group(gpu->scene, in->node) << INSTANCE_LIGHT_GROUP_SHIFT;
+        instance->flags |= (uint32_t)in->light_group << INSTANCE_LIGHT_GROUP_SHIFT;
         memcpy(instance->world_from_object, in->world_from_object, sizeof(instance->world_from_object));
         memcpy(instance->object_from_world, in->object_from_world, sizeof(instance->object_from_world));
         add_motion(fresh, instance, matrices, posed->pose_count);

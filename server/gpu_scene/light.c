@@ -81,10 +81,8 @@ static bool pack_lights(struct gpu_scene *gpu, const struct scene *scene, const 
     for (size_t i = 0; *packed && i < count; i++) {
         const struct scene_light *light = scene_light(scene, list[i].node->object);
         if (light &&
-            pack_light(scene_pose_light(pose, light), list[i].world_from_object, *packed + gpu->light_count)) {
-            const float group = (float)scene_light_group(scene, list[i].node);
-            (*packed)[gpu->light_count++].position_kind[3] += group / LIGHT_GROUPS_MAX;
-        }
+            pack_light(scene_pose_light(pose, light), list[i].world_from_object, *packed + gpu->light_count))
+            (*packed)[gpu->light_count++].position_kind[3] += (float)list[i].light_group / LIGHT_GROUPS_MAX;
     }
     free(list);
     return *packed || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the lights of a scene");

@@ -55,7 +55,7 @@ static bool has_grouped_surfaces(const struct gpu_scene *copy)
     return false;
 }
 
-/* What glows is in the group of its node, which stored samples do not hold. */
+/* A surface that glows is in the group of its node, which stored samples do not hold. */
 static bool check_groups(const struct frame_renderer *renderer, struct error *error)
 {
     const struct render_context *context = &renderer->work->context;

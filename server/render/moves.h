@@ -8,8 +8,7 @@
 #include "gpu_scene/scene.h"
 #include "render/frame.h"
 
-/* All-zero is the valid empty one. */
-struct moves {
+struct moves {                   /* all-zero: none */
     struct gpu_buffer instances; /* shared/layers.h: struct move */
     struct gpu_buffer vertices;
     bool has_any; /* else nothing but the camera moves */

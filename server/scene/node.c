@@ -14,6 +14,7 @@ struct world {
     const struct scene_pose *pose;
     double (*world_from_node)[12];
     enum { WORLD_UNKNOWN, WORLD_VISIBLE, WORLD_HIDDEN } * state;
+    uint8_t *light_groups; /* a node's own, or the nearest above it; 0: none */
 };
 
 static bool world_init(struct world *world, const struct scene_pose *pose, size_t count)
@@ -21,13 +22,15 @@ static bool world_init(struct world *world, const struct scene_pose *pose, size_
     world->pose = pose;
     world->world_from_node = malloc(count * sizeof(*world->world_from_node));
     world->state = calloc(count, sizeof(*world->state));
-    return world->world_from_node && world->state;
+    world->light_groups = malloc(count);
+    return world->world_from_node && world->state && world->light_groups;
 }
 
 static void world_finish(struct world *world)
 {
     free(world->world_from_node);
     free(world->state);
+    free(world->light_groups);
 }
 
 /* Goes up to an ancestor that is known, then down again; a chain has at most SCENE_DEPTH_MAX nodes. */
@@ -47,9 +50,12 @@ static void world_resolve(struct world *world, const struct hierarchy *hierarchy
         const struct scene_node *node = hierarchy->nodes[i];
         bool hidden = scene_pose_hidden(world->pose, node);
         const double *parent = root;
+        world->light_groups[i] = (uint8_t)node->light_group;
         if (above != HIERARCHY_NONE) {
             parent = world->world_from_node[above];
             hidden = hidden || world->state[above] == WORLD_HIDDEN;
+            if (node->light_group == 0)
+                world->light_groups[i] = world->light_groups[above];
         }
         affine_double_multiply(world->world_from_node[i], parent, scene_pose_parent_from_node(world->pose, node));
         world->state[i] = hidden ? WORLD_HIDDEN : WORLD_VISIBLE;
@@ -102,8 +108,10 @@ bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enu
         if (hierarchy.nodes[i]->kind != kind)
             continue;
         world_resolve(&world, &hierarchy, i);
-        if (world.state[i] == WORLD_VISIBLE)
-            fill_instance(&list[used++], scene, hierarchy.nodes[i], world.world_from_node[i]);
+        if (world.state[i] != WORLD_VISIBLE)
+            continue;
+        fill_instance(&list[used], scene, hierarchy.nodes[i], world.world_from_node[i]);
+        list[used++].light_group = world.light_groups[i];
     }
     world_finish(&world);
     hierarchy_finish(&hierarchy);

@@ -41,13 +41,6 @@ const struct scene_node *scene_node(const struct scene *scene, uint32_t id)
     return hashmap_get(&scene->objects[OBJECT_NODE], id);
 }
 
-uint32_t scene_light_group(const struct scene *scene, const struct scene_node *node)
-{
-    while (node->light_group == 0 && node->parent != 0)
-        node = scene_node(scene, node->parent);
-    return node->light_group;
-}
-
 const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id)
 {
     return hashmap_get(&scene->objects[OBJECT_MESH], id);

@@ -253,8 +253,6 @@ uint64_t scene_edits_table_bytes(const struct scene_edit *edits, size_t edit_cou
 
 /* Objects by identifier, NULL if there is none. */
 const struct scene_node *scene_node(const struct scene *scene, uint32_t id);
-/* The light group of a node, its own or the nearest above it; 0: none. */
-uint32_t scene_light_group(const struct scene *scene, const struct scene_node *node);
 const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id);
 /* Whether its colours have 16 bits each. */
 bool mesh_has_wide_colours(const struct scene_mesh *mesh);
@@ -284,6 +282,7 @@ struct scene_instance {
     float world_from_object[12];
     float object_from_world[12]; /* zero where `singular` */
     bool singular;               /* the transform is singular: geometry there is skipped */
+    uint8_t light_group;         /* the node's own, or the nearest above it; 0: none */
 };
 /* Below, `pose` says where things are; NULL: as they were committed. */
 /* Instances of one kind in the order of node ids; an array to free(). False: out of memory. */

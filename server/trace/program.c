@@ -11,10 +11,6 @@
 #define OWN_DEFINES_MAX 12
 #define SURFACE_DEFINES_MAX (TRACE_SURFACE_DEFINES + 1)
 
-/* A multiple of all packets' sizes. */
-#define DISPATCH_RAYS_MIN 192u
-/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
-#define DISPATCH_RAYS_MAX ((1u << 18) / DISPATCH_RAYS_MIN * DISPATCH_RAYS_MIN)
 /* Seconds of a slow GPU, if every ray took all of its rounds: a thousandth of them is usual. */
 #define DISPATCH_ROUNDS_MAX ((uint64_t)1 << 35)
 
@@ -100,9 +96,10 @@ uint32_t trace_rays_a_dispatch(const struct gpu_device *device, uint64_t rounds_
 {
     if (device->facts.software) /* traces short ranges, and no driver ends them */
         return 0;
-    const uint64_t fitting = DISPATCH_ROUNDS_MAX / (rounds_of_a_ray + 1) / DISPATCH_RAYS_MIN * DISPATCH_RAYS_MIN;
-    const uint64_t some = fitting < DISPATCH_RAYS_MAX ? fitting : DISPATCH_RAYS_MAX;
-    return some > DISPATCH_RAYS_MIN ? (uint32_t)some : DISPATCH_RAYS_MIN;
+    const uint64_t fitting =
+        DISPATCH_ROUNDS_MAX / (rounds_of_a_ray + 1) / TRACE_RAYS_MULTIPLE * TRACE_RAYS_MULTIPLE;
+    const uint64_t some = fitting < TRACE_DISPATCH_RAYS_MAX ? fitting : TRACE_DISPATCH_RAYS_MAX;
+    return some > TRACE_RAYS_MULTIPLE ? (uint32_t)some : TRACE_RAYS_MULTIPLE;
 }
 
 void trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
@@ -117,7 +114,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
         gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
     gpu_uniform_uint(program, "disc_count", scene->disc_count);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
-    const bool is_whole = wave->counts && source->rays_a_dispatch >= DISPATCH_RAYS_MAX;
+    const bool is_whole = wave->counts && source->rays_a_dispatch >= TRACE_DISPATCH_RAYS_MAX;
     for (uint32_t first = rays->first, part; first < rays->end; first += part) {
         part = rays->end - first;
         if (source->rays_a_dispatch && source->rays_a_dispatch < part && !is_whole)

@@ -14,15 +14,18 @@
 
 #define TRACE_DEPTH_BYTES 16u /* of a ray, where rays go on from one dispatch to the next (RAYS_GO_ON) */
 
+#define TRACE_RAYS_MULTIPLE 192u /* of all packets' sizes */
+/* Rays of a dispatch that fill any GPU; more at once only near the time after which a driver ends it. */
+#define TRACE_DISPATCH_RAYS_MAX ((1u << 18) / TRACE_RAYS_MULTIPLE * TRACE_RAYS_MULTIPLE)
+
 /* Zero is the default of each. */
 struct trace_program_source {
     const char *traverse;             /* "bvh/traverse.glsl" */
     const struct gpu_define *defines; /* of the tracer's own, ends with {0}; may be NULL; at most 12 */
     uint32_t packet_rays;             /* 0: 1 */
     bool ray_pairs;                   /* an invocation traverses two packets of one ray side by side */
-    /* 0: all; a multiple of packet_rays, and of 2. Where the device alone knows how many rays there are, only a
-     * bound that is lower than others have is kept: nearly all parts of the most that there may be would be empty.
-     */
+    /* 0: all; a multiple of packet_rays, and of 2. A wave that the device counts is one dispatch where this is
+     * TRACE_DISPATCH_RAYS_MAX: parts of the most rays that it may have would nearly all be empty. */
     uint32_t rays_a_dispatch;
 };
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // From the strip to the sums of a band: the picture's, moved by as much as filtering has moved the light.
 //
-// What the filter has left out because it was much brighter than its surroundings stays where a pixel beside it is as bright by
-// both halves of its samples: a highlight. All else is brighter or darker than all around it only as far as each part of its
-// samples says so. What one part has alone is a speck, which is worth next to nothing where it was found (DeCoro, Weyrich,
-// Rusinkiewicz. Density-based Outlier Rejection in Monte Carlo Rendering. 2010, by neighbours and parts in place of all samples).
+// A pixel stays as bright as it is where a pixel beside it is as bright by both halves of its samples: a highlight. Any other is
+// brighter or darker than its neighbours only as far as each part of its samples says so. The rest is a speck, which is worth
+// next to nothing where it was found (DeCoro, Weyrich, Rusinkiewicz. Density-based Outlier Rejection in Monte Carlo Rendering.
+// 2010, by neighbours and parts in place of all samples), and goes to their mean.
 //
 // Defines: HAS_REPROJECTED what pictures before have brought has moved it, too.
 

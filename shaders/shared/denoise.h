@@ -40,7 +40,7 @@
 /* The noise of the halves is believed up to twice the power that neighbours show: sparse noise shows in few of
  * them. */
 #define DENOISE_NEIGHBOURS_TRUST 2.0f
-/* Of the noise of many samples of mirrors and glass so much is not believed. */
+/* The share of the noise of mirrors and glass that is not believed where there are many samples. */
 #define DENOISE_MIRROR_DOUBT 0.5f
 /* What is brighter than so many times what is around it, or than so much of white, is left out of the filter. */
 #define DENOISE_CAP 4.0f

@@ -10,6 +10,7 @@
 #include "trace/raster/box.h"
 #include "trace/raster/draw.h"
 #include "trace/raster/fit.h"
+#include "trace/program.h"
 #include "trace/tracer.h"
 
 #include <epoxy/gl.h>
@@ -234,7 +235,7 @@ const struct tracer_impl tracer_abuffer_impl = {
     .name = "abuffer",
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES,
     .still = true,
-    .minimum_rays = 192,
+    .minimum_rays = TRACE_RAYS_MULTIPLE,
     .create = abuffer_create,
     .destroy = abuffer_destroy,
     .update = abuffer_update,

@@ -9,10 +9,6 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-#define MINIMUM_RAYS 192u /* a multiple of all packets' sizes */
-/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
-#define DISPATCH_RAYS_MAX ((1u << 18) / MINIMUM_RAYS * MINIMUM_RAYS)
-
 static struct bvh_form settings_of(const struct gpu_device *device, const struct tracer_options *options)
 {
     const bool is_paper = options->bvh.form == TRACER_FORM_PAPER;
@@ -147,7 +143,7 @@ static enum budget budget_of(const struct bvh *bvh, const struct trace_state *st
 static uint32_t rays_of_a_dispatch(const struct ray_range *rays)
 {
     const uint32_t count = rays->end - rays->first;
-    return count < DISPATCH_RAYS_MAX ? count : DISPATCH_RAYS_MAX;
+    return count < TRACE_DISPATCH_RAYS_MAX ? count : TRACE_DISPATCH_RAYS_MAX;
 }
 
 static void run_and_stop(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
@@ -239,7 +235,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         .defines = defines,
         .packet_rays = packet_rays,
         .ray_pairs = own->ray_pairs,
-        .rays_a_dispatch = DISPATCH_RAYS_MAX,
+        .rays_a_dispatch = TRACE_DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
@@ -268,7 +264,7 @@ const struct tracer_impl tracer_bvh_impl = {
     .name = "bvh",
     .finds_first_hits = true,
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES,
-    .minimum_rays = MINIMUM_RAYS,
+    .minimum_rays = TRACE_RAYS_MULTIPLE,
     .create = bvh_create,
     .destroy = bvh_destroy,
     .update = bvh_update,

@@ -12,6 +12,7 @@
 #include "trace/ldc/store.h"
 #include "trace/ldc/surface.h"
 #include "trace/ldc/trace.h"
+#include "trace/program.h"
 #include "trace/tracer.h"
 
 #include <epoxy/gl.h>
@@ -274,7 +275,7 @@ const struct tracer_impl tracer_ldc_impl = {
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES,
     .sampled = true,
     .still = true,
-    .minimum_rays = 192,
+    .minimum_rays = TRACE_RAYS_MULTIPLE,
     .create = ldc_create,
     .destroy = ldc_destroy,
     .update = ldc_update,

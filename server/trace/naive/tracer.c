@@ -115,7 +115,7 @@ static bool naive_trace_range(struct tracer *tracer, struct gpu_scene *scene, st
 const struct tracer_impl tracer_naive_impl = {
     .name = "naive",
     .depends_on = CHANGED_GEOMETRY | CHANGED_INSTANCES | CHANGED_SHADING, /* what limits it */
-    .minimum_rays = 192,
+    .minimum_rays = TRACE_RAYS_MULTIPLE,
     .create = naive_create,
     .destroy = naive_destroy,
     .update = naive_update,

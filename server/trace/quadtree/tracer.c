@@ -219,7 +219,7 @@ const struct tracer_impl tracer_quadtree_impl = {
     .depends_on =
         CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES | CHANGED_DISCS | CHANGED_VIEW,
     .still = true,
-    .minimum_rays = 192,
+    .minimum_rays = TRACE_RAYS_MULTIPLE,
     .create = quadtree_create,
     .destroy = quadtree_destroy,
     .update = quadtree_update,
