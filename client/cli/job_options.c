@@ -284,11 +284,12 @@ static error_t add_edit(struct cli_job *job, const char *field, const char *valu
     return fl_assignment_parse(value, &job->edits[job->edit_count++], &job->error) ? 0 : EINVAL;
 }
 
-/* "key" of "key=Sun,Lamp*": the group's number, a new one if the name is new; 0: it cannot be. */
+/* "key" of "key=Sun,Lamp*", its length is that of a name: the group's number, a new one if the name is new;
+   0: it cannot be. */
 static unsigned light_group_of(struct cli_job *job, const char *value, size_t length)
 {
-    char name[CLI_LIGHT_GROUP_NAME];
-    snprintf(name, sizeof(name), "%.*s", (int)(length < sizeof(name) ? length : sizeof(name)), value);
+    char name[CLI_LIGHT_GROUP_NAME] = "";
+    memcpy(name, value, length);
     for (unsigned i = 0; i < job->light_group_count; i++)
         if (strcmp(job->light_groups[i], name) == 0)
             return i + 1;
@@ -298,19 +299,19 @@ static unsigned light_group_of(struct cli_job *job, const char *value, size_t le
     return job->light_group_count;
 }
 
-static error_t add_to_group(struct cli_job *job, const char *field, unsigned group, const char *node)
+static error_t add_to_group(struct cli_job *job, const char *field, unsigned group, const char *node,
+                            size_t length)
 {
     if (job->edit_count == CLI_EDITS_MAX)
         return cli_usage(job, field, "with all of --edit more than %d names cannot be given", CLI_EDITS_MAX);
     struct fl_assignment *edit = &job->edits[job->edit_count];
-    const bool is_environment = strcmp(node, "environment") == 0;
-    *edit = (struct fl_assignment){.kind = is_environment ? PROTOCOL_OBJECT_ENVIRONMENT : PROTOCOL_OBJECT_NODE,
-                                   .field = "light_group",
-                                   .count = 1,
-                                   .values = {group}};
-    if (node[0] == '\0' || strlen(node) >= sizeof(edit->which))
-        return cli_usage(job, field, "'%s' is no name of a node", node);
-    snprintf(edit->which, sizeof(edit->which), "%s", node);
+    *edit = (struct fl_assignment){
+        .kind = PROTOCOL_OBJECT_NODE, .field = "light_group", .count = 1, .values = {group}};
+    if (length == 0 || length >= sizeof(edit->which))
+        return cli_usage(job, field, "'%.*s' is no name of a node", (int)length, node);
+    memcpy(edit->which, node, length);
+    if (strcmp(edit->which, "environment") == 0)
+        edit->kind = PROTOCOL_OBJECT_ENVIRONMENT;
     job->edit_count++;
     return 0;
 }
@@ -333,10 +334,8 @@ static error_t set_light_group(struct cli_job *job, const char *field, const cha
     if (group == 0)
         return cli_usage(job, field, "'%s' is one group too many: there may be %d", value, CLI_LIGHT_GROUPS);
     for (const char *at = value + length; *at != '\0';) {
-        char node[160];
         const size_t bytes = strcspn(++at, ",");
-        snprintf(node, sizeof(node), "%.*s", (int)(bytes < sizeof(node) ? bytes : sizeof(node)), at);
-        const error_t status = add_to_group(job, field, group, node);
+        const error_t status = add_to_group(job, field, group, at, bytes);
         if (status != 0)
             return status;
         at += bytes;
