@@ -86,6 +86,29 @@ static uint64_t get_integer(GLenum name)
     return value < 0 ? 0 : (uint64_t)value;
 }
 
+void gpu_facts_choose(struct gpu_facts *facts, bool software)
+{
+    facts->software = facts->shares_memory = facts->builds_on_host = software;
+    facts->step_scale = software ? 1 : 64;
+    /* Software GL has no latency to hide, and its caches are the processor's; a GPU wants enough rays to fill
+     * itself. */
+    facts->slice_rays_max = software ? 1u << 15 : 1u << 20;
+    facts->range_rays_first = software ? 4096 : UINT32_MAX;
+    /* Seconds of a slow GPU, if every ray took all of its rounds: a thousandth of them is usual. No driver ends
+     * what a processor does. */
+    facts->dispatch_rounds_max = software ? 0 : (uint64_t)1 << 35;
+    facts->packet_rays = software ? 8 : 1;
+    /* Software GL takes some ten milliseconds for as many. A GPU has at least twice its number in a storage block.
+     */
+    facts->band_slots_max = software ? 1u << 18 : 1u << 22;
+    /* A ray of a large scene needs some hundred; it has enough of them to be finished in one dispatch, unless the
+     * scene is made to keep it. Software GL leaves a loop after 65535 rounds. */
+    facts->ray_tests_max = software ? 65000 : 1u << 16;
+    /* With more, a step of the smallest range of rays would take software GL longer than a cancel may. */
+    facts->primitives_max = software ? 65000 : 0;
+    facts->axes_samples_max = (software ? 1 : 8) * (4ull * 3 * 1024 * 1024);
+}
+
 static void ask_facts(struct gpu_facts *facts, const struct gpu_device_info *info, bool robust, bool debug)
 {
     GLint groups = 0, time_stamp_bits = 0;
@@ -94,7 +117,6 @@ static void ask_facts(struct gpu_facts *facts, const struct gpu_device_info *inf
     const char *renderer = (const char *)glGetString(GL_RENDERER);
     const bool compiles_at_dispatch = renderer && strncmp(renderer, "llvmpipe", 8) == 0;
     *facts = (struct gpu_facts){
-        .software = chooses_as_software(info),
         .robust = robust,
         .debug_output = debug,
         .has_program_binary = get_integer(GL_NUM_PROGRAM_BINARY_FORMATS) > 0,
@@ -105,16 +127,7 @@ static void ask_facts(struct gpu_facts *facts, const struct gpu_device_info *inf
         .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),
         .work_groups_max = groups > 0 ? (uint32_t)groups : 65535,
     };
-    /* On hardware a SIMD group traverses together already, and several rays an invocation cost registers. */
-    facts->packet_rays = facts->software ? 8 : 1;
-    /* A ray of a large scene needs some hundred; it has enough of them to be finished in one dispatch, unless the
-     * scene is made to keep it. Software GL leaves a loop after 65535 rounds. */
-    facts->ray_tests_max = facts->software ? 65000 : 1u << 16;
-    facts->builds_on_host = facts->software;
-    /* Software GL takes some ten milliseconds for as many. A GPU has at least twice its number in a storage block.
-     */
-    facts->band_slots_max = facts->software ? 1u << 18 : 1u << 22;
-    facts->axes_samples_max = (facts->software ? 1 : 8) * (4ull * 3 * 1024 * 1024);
+    gpu_facts_choose(facts, chooses_as_software(info));
     gpu_limits_ask(facts->limits);
     facts->texture_buffer_texels_max = facts->limits[GPU_MAX_TEXTURE_BUFFER_SIZE];
     facts->texture_size_max = (uint32_t)facts->limits[GPU_MAX_TEXTURE_SIZE];

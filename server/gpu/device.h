@@ -48,11 +48,18 @@ struct gpu_facts {
     uint32_t work_groups_max;  /* on x; more is a GL error */
     uint32_t texture_size_max; /* texels along an edge of a 2D texture */
     uint32_t texture_layers_max;
-    /* Numbers by which passes choose sizes. */
-    uint32_t packet_rays;    /* of a packet that bvh traverses where packets pay; 1: they never do */
+    /* Numbers by which passes choose sizes, see gpu_facts_choose. */
+    uint32_t step_scale; /* a step of a pass has so many times the items that two cores have with software GL */
+    uint32_t slice_rays_max;      /* of a slice of a picture */
+    uint32_t range_rays_first;    /* rays of a wave that are traced before the host looks at the clock; UINT32_MAX:
+                                     the    host cannot, because a dispatch returns before it is done */
+    uint64_t dispatch_rounds_max; /* rounds of rays' loops in a dispatch, or the driver ends it; 0: no limit */
+    uint32_t packet_rays;         /* of a packet that bvh traverses where packets pay; 1: they never do */
     uint32_t band_slots_max; /* samples' places in a band of a picture, which is turned into pixels in one step */
     uint32_t ray_tests_max;  /* elements or primitives that a ray may have of a dispatch */
+    uint32_t primitives_max; /* that naive tests every ray with; 0: no limit */
     uint64_t axes_samples_max; /* of a structure of samples along axes: ldc, abuffer */
+    bool shares_memory;        /* buffers are mapped memory of the host: it writes to them in place */
     bool builds_on_host;       /* where the host has a way to build a structure of its own */
     uint64_t limits[GPU_LIMIT_COUNT];
     struct gpu_memory memory;
@@ -107,6 +114,10 @@ static inline bool gpu_host_builds(const struct gpu_device *device)
 {
     return device->facts.software && device->facts.builds_on_host;
 }
+
+/* Numbers and ways by which passes suit software GL on two cores, or a GPU. On the latter a SIMD group traverses
+ * together already, and several rays an invocation cost registers. */
+void gpu_facts_choose(struct gpu_facts *facts, bool software);
 
 struct gpu_options {
     int index;                    /* of gpu_device_list; -1: first hardware, else software */

@@ -107,9 +107,10 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     bool whole = false, drawn = draw_part(primary, context, &whole, error);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     *done = primary->layer == primary->layer_count;
-    if (!whole || context->device->facts.software)
+    if (!whole) {
         gpu_finish(context->device); /* else all parts would be waited for at the end, at once */
-    raster_view_learn(&primary->view, clock_now_ns() - start_ns, STEP_NS);
+        raster_view_learn(&primary->view, clock_now_ns() - start_ns, STEP_NS);
+    }
     gpu_pop_group(context->device);
     context_span_end(context);
     return drawn && gpu_check(context->device, "rasterising primary hits", error);

@@ -11,9 +11,6 @@
 #define OWN_DEFINES_MAX 12
 #define SURFACE_DEFINES_MAX (TRACE_SURFACE_DEFINES + 1)
 
-/* Seconds of a slow GPU, if every ray took all of its rounds: a thousandth of them is usual. */
-#define DISPATCH_ROUNDS_MAX ((uint64_t)1 << 35)
-
 /* Rays at the time 0 see the first pose, as does a program without motion. */
 bool trace_has_motion(const struct gpu_scene *scene, const struct wave *wave)
 {
@@ -94,10 +91,10 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
 
 uint32_t trace_rays_a_dispatch(const struct gpu_device *device, uint64_t rounds_of_a_ray)
 {
-    if (device->facts.software) /* traces short ranges, and no driver ends them */
+    if (device->facts.dispatch_rounds_max == 0)
         return 0;
     const uint64_t fitting =
-        DISPATCH_ROUNDS_MAX / (rounds_of_a_ray + 1) / TRACE_RAYS_MULTIPLE * TRACE_RAYS_MULTIPLE;
+        device->facts.dispatch_rounds_max / (rounds_of_a_ray + 1) / TRACE_RAYS_MULTIPLE * TRACE_RAYS_MULTIPLE;
     const uint64_t some = fitting < TRACE_DISPATCH_RAYS_MAX ? fitting : TRACE_DISPATCH_RAYS_MAX;
     return some > TRACE_RAYS_MULTIPLE ? (uint32_t)some : TRACE_RAYS_MULTIPLE;
 }

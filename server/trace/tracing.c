@@ -8,9 +8,8 @@
 
 #include <stdlib.h>
 
-/* The first step of a family of waves; and how many times as many rays as the last one per step may have, which
- * may have been of rays that leave the scene at once. */
-#define STEP_RAYS_FIRST 4096u
+/* How many times as many rays as the last one a step may have, which may have been of rays that leave the scene at
+ * once. The first one has the device's range_rays_first. */
 #define STEP_RAYS_GROWTH 2u
 #define STEP_RAYS_MAX (1u << 30)
 
@@ -126,16 +125,15 @@ static uint32_t minimum_rays(const struct trace_state *state)
     return state->impl->minimum_rays ? state->impl->minimum_rays : 1;
 }
 
-/* The rays of the next step: of equal steps, none of which has more than the family's. On a GPU the end of a range
- * is known only by waiting, and a wave takes a few milliseconds. */
+/* The rays of the next step: of equal steps, none of which has more than the family's. */
 static struct ray_range next_range(const struct trace_state *state, uint64_t step_ns)
 {
     const struct wave *wave = &state->wave;
     const uint32_t learnt = state->step_rays[wave->family], minimum = minimum_rays(state);
     const uint32_t first = state->traced_rays, left = wave->ray_count - first;
-    const uint32_t maximum = step_ns == 0 ? minimum : learnt ? learnt : STEP_RAYS_FIRST;
+    const uint32_t maximum = step_ns == 0 ? minimum : learnt ? learnt : state->device->facts.range_rays_first;
     struct ray_range rays = {.wave = wave, .first = first, .end = wave->ray_count};
-    if (step_ns == STEP_WITHOUT_END || (step_ns > 0 && !state->device->facts.software) || maximum >= left)
+    if (step_ns == STEP_WITHOUT_END || maximum >= left)
         return rays;
     const uint32_t steps = (left - 1) / maximum + 1, even = (left - 1) / steps + 1;
     const uint32_t count = (even + minimum - 1) / minimum * minimum;
@@ -147,8 +145,11 @@ static struct ray_range next_range(const struct trace_state *state, uint64_t ste
 static void learn(struct trace_state *state, uint32_t rays, uint64_t step_ns, uint64_t took_ns)
 {
     uint32_t *step_rays = &state->step_rays[state->wave.family];
-    const uint64_t last = *step_rays ? *step_rays : STEP_RAYS_FIRST, minimum = minimum_rays(state);
+    const uint32_t first = state->device->facts.range_rays_first;
+    const uint64_t last = *step_rays ? *step_rays : first, minimum = minimum_rays(state);
     const uint64_t wanted = rays * step_ns / (took_ns + 1), maximum = STEP_RAYS_GROWTH * last;
+    if (first == UINT32_MAX)
+        return;
     const uint64_t next = wanted < maximum ? wanted : maximum;
     *step_rays = (uint32_t)(next < minimum ? minimum : next < STEP_RAYS_MAX ? next : STEP_RAYS_MAX);
 }

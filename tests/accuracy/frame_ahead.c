@@ -12,19 +12,19 @@
 
 #define PANES 24 /* more than the waves that are queued at first */
 
-static bool was_software;
+static struct gpu_facts facts_before;
 
 static int take_for_hardware(void **state)
 {
     fixture_setup(state);
-    was_software = device->facts.software;
-    device->facts.software = false;
+    facts_before = device->facts;
+    gpu_facts_choose(&device->facts, false);
     return 0;
 }
 
 static int take_for_what_it_is(void **state)
 {
-    device->facts.software = was_software;
+    device->facts = facts_before;
     return fixture_teardown(state);
 }
 

@@ -81,7 +81,8 @@ TEST(a_frame_on_a_gpu_compiles_no_program_that_it_does_not_need)
     fixture->request.tracer = TRACER_BVH;
     fixture->request.integrator = INTEGRATOR_WHITTED;
     fixture->request.depth = 4;
-    device->facts.software = device->facts.compiles_at_dispatch = false;
+    gpu_facts_choose(&device->facts, false);
+    device->facts.compiles_at_dispatch = false;
     frame_renderer_queue_ahead(fixture->renderer, true);
     struct frame_result result = fixture_render(fixture);
     frame_renderer_queue_ahead(fixture->renderer, !facts.software);

@@ -13,8 +13,7 @@
 #define EDGE_ROWS (((1u << LEVELS) - 1) * (1 + DENOISE_CHOICE_RADIUS) + 4)
 /* Pixels of a dispatch: software GL does them within some ten milliseconds; a GPU has no use for more than this.
  */
-#define STEP_PIXELS_SOFTWARE (1u << 15)
-#define STEP_PIXELS (1u << 22)
+#define STEP_PIXELS (1u << 15) /* times step_scale */
 /* Up to so many samples, noise weighs more than the detail that looks like it. */
 #define FEW_SAMPLES 16u
 
@@ -266,7 +265,7 @@ static bool has_band(const struct denoise_filter *filter)
 static uint32_t rows_of_step(const struct denoise_filter *filter, const struct render_context *context,
                              const struct picture *picture, uint32_t left)
 {
-    const uint32_t pixels = context->device->facts.software ? STEP_PIXELS_SOFTWARE : STEP_PIXELS;
+    const uint32_t pixels = STEP_PIXELS * context->device->facts.step_scale;
     uint32_t rows = pixels / picture->width ? pixels / picture->width : 1;
     const uint32_t row = filter->strip_row + filter->row;
     const uint32_t band_left = picture->band_rows - row % picture->band_rows;

@@ -119,10 +119,7 @@ static bool voxels_run(struct abuffer_task *task, uint32_t first, uint32_t end, 
     return abuffer_voxels_pass(task->store, task->stage - ABUFFER_VOXELS_JUDGE, first, end, error);
 }
 
-/* Units are of so many items at first: a few milliseconds on software GL; on a GPU, which wants enough of them at
- * once, so many times as many. */
-#define HARDWARE_TIMES 64u
-
+/* Units are of so many items at first, times step_scale. */
 static const struct stage_functions {
     abuffer_stage_begin *begin;
     abuffer_stage_run *run;
@@ -148,7 +145,7 @@ static uint32_t *unit_of(struct abuffer_task *task)
     struct abuffer_builder *builder = task->builder;
     uint32_t *items = &builder->unit_items[task->stage];
     if (*items == 0)
-        *items = stages[task->stage].unit_items * (builder->device->facts.software ? 1 : HARDWARE_TIMES);
+        *items = stages[task->stage].unit_items * builder->device->facts.step_scale;
     return items;
 }
 

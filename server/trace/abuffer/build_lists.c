@@ -15,8 +15,7 @@
 #define TEXELS_A_NODE 4
 #define NODES_MIN 1024u
 /* What a unit of draws fills, at most: some milliseconds on software GL. */
-#define DRAW_TEXELS_SOFTWARE 65536.0
-#define DRAW_TEXELS_HARDWARE 16777216.0
+#define DRAW_TEXELS 65536.0 /* times step_scale */
 /* Cleared together, as one item. */
 #define CLEAR_BYTES ((size_t)1 << 16)
 
@@ -168,7 +167,7 @@ bool abuffer_draw_begin(struct abuffer_task *task, uint32_t *items, struct error
 uint32_t abuffer_draw_fit(struct abuffer_task *task, uint32_t first, uint32_t items)
 {
     const struct abuffer_store *store = task->store;
-    const double maximum = task->builder->device->facts.software ? DRAW_TEXELS_SOFTWARE : DRAW_TEXELS_HARDWARE;
+    const double maximum = DRAW_TEXELS * (double)task->builder->device->facts.step_scale;
     double texels;
     if (task->band_count > 0)
         return 1;

@@ -135,7 +135,7 @@ enum budget {
 
 static enum budget budget_of(const struct bvh *bvh, const struct trace_state *state)
 {
-    if (bvh->base.device->facts.software)
+    if (bvh->base.device->facts.dispatch_rounds_max == 0)
         return BUDGET_NONE;
     return state->wave.stopped && !state->patient ? BUDGET_STOPS : BUDGET_RESUMES;
 }

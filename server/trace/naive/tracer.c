@@ -16,8 +16,6 @@
  * behind would be missed. Materials that are evaluated at an intersection have loops of their own, whose rounds
  * count for each primitive, hit or not: five were measured. */
 #define ROUNDS_WITH_MATERIALS 8u
-/* On software GL a step of the smallest range of rays would take longer than a cancel may. */
-#define SOFTWARE_PRIMITIVES_MAX 65000u
 
 struct naive {
     struct tracer base;
@@ -50,18 +48,18 @@ static enum tracer_progress naive_update(struct tracer *tracer, struct gpu_scene
 {
     (void)update;
     struct naive *naive = (struct naive *)tracer;
-    const bool software = tracer->device->facts.software;
+    const struct gpu_facts *facts = &tracer->device->facts;
     const uint32_t rounds = scene->has_cutout || scene->has_translucent ? ROUNDS_WITH_MATERIALS : 1;
     uint64_t primitives = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         primitives += scene->geometries[scene->instances[i].geometry].device.primitive_count;
-    if (software && primitives > SOFTWARE_PRIMITIVES_MAX) {
-        error_set(error, ERROR_LIMIT, "tracer", "naive: %llu primitives; on software GL it can look at %u",
-                  (unsigned long long)primitives, SOFTWARE_PRIMITIVES_MAX);
+    if (facts->primitives_max && primitives > facts->primitives_max) {
+        error_set(error, ERROR_LIMIT, "tracer", "naive: %llu primitives; on this device it can test %u",
+                  (unsigned long long)primitives, facts->primitives_max);
         error_remedy(error, "take another tracer");
         return TRACER_FAILED;
     }
-    naive->ray_tests_max = tracer->device->facts.ray_tests_max / (software ? rounds : 1);
+    naive->ray_tests_max = facts->ray_tests_max / rounds;
     naive->has_parts = primitives + scene->instance_count > naive->ray_tests_max;
     return TRACER_DONE;
 }

@@ -133,12 +133,11 @@ static bool go_on(struct quadtree_layers *layers, struct gpu_scene *scene, struc
     bool whole = false;
     if ((!layers->begun && !begin_pass(layers, scene, error)) || !draw_part(layers, scene, &whole, error))
         return false;
-    if (layers->store->device->facts.software) {
+    if (!whole) {
         gpu_finish(layers->store->device); /* else all parts would be waited for at the end, at once */
         raster_view_learn(&layers->drawing, clock_now_ns() - start_ns, STEP_NS);
-    }
-    if (!whole)
         return true;
+    }
     layers->begun = false;
     layers->layer += layers->pass_layers;
     if (layers->layer == layers->store->uniforms.layers) {

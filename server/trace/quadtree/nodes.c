@@ -11,8 +11,7 @@
 #define NODE_BYTES 8u
 #define ERROR_BYTES 4u
 /* Nodes of a unit: some milliseconds. */
-#define UNIT_ITEMS_SOFTWARE (1u << 17)
-#define UNIT_ITEMS (1u << 23)
+#define UNIT_ITEMS (1u << 17) /* times step_scale */
 
 static uint32_t slice_count(const struct quadtree_uniforms *uniforms)
 {
@@ -152,7 +151,7 @@ static void clear_nodes(struct gpu_device *device, struct gpu_buffer *nodes, uin
 
 static uint32_t unit_items(const struct quadtree_store *store)
 {
-    return store->device->facts.software ? UNIT_ITEMS_SOFTWARE : UNIT_ITEMS;
+    return UNIT_ITEMS * store->device->facts.step_scale;
 }
 
 uint32_t quadtree_nodes_units(const struct quadtree_store *store)

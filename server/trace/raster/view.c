@@ -11,11 +11,10 @@
  * small enough never to cut anything: a share of the scene's diagonal. */
 #define NEAR_OF_DIAGONAL 1e-5f
 
-/* Vertices that one part draws. On a GPU nearly as many as an int can number. On software GL at most
- * what takes some ten milliseconds if triangles are small, and fewer where that takes longer than a step should:
- * larger triangles, other work on the machine. Each part costs something of its own, so only then. */
-#define DRAW_VERTICES_HARDWARE (3u << 24)
-#define DRAW_VERTICES_SOFTWARE (3u << 16)
+/* Vertices that one part draws, times step_scale: at most what takes some ten milliseconds if triangles are small,
+ * and fewer where that takes longer than a step should: larger triangles, other work on the machine. Each part
+ * costs something of its own, so only then. */
+#define DRAW_VERTICES_MAX (3u << 16)
 #define DRAW_VERTICES_FIRST (3u << 14) /* nothing is known of the scene yet */
 #define DRAW_VERTICES_MIN (3u << 12)
 
@@ -174,7 +173,7 @@ bool raster_view_draw(struct raster_view *view, const struct raster_view_target 
 {
     if (view->part_vertices == 0)
         view->part_vertices = DRAW_VERTICES_FIRST;
-    uint32_t budget = target->device->facts.software ? view->part_vertices : DRAW_VERTICES_HARDWARE;
+    uint32_t budget = view->part_vertices * target->device->facts.step_scale;
     glDisable(GL_BLEND);
     glDisable(GL_SCISSOR_TEST);
     glDisable(GL_CULL_FACE);
@@ -195,7 +194,7 @@ void raster_view_learn(struct raster_view *view, uint64_t took_ns, uint64_t step
 {
     if (took_ns > step_ns && view->part_vertices > DRAW_VERTICES_MIN)
         view->part_vertices /= 2;
-    else if (took_ns < step_ns / 8 && view->part_vertices < DRAW_VERTICES_SOFTWARE)
+    else if (took_ns < step_ns / 8 && view->part_vertices < DRAW_VERTICES_MAX)
         view->part_vertices *= 2;
 }
 

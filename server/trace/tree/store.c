@@ -391,7 +391,7 @@ static bool open_arrays(struct bvh_store *store, struct error *error)
     struct bvh_store_build *build = &store->build;
     const struct bvh_entry *entries = &store->entries[store->entry_count - build->count];
     uint8_t *elements = NULL, *primitives = NULL;
-    if (store->device->facts.software && build->count > 0) {
+    if (store->device->facts.shares_memory && build->count > 0) {
         elements = gpu_buffer_open(store->device, &store->elements, error);
         if (!elements)
             return false;

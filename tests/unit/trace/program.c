@@ -8,7 +8,9 @@ ALL_TESTS(NULL, NULL)
 
 TEST(rays_that_may_take_long_go_in_small_dispatches)
 {
-    const struct gpu_device hardware = {0}, software = {.facts.software = true};
+    struct gpu_device hardware = {0}, software = {0};
+    gpu_facts_choose(&hardware.facts, false);
+    gpu_facts_choose(&software.facts, true);
     assert_int_equal(trace_rays_a_dispatch(&software, UINT64_MAX / 2), 0);
     /* Structures as they are usual fill any GPU. */
     assert_in_range(trace_rays_a_dispatch(&hardware, 0), 1u << 17, 1u << 18);

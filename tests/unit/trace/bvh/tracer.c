@@ -331,8 +331,7 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
     assert_true(bvh_is_packed(&store->settings));
     for (uint32_t i = 0; i < RAY_COUNT; i++)
         rays[i] = make_ray(6, 6, 20, test_uniform(&seed, -0.4f, 0.4f), test_uniform(&seed, -0.4f, 0.4f), -1);
-    device->facts.software = false; /* which leaves a loop by itself */
-    device->facts.packet_rays = 1;
+    gpu_facts_choose(&device->facts, false); /* software GL leaves a loop by itself */
     for (int i = 0; i < 2; i++) {
         hits[i] = malloc(RAY_COUNT * sizeof(struct hit));
         trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, RAY_COUNT, hits[i], NULL);
@@ -364,7 +363,7 @@ static void *trace_as_hardware(struct scene *scene, const struct ray *rays, enum
     struct fixture fixture;
     void *answers = malloc(RAY_COUNT * sizeof(struct hit));
     fixture_init_by(&fixture, TRACER_BVH, scene, options);
-    device->facts.software = ray_tests == 0;
+    gpu_facts_choose(&device->facts, ray_tests == 0);
     device->facts.packet_rays = 1;
     device->facts.ray_tests_max = ray_tests;
     trace_rays(trace_by_tracer, &fixture, kind, rays, RAY_COUNT, answers, answers);
@@ -414,8 +413,7 @@ TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
     struct hit *expected = trace_as_hardware(scene_of_instances(), rays, WAVE_CLOSEST, NULL, 0);
     fixture_init(&fixture, scene_of_instances());
     expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error), &error);
-    device->facts.software = false;
-    device->facts.packet_rays = 1;
+    gpu_facts_choose(&device->facts, false);
     device->facts.ray_tests_max = 8;
     struct trace_state *wave = begin_wave(&fixture, &ray_buffer, &hit_buffer);
     unsigned steps = 0;

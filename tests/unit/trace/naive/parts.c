@@ -53,8 +53,10 @@ static void *trace(struct gpu_scene *gpu, const struct ray *rays, enum wave_kind
     struct error error = {0};
     const size_t each = kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit);
     struct gpu_buffer ray_buffer = {0}, answers = {0};
-    device->facts.software = facts.software && tests == 0;
-    device->facts.ray_tests_max = tests > 0 ? tests : facts.ray_tests_max;
+    gpu_facts_choose(&device->facts, facts.software && tests == 0);
+    /* Where materials are evaluated at intersections, a test counts as eight rounds. */
+    const uint32_t rounds = gpu->has_cutout || gpu->has_translucent ? 8 : 1;
+    device->facts.ray_tests_max = tests > 0 ? tests * rounds : device->facts.ray_tests_max;
     struct tracer *tracer = tracer_create(&tracer_naive_impl, device, NULL, &error);
     expect_ok(tracer && tracer_update(tracer, gpu, &(struct tracer_update){0}, &error) &&
                   gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error) &&
