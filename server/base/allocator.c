@@ -3,8 +3,6 @@
  * blocks, again and again. Freed memory keeps its pages for ten seconds (jemalloc's default, here for the largest
  * blocks too) for whichever thread allocates next (one arena). New memory comes in huge pages, as small ones cost
  * 3 to 30 times as much. A background thread returns unused pages to the kernel. */
-#include "base/allocator.h"
-
 #include <jemalloc/jemalloc.h>
 
 /* Read by jemalloc when it starts, by this name, which -fvisibility=hidden would hide. */
@@ -14,16 +12,11 @@ __attribute__((visibility("default"))) const char *malloc_conf =
 /* NULL where the sanitizers are linked in place of jemalloc. */
 #pragma weak mallctl
 
-bool allocator_keeps_pages(void)
-{
-    return mallctl != NULL;
-}
-
 /* jemalloc makes the first arena before it reads the options, and that arena would return large blocks to the
  * kernel at once. */
 __attribute__((constructor)) static void keep_large_blocks(void)
 {
     size_t never = (size_t)1 << 50;
-    if (allocator_keeps_pages())
+    if (mallctl)
         mallctl("arena.0.oversize_threshold", NULL, NULL, &never, sizeof(never));
 }

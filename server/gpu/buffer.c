@@ -143,23 +143,6 @@ void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer)
     glUnmapNamedBuffer(buffer->name);
 }
 
-bool gpu_buffers_open(struct gpu_device *device, struct gpu_buffer *const *buffers, int count, void **opened,
-                      struct error *error)
-{
-    int open = 0;
-    while (open < count && (opened[open] = gpu_buffer_open(device, buffers[open], error)))
-        open++;
-    if (open < count)
-        gpu_buffers_close(device, buffers, open);
-    return open == count;
-}
-
-void gpu_buffers_close(struct gpu_device *device, struct gpu_buffer *const *buffers, int count)
-{
-    for (int i = 0; i < count; i++)
-        gpu_buffer_unmap(device, buffers[i]);
-}
-
 void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes, const void *data,
                       size_t size_bytes)
 {

@@ -39,11 +39,6 @@ void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_
  * failure. Unmap it before the GPU uses it. */
 void *gpu_buffer_open(struct gpu_device *device, struct gpu_buffer *buffer, struct error *error);
 void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer);
-/* Opens `count` buffers, all or none. false and *error on failure. */
-bool gpu_buffers_open(struct gpu_device *device, struct gpu_buffer *const *buffers, int count, void **opened,
-                      struct error *error);
-/* Unmaps them. */
-void gpu_buffers_close(struct gpu_device *device, struct gpu_buffer *const *buffers, int count);
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
                      size_t size_bytes); /* waits for the GPU */
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value); /* every u32 */

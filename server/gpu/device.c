@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/device.h"
 
-#include "base/allocator.h"
 #include "base/clock.h"
 #include "base/log.h"
-#include "base/prefault.h"
 #include "gpu/binary_cache.h"
 #include "gpu/debug.h"
 #include "gpu/egl.h"
@@ -88,7 +86,7 @@ static uint64_t get_integer(GLenum name)
 
 void gpu_facts_choose(struct gpu_facts *facts, bool software)
 {
-    facts->software = facts->shares_memory = facts->builds_on_host = software;
+    facts->software = facts->shares_memory = software;
     facts->step_scale = software ? 1 : 64;
     /* Software GL has no latency to hide, and its caches are the processor's; a GPU wants enough rays to fill
      * itself. */
@@ -251,8 +249,6 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     device->measured = options->measured;
     if (!device->measured.known)
         gpu_measured_load(&device->info, &device->measured);
-    if (device->facts.software && allocator_keeps_pages())
-        device->prefault = prefault_create();
     if (debug)
         gpu_debug_start();
     if (!gpu_limits_check(device->facts.limits, error) || !create_defaults(device, error))
@@ -276,7 +272,6 @@ void gpu_device_destroy(struct gpu_device *device)
     if (device->egl)
         gpu_egl_close(device->egl);
     free(device->egl);
-    prefault_destroy(device->prefault);
     if (current_device == device)
         current_device = NULL;
     free(device);
@@ -374,34 +369,23 @@ bool gpu_memory_take(struct gpu_device *device, uint64_t size_bytes, const char 
 void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns)
 {
     device->reserve_until_ns = clock_now_ns() + time_ns;
-    device->reserve_awaited_bytes = 0;
     device->reserve_made = device->reserve_put_off = false;
 }
 
-bool gpu_reserve_end(struct gpu_device *device, size_t *awaited_bytes)
+bool gpu_reserve_end(struct gpu_device *device)
 {
     bool put_off = device->reserve_put_off;
-    *awaited_bytes = device->reserve_awaited_bytes;
     device->reserve_until_ns = 0;
     device->reserve_put_off = false;
     return put_off;
 }
 
-bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes)
-{
-    return prefault_goes_on(device->prefault, awaited_bytes);
-}
-
-bool gpu_reserve_goes_on(struct gpu_device *device, size_t bytes, struct error *error)
+bool gpu_reserve_goes_on(struct gpu_device *device, struct error *error)
 {
     if (!device->reserve_until_ns)
         return true;
     if (device->reserve_made && clock_now_ns() >= device->reserve_until_ns)
         device->reserve_put_off = true;
-    if (!device->reserve_put_off && !prefault_is_ready(device->prefault, bytes, device->reserve_until_ns)) {
-        device->reserve_put_off = true;
-        device->reserve_awaited_bytes = bytes;
-    }
     device->reserve_made = true;
     return !device->reserve_put_off || error_set(error, ERROR_BUSY, NULL, "memory is reserved in steps");
 }
@@ -410,7 +394,7 @@ bool gpu_reserve_memory(struct gpu_device *device, size_t bytes, const char *wha
 {
     if (!gpu_memory_take(device, bytes, what, error))
         return false;
-    if (gpu_reserve_goes_on(device, bytes, error))
+    if (gpu_reserve_goes_on(device, error))
         return true;
     gpu_memory_give(device, bytes);
     return false;

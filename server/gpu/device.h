@@ -60,7 +60,6 @@ struct gpu_facts {
     uint32_t primitives_max; /* that naive tests every ray with; 0: no limit */
     uint64_t axes_samples_max; /* of a structure of samples along axes: ldc, abuffer */
     bool shares_memory;        /* buffers are mapped memory of the host: it writes to them in place */
-    bool builds_on_host;       /* where the host has a way to build a structure of its own */
     uint64_t limits[GPU_LIMIT_COUNT];
     struct gpu_memory memory;
 };
@@ -94,12 +93,10 @@ struct gpu_device {
     unsigned empty_buffer;                         /* zeros, bound in place of an empty buffer */
     struct gpu_uniform_ring uniform_ring;
     struct gpu_unseen unseen;
-    const char *misused_uniform;  /* one that was given a value of another type; NULL: none */
-    uint64_t memory_used_bytes;   /* counted by gpu_memory_take: buffers, textures, Embree */
-    uint64_t memory_limit_bytes;  /* 0: none; facts.memory.bytes at first */
-    struct prefault *prefault;    /* of software GL; NULL: its reservations do not wait */
-    uint64_t reserve_until_ns;    /* see gpu_reserve_begin; 0: whenever */
-    size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
+    const char *misused_uniform; /* one that was given a value of another type; NULL: none */
+    uint64_t memory_used_bytes;  /* counted by gpu_memory_take: buffers, textures, Embree */
+    uint64_t memory_limit_bytes; /* 0: none; facts.memory.bytes at first */
+    uint64_t reserve_until_ns;   /* see gpu_reserve_begin; 0: whenever */
     bool reserve_made, reserve_put_off;
     uint64_t waits; /* how often this thread has waited for the device to come to an end with something */
     uint64_t dispatches, barriers; /* that it has queued */
@@ -108,12 +105,6 @@ struct gpu_device {
     struct gpu_measured measured;
     bool lost; /* the context; nothing works any more, see gpu_note_loss */
 };
-
-/* Whether the host may build a structure in place of passes: it maps buffers, whose memory is software GL's. */
-static inline bool gpu_host_builds(const struct gpu_device *device)
-{
-    return device->facts.software && device->facts.builds_on_host;
-}
 
 /* Numbers and ways by which passes suit software GL on two cores, or a GPU. On the latter a SIMD group traverses
  * together already, and several rays an invocation cost registers. */
@@ -156,15 +147,13 @@ void gpu_memory_give(struct gpu_device *device, uint64_t size_bytes);
 /* Software GL clears new memory at once, which takes a second a gigabyte and more. From here to gpu_reserve_end(),
  * reservations beyond `time_ns` are put off: they fail with ERROR_BUSY, and the caller comes again with the same
  * ones, of which those that were made stay. The first reservation after each gpu_reserve_begin() is made in any
- * case, unless its memory is still being prefaulted (base/prefault.h). */
+ * case. */
 void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns);
-/* Whether anything was put off. *awaited_bytes is then for gpu_reserve_waits(). */
-bool gpu_reserve_end(struct gpu_device *device, size_t *awaited_bytes);
-/* Whether the reservation that was put off is still being prefaulted. */
-bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes);
-/* Before a reservation of that many bytes, on the device or of the host; 0: before other work of milliseconds for
- * it. False: it is put off. */
-bool gpu_reserve_goes_on(struct gpu_device *device, size_t bytes, struct error *error);
+/* Whether anything was put off. */
+bool gpu_reserve_end(struct gpu_device *device);
+/* Before a reservation on the device or of the host, or other work of milliseconds for it. False: it is put off.
+ */
+bool gpu_reserve_goes_on(struct gpu_device *device, struct error *error);
 /* The same for memory of the device, which is taken, unless it is put off or there is too little. */
 bool gpu_reserve_memory(struct gpu_device *device, size_t bytes, const char *what, struct error *error);
 

@@ -120,7 +120,7 @@ static void *run(void *context)
     struct worker *worker = context;
     struct gpu_ahead *ahead = worker->ahead;
     struct gpu_egl beside;
-    host_thread_gives_way(); /* to what builds and prefaults; what waits for this one takes no time */
+    host_thread_gives_way(); /* to what builds; what waits for this one takes no time */
     const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
     if (opened) {
         compile_items(ahead, worker->stands_in);

@@ -474,14 +474,11 @@ bool frame_step_waits(const struct frame_renderer *renderer)
         return tracer_update_waits(building);
     if (renderer->phase == PHASE_UPDATE && gpu_scene_bring_waits(&renderer->shared->copy))
         return true;
-    if (renderer->phase == PHASE_UPDATE || renderer->phase == PHASE_BUILD ||
-        (renderer->phase == PHASE_RESOLVE && !renderer->picture.pixels))
-        return gpu_reserve_waits(renderer->device, renderer->awaited_bytes);
     const struct slices_ahead *ahead = &renderer->work->ahead;
     if (renderer->phase == PHASE_LAND || (renderer->phase == PHASE_SLICE && ahead->count == SLICES_AHEAD_MAX))
         return ahead->count > 0 && !slices_ahead_has_done(ahead);
-    return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
-           !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
+    return renderer->phase == PHASE_RESOLVE && renderer->picture.pixels && renderer->copying &&
+           all_resolved(renderer) && !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }
 
 static size_t attached_bytes(const struct frame_request *request)

@@ -429,7 +429,7 @@ static void announce_shading(struct frame_renderer *renderer)
     gpu_program_announce(renderer->device, NULL);
 }
 
-/* Threads compile while this one goes on, and while memory is prefaulted. */
+/* Threads compile while this one goes on. */
 static void announce_programs(struct frame_renderer *renderer)
 {
     struct render_context *context = &renderer->work->context;
@@ -521,7 +521,7 @@ static enum tracer_progress bring(struct frame_renderer *renderer, const struct 
 static bool end_reserving(struct frame_renderer *renderer, bool made, const struct error *failed,
                           struct error *error)
 {
-    bool put_off = gpu_reserve_end(renderer->device, &renderer->awaited_bytes);
+    bool put_off = gpu_reserve_end(renderer->device);
     if (!made && !put_off && error && error->kind == ERROR_NONE)
         *error = *failed;
     return made || put_off;

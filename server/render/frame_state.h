@@ -92,7 +92,6 @@ struct frame_renderer {
     uint32_t pass;          /* with a key tracer: the layer that is rendered, or, behind the last, the eyes */
     struct picture *target; /* that gets the samples: `picture`, or the sums of the key view */
     uint32_t eyes_samples_before; /* samples_before, while layers are rendered */
-    size_t awaited_bytes;         /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
     bool announced;               /* are the programs of the pass that is being reserved */
     bool announced_early;         /* and those that depend on no structure */
     bool announced_first;         /* and what depends on materials alone */

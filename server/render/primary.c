@@ -297,8 +297,7 @@ bool primary_find(const struct primary *primary, struct render_context *context,
 
 void primary_announce(struct render_context *context, bool rasterised)
 {
-    /* Software GL compiles most of what draws where it draws, and this thread needs it first. */
-    if (rasterised && !context->device->facts.software)
+    if (rasterised)
         raster_view_announce(context->device, context->scene);
     context->sampled_hits = !rasterised && context->tracer->impl->sampled;
     if (rasterised) {

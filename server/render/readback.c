@@ -23,7 +23,7 @@ static size_t band_bytes(const struct picture *picture, const struct render_cont
 bool picture_reserve_pixels(struct picture *picture, const struct render_context *context, struct error *error)
 {
     const size_t size_bytes = (size_t)frame_request_bytes(&context->request);
-    if (!gpu_reserve_goes_on(context->device, size_bytes, error))
+    if (!gpu_reserve_goes_on(context->device, error))
         return false;
     picture->pixels = malloc(size_bytes);
     picture->size_bytes = size_bytes;

@@ -46,8 +46,6 @@ static void dispatch_rays(const struct gpu_program *program, const struct gpu_sc
 size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave, struct gpu_define *defines)
 {
     size_t n = 0;
-    if (scene->device->facts.software)
-        defines[n++] = (struct gpu_define){"SOFTWARE_GL", "1"};
     if (wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
     if (scene->has_spheres)
@@ -81,8 +79,6 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
     snprintf(packet_rays, sizeof(packet_rays), "%u", source->packet_rays ? source->packet_rays : 1);
     defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
     defines[n++] = (struct gpu_define){"PACKET_RAYS", packet_rays};
-    if (source->ray_pairs)
-        defines[n++] = (struct gpu_define){"RAY_PAIRS", "1"};
     for (size_t i = 0; i < OWN_DEFINES_MAX && source->defines && source->defines[i].name; i++)
         defines[n++] = source->defines[i];
     struct gpu_program_source whole = {.compute = "trace/wave.comp", .defines = defines};
@@ -103,7 +99,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
                        const struct ray_range *rays, const struct trace_program_source *source)
 {
     const struct wave *wave = rays->wave;
-    const uint32_t rays_an_invocation = source->ray_pairs ? 2 : source->packet_rays ? source->packet_rays : 1;
+    const uint32_t rays_an_invocation = source->packet_rays ? source->packet_rays : 1;
     trace_bind_rays(scene, wave);
     if (wave->kind == WAVE_ANY)
         gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);

@@ -23,8 +23,7 @@ struct trace_program_source {
     const char *traverse;             /* "bvh/traverse.glsl" */
     const struct gpu_define *defines; /* of the tracer's own, ends with {0}; may be NULL; at most 12 */
     uint32_t packet_rays;             /* 0: 1 */
-    bool ray_pairs;                   /* an invocation traverses two packets of one ray side by side */
-    /* 0: all; a multiple of packet_rays, and of 2. A wave that the device counts is one dispatch where this is
+    /* 0: all; a multiple of packet_rays. A wave that the device counts is one dispatch where this is
      * TRACE_DISPATCH_RAYS_MAX: parts of the most rays that it may have would nearly all be empty. */
     uint32_t rays_a_dispatch;
 };

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Links each fragment into its texel's list, and adds it to the voxels that it touches. Hu, Huang, Zhang, Yuan, Li. Ray
 // Tracing via GPU Rasterization. 2014, section 3.1.
-// Defines: those of raster/fragment.glsl; of raster/draw.geom ALL_IMAGES, always, and WITHOUT_STEEP; NODES_IN_STORAGE
-// nodes are in a storage block, which software GL writes faster than an image.
+// Defines: those of raster/fragment.glsl; of raster/draw.geom ALL_IMAGES, always, and WITHOUT_STEEP.
 
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
@@ -15,11 +14,7 @@ uniform float voxels_per_cell;
 uniform bool has_subvoxels;
 
 layout(binding = IMAGE_ABUFFER_HEADS, r32ui) uniform uimageBuffer heads;
-#ifdef NODES_IN_STORAGE
-layout(std430, binding = BIND_ABUFFER_NODES) writeonly buffer nodes_block { uvec4 nodes[]; };
-#else
 layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer nodes;
-#endif
 layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
 layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels;
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
@@ -41,11 +36,7 @@ bool link(float depth_cells, uint bits)
     }
     uint before = imageAtomicExchange(heads, int(texel_in_tiles()), node + 1u);
     uvec4 words = uvec4(before, floatBitsToUint(depth_cells), bits, primitive.x);
-#ifdef NODES_IN_STORAGE
-    nodes[node] = words;
-#else
     imageStore(nodes, int(node), words);
-#endif
     return true;
 }
 

@@ -124,7 +124,6 @@ SHARED_SIZE(abuffer_build_counts, 48)
 
 /* Binding points. */
 #define BIND_ABUFFER_BUILD_COUNTS BIND_TRACER_0 /* struct abuffer_build_counts */
-#define BIND_ABUFFER_NODES BIND_TRACER_1        /* or IMAGE_ABUFFER_NODES */
 #define IMAGE_ABUFFER_HEADS 0 /* abuffer/build.frag, and the passes behind it: abuffer/layout.h */
 #define IMAGE_ABUFFER_NODES 1
 #define IMAGE_ABUFFER_SUMS 2

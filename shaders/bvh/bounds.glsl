@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Rays against the bound of an element: spheres (BVH_SPHERES), boxes in floats, or boxes on the tree's grid
 // (BVH_PACKED), whose cells are then the unit of the ray too. All tests only ever err towards a hit.
-#include "tree/minmax.glsl"
 #include "tree/slack.glsl"
 
 // The grid of the traversed tree; without one: 0 and 1.
@@ -135,9 +134,9 @@ bool box_is_hit(bundle b, vec3 near, vec3 far, float t_min, float t_max)
     leave = mix(leave_other, leave, greaterThan(leave, leave_other));
 #endif
     // NaN is ignored or, in the last comparison, counts as a hit: hence the negation.
-    float enter_xy = greater(enter.x, enter.y), enter_z = greater(enter.z, t_min);
-    float leave_xy = lesser(leave.x, leave.y), leave_z = lesser(leave.z, t_max);
-    return !(greater(enter_xy, enter_z) > lesser(leave_xy, leave_z));
+    float enter_xy = max(enter.x, enter.y), enter_z = max(enter.z, t_min);
+    float leave_xy = min(leave.x, leave.y), leave_z = min(leave.z, t_max);
+    return !(max(enter_xy, enter_z) > min(leave_xy, leave_z));
 }
 
 #endif

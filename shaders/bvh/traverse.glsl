@@ -47,13 +47,6 @@ uniform vec3 bvh_top_grid_lower;
 uniform vec3 bvh_top_cells_per_unit;
 #endif
 
-// Shadow rays that are traversed one by one have few octants in common: all read the first octant's copy, whose order
-// is as good for finding any hit, and which stays in the processor's cache. Measured on software GL with 146K triangles:
-// ambient occlusion takes 0.9 of the time. (Closest hits take 1.5 of it without their order.)
-#if defined SOFTWARE_GL && defined ANY_HIT && PACKET_RAYS == 1 && !defined BVH_SPHERES
-#define ONE_ORDER
-#endif
-
 #define NOT_INSIDE 0xffffffffu
 
 #ifdef BVH_BUDGET
@@ -83,8 +76,6 @@ void begin_tree(inout tree_traversal traversal, uint first_element, uint element
 {
 #ifdef BVH_SPHERES
     traversal.first = first_element;
-#elif defined ONE_ORDER
-    traversal.first = first_element * BVH_OCTANTS;
 #else
     traversal.first = first_element * BVH_OCTANTS + octant * element_count;
 #endif
@@ -132,13 +123,7 @@ uint test_element(inout tree_traversal traversal, bundle b, distances_left left,
     for (int k = 0; k < PACKET_RAYS; k++)
         any_hit = sphere_is_hit(b.rays[k], lower, r[k].t_min, end_of(r[k], found[k])) || any_hit;
 #elif defined BVH_PACKED
-#ifdef ONE_ORDER
-    uvec3 first_corner = uvec3(b.octant << 4, b.octant << 3, b.octant << 2) & 16u; // 16: the other one
-#else
-    const uvec3 first_corner = uvec3(0u);
-#endif
-    bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz >> first_corner & 0xffffu)),
-                              vec3(ivec3(element.xyz >> (16u - first_corner) & 0xffffu)), left.t_min, left.t_max);
+    bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz & 0xffffu)), vec3(ivec3(element.xyz >> 16u)), left.t_min, left.t_max);
 #else
     bvec3 negative = notEqual(uvec3(b.octant) & uvec3(1u, 2u, 4u), uvec3(0u));
     bool any_hit = box_is_hit(b, mix(lower_corner, upper_corner, negative),
@@ -385,8 +370,6 @@ bool traverse_instances(inout tree_traversal traversal, inout tree_traversal wor
     }
 }
 
-#include "bvh/pair.glsl"
-
 // `leading`: the first ray that was active as the packet began: it leads to the end, also when it is finished.
 void trace_packet(inout trace_ray r[PACKET_RAYS], int leading, inout answer found[PACKET_RAYS])
 {
@@ -457,21 +440,7 @@ void end_budget()
 }
 
 // Called by trace/wave.comp.
-#ifdef RAY_PAIRS
-
-#ifdef ANY_HIT
-void trace_any_rays(trace_ray r[2], inout vec3 optical_depth[2])
-{
-    trace_pair(r, optical_depth);
-}
-#else
-void trace_closest_rays(trace_ray r[2], inout candidate best[2])
-{
-    trace_pair(r, best);
-}
-#endif
-
-#elif PACKET_RAYS == 1
+#if PACKET_RAYS == 1
 
 #ifdef ANY_HIT
 bool trace_any(trace_ray r, inout vec3 optical_depth)

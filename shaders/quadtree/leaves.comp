@@ -17,8 +17,6 @@ layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer nodes;
 layout(binding = IMAGE_QUADTREE_PLANES, rg32ui) writeonly uniform uimageBuffer planes;
 
 uniform uint first_item; // of the dispatch
-// Fours of leaves that are made, of a slice: the others show nothing.
-uniform uint first_column, first_row, columns, rows;
 uniform uint first_leaf; // in `planes`
 uniform uint slice;
 uniform uint layer; // of the face; its slice comes just behind that of the layer before
@@ -181,9 +179,10 @@ uvec2 what_at(uvec2 place)
 void main()
 {
     uint item = first_item + item_index();
-    if (item >= columns * rows)
+    uint columns = quadtree.padded_width / 2u;
+    if (item >= columns * (quadtree.padded_height / 2u))
         return;
-    uvec2 place = 2u * uvec2(first_column + item % columns, first_row + item / columns);
+    uvec2 place = 2u * uvec2(item % columns, item / columns);
     uvec2 a = what_at(place), b = what_at(place + uvec2(1u, 0u)), c = what_at(place + uvec2(0u, 1u)), d = what_at(place + 1u);
     uvec4 instances_left = uvec4(a.x, b.x, c.x, d.x), primitives = uvec4(a.y, b.y, c.y, d.y);
     uvec4 heads = plane_heads(vec4(0.0)), tails = uvec4(0u), own_heads, own_tails;

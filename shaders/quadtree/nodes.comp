@@ -15,7 +15,6 @@
 #ifdef NODES_OF_LEAVES
 layout(binding = UNIT_QUADTREE_PLANES) uniform usamplerBuffer planes;
 uniform uint slice;
-uniform uint first_column, first_row, columns, rows; // nodes that are made: below the others there is nothing
 #else
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer nodes;
 layout(binding = UNIT_QUADTREE_ERRORS) uniform samplerBuffer errors;
@@ -169,9 +168,10 @@ void main()
 {
     uint item = first_item + item_index();
 #ifdef NODES_OF_LEAVES
-    if (item >= columns * rows)
+    uint columns = node_row(1u);
+    if (item >= columns * (quadtree.padded_height / 2u))
         return;
-    uvec2 place = uvec2(first_column + item % columns, first_row + item / columns);
+    uvec2 place = uvec2(item % columns, item / columns);
     children four = children_of(place);
 #else
     uint width = node_row(level), height = quadtree.padded_height >> level;

@@ -28,8 +28,6 @@ uniform uint to; // the stack that is written to
 // The node is divided while it is wider than a fraction of the element, by that factor: what is coarse on both sides
 // costs tests and culls little.
 uniform float split_factor;
-// 1: and whatever its width where its rays may go on alone (is_for_one_ray): each then has few pairs.
-uniform uint rays_go_alone;
 
 bundle bundle_at(uint node)
 {
@@ -45,7 +43,9 @@ bool is_for_one_ray(bool is_top, uint element, uint link)
     return is_leaf(link) ? !is_instance(link) : !is_top && link - element <= RAYSPACE_SUBTREE_MAX;
 }
 
-// Whether the node of a pair is to be divided, rather than the element.
+// Whether the node of a pair is to be divided, rather than the element: also whatever its width where its rays may go
+// on alone, so that each has few pairs. On software GL a pair of a pass takes as long as a ray its whole way through a
+// tree.
 bool divides_node(uint level, bundle node, bool for_one, uint link, bounds b)
 {
     if (level == 0u)
@@ -53,7 +53,7 @@ bool divides_node(uint level, bundle node, bool for_one, uint link, bounds b)
     if (is_leaf(link))
         return !is_instance(link);
     float width = node.radius + distance(b.centre, node.centre) * node.tangent;
-    return (for_one && rays_go_alone != 0u) || node.secant == 0.0 || width * split_factor > b.radius;
+    return for_one || node.secant == 0.0 || width * split_factor > b.radius;
 }
 
 uint after(uint element, uint link)

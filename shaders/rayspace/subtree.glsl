@@ -7,7 +7,6 @@
 #include "common/candidate.glsl"
 #include "common/math.glsl"
 #include "tree/layout.h"
-#include "tree/minmax.glsl"
 #include "tree/slack.glsl"
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer tree_elements;
@@ -76,8 +75,8 @@ uint test_element(inout subtree part, float t_min, float t_max)
 #endif
     vec3 enter = near * part.scale - part.near_offset, leave = far * part.scale - part.far_offset;
     // NaN is ignored or, in the last comparison, counts as a hit: hence the negation.
-    float first = greater(greater(enter.x, enter.y), greater(enter.z, t_min));
-    float last = lesser(lesser(leave.x, leave.y), lesser(leave.z, t_max));
+    float first = max(max(enter.x, enter.y), max(enter.z, t_min));
+    float last = min(min(leave.x, leave.y), min(leave.z, t_max));
     bool is_hit = !(first > last), is_leaf = link >> BVH_LEAF_KIND_SHIFT != 0u;
     part.element = is_hit || is_leaf ? part.element + 1u : max(link, part.element + 1u);
     return is_hit && is_leaf ? link : 0u;

@@ -4,7 +4,6 @@
 // The host (trace/program.c) sets the defines:
 //   TRAVERSE             "bvh/traverse.glsl", the structure's traversal
 //   TRACER_BVH, TRACER_NAIVE, ..  and others of the tracer's own choice
-//   SOFTWARE_GL          a processor runs this
 //   ANY_HIT              the wave asks for transmittance, not for the closest surface
 //   HAS_SPHERES          some geometry is made of spheres
 //   HAS_DISCS            there are discs
@@ -15,13 +14,12 @@
 //   EVEN_ALPHA           none of these has a texture or vertex colours
 //   HAS_COUNTS           only the device knows how many rays there are
 //   PACKET_RAYS        how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
-//   RAY_PAIRS          or two one by one, but side by side; PACKET_RAYS is 1 then
 //
-// A traverse.glsl defines one of these, for ANY_HIT or not, and for INVOCATION_RAYS 1 or more:
+// A traverse.glsl defines one of these, for ANY_HIT or not, and for PACKET_RAYS 1 or more:
 //   void trace_closest(trace_ray r, inout candidate best);
 //   bool trace_any(trace_ray r, inout vec3 optical_depth);
-//   void trace_closest_rays(trace_ray r[INVOCATION_RAYS], inout candidate best[INVOCATION_RAYS]);
-//   void trace_any_rays(trace_ray r[INVOCATION_RAYS], inout vec3 optical_depth[INVOCATION_RAYS]);
+//   void trace_closest_rays(trace_ray r[PACKET_RAYS], inout candidate best[PACKET_RAYS]);
+//   void trace_any_rays(trace_ray r[PACKET_RAYS], inout vec3 optical_depth[PACKET_RAYS]);
 // It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
 // primitive against a ray with cutouts and tints accounted for. A traversal that intersects by its own means calls
 // offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
@@ -45,11 +43,6 @@
 
 #ifndef PACKET_RAYS
 #define PACKET_RAYS 1
-#endif
-#ifdef RAY_PAIRS
-#define INVOCATION_RAYS 2
-#else
-#define INVOCATION_RAYS PACKET_RAYS
 #endif
 #include TRAVERSE
 
@@ -164,7 +157,7 @@ bool is_new()
 #endif
 }
 
-#if INVOCATION_RAYS == 1
+#if PACKET_RAYS == 1
 
 void main()
 {
@@ -195,19 +188,19 @@ void main()
 #else
 
 // Work per ray runs in a loop that selects its ray by comparing indices: indexing the arrays by the loop's counter
-// would make the compiler unroll all of it (discs, textures, surfaces) INVOCATION_RAYS times.
+// would make the compiler unroll all of it (discs, textures, surfaces) PACKET_RAYS times.
 #ifdef ANY_HIT
 #define found_type vec3 // optical depths
 #else
 #define found_type candidate
 #endif
 
-void look_at_discs(inout trace_ray r[INVOCATION_RAYS], inout found_type found[INVOCATION_RAYS])
+void look_at_discs(inout trace_ray r[PACKET_RAYS], inout found_type found[PACKET_RAYS])
 {
-    for (int i = 0; i < INVOCATION_RAYS; i++) {
+    for (int i = 0; i < PACKET_RAYS; i++) {
         trace_ray r_i = r[0];
         found_type found_i = found[0];
-        for (int k = 1; k < INVOCATION_RAYS; k++) {
+        for (int k = 1; k < PACKET_RAYS; k++) {
             if (k == i) {
                 r_i = r[k];
                 found_i = found[k];
@@ -224,7 +217,7 @@ void look_at_discs(inout trace_ray r[INVOCATION_RAYS], inout found_type found[IN
             discs_closest(r_i, found_i);
 #endif
         }
-        for (int k = 0; k < INVOCATION_RAYS; k++) {
+        for (int k = 0; k < PACKET_RAYS; k++) {
             if (k == i) {
                 r[k] = r_i;
                 found[k] = found_i;
@@ -235,13 +228,13 @@ void look_at_discs(inout trace_ray r[INVOCATION_RAYS], inout found_type found[IN
 
 void main()
 {
-    uint first = first_ray + item_index() * INVOCATION_RAYS;
+    uint first = first_ray + item_index() * PACKET_RAYS;
     if (first >= ray_end)
         return;
-    trace_ray r[INVOCATION_RAYS];
-    found_type found[INVOCATION_RAYS];
+    trace_ray r[PACKET_RAYS];
+    found_type found[PACKET_RAYS];
     bool any_alive = false;
-    for (int k = 0; k < INVOCATION_RAYS; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         r[k] = load_ray(first + uint(k));
         any_alive = any_alive || is_alive(r[k]);
         found[k] = found_before(first + uint(k), r[k]);
@@ -257,12 +250,12 @@ void main()
 #ifdef ANY_HIT
     if (any_alive)
         trace_any_rays(r, found);
-    for (int k = 0; k < INVOCATION_RAYS; k++)
+    for (int k = 0; k < PACKET_RAYS; k++)
         store_visibility(first + uint(k), found[k]);
 #else
     if (any_alive)
         trace_closest_rays(r, found);
-    for (int k = 0; k < INVOCATION_RAYS; k++)
+    for (int k = 0; k < PACKET_RAYS; k++)
         store_intersection(first + uint(k), found[k]);
 #endif
 }

@@ -107,12 +107,9 @@ void refit(uvec4 record)
 
 #endif
 
-// One round per record; most passes have one.
-uniform uint each;
-
 void main()
 {
-    uint first = item_index() * each;
-    for (uint i = first; i < min(first + each, record_count); i++)
+    uint i = item_index();
+    if (i < record_count)
         refit(texelFetch(records, int(first_record + i) * BVH_REFIT_TEXELS));
 }

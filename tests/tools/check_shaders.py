@@ -26,8 +26,6 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
     for packet in ("1", "8")
     for bounds in ({"BVH_PACKED": "1"}, {})] + [
     {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": "2", "BVH_SPHERES": "1"}] + [
-    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": "1", "RAY_PAIRS": "1", **bounds}
-    for bounds in ({"BVH_PACKED": "1"}, {})] + [
     {"TRAVERSE": '"ldc/traverse.glsl"', "TRACER_LDC": "1", "LDC_CUBES": cubes, "PACKET_RAYS": "1", **way}
     for cubes in "12" for way in ({"LDC_CELLS": "1"}, {}, {"LDC_TOLERANCE": "1"})] + [
     {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"},

@@ -84,7 +84,7 @@ static bool reserve(struct abuffer_task *task, struct error *error)
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
     return abuffer_texels_allowed(task, error) &&
            gpu_buffer_reserve(device, &builder->heads, texel_numbers, error) &&
-           (abuffer_host_is_used(task) || gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error)) &&
+           gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(task->counts), error) &&
            gpu_buffer_reserve(device, &store->sums, (size_t)voxels * ABUFFER_SUM_BYTES, error) &&
            gpu_buffer_reserve(device, &store->subvoxels, subvoxels * ABUFFER_SUBVOXELS_BYTES, error) &&

@@ -5,6 +5,10 @@
 
 #include <stdlib.h>
 
+struct abuffer_node { /* abuffer/layout.h */
+    uint32_t next, depth, bits, id;
+};
+
 struct abuffer_deep {
     struct abuffer_node *nodes, *sorted;
     uint32_t (*samples)[2], *ids;
@@ -12,13 +16,49 @@ struct abuffer_deep {
     uint32_t place;   /* of the next one, among the samples */
 };
 
+static int compare(const void *a, const void *b)
+{
+    const struct abuffer_node *left = a, *right = b;
+    if (left->depth != right->depth) /* not negative: bits ascend as depths do */
+        return left->depth < right->depth ? -1 : 1;
+    return (left->id > right->id) - (left->id < right->id);
+}
+
+/* As abuffer/run.glsl has it. */
+static uint32_t sample_bits(uint32_t bits, int64_t winding)
+{
+    int64_t stored = winding + ABUFFER_WINDING_ZERO, maximum = ABUFFER_WINDING_MASK;
+    stored = stored < 0 ? 0 : stored > maximum ? maximum : stored;
+    return (bits & ABUFFER_NODE_NORMAL) | (uint32_t)stored << ABUFFER_WINDING_SHIFT |
+           (bits & ABUFFER_NODE_CLOSED ? ABUFFER_SAMPLE_BODY : 0);
+}
+
+/* The list of a head, in order and with its winding. Returns how many there are. */
+static uint32_t sort_list(struct abuffer_deep *lists, uint32_t head)
+{
+    uint32_t count = 0;
+    int64_t winding = 0;
+    for (; head != 0; head = lists->nodes[head - 1].next)
+        lists->sorted[count++] = lists->nodes[head - 1];
+    qsort(lists->sorted, count, sizeof(*lists->sorted), compare);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct abuffer_node *node = &lists->sorted[i];
+        if (node->bits & ABUFFER_NODE_CLOSED)
+            winding += node->bits & ABUFFER_NODE_LEAVES ? -1 : 1;
+        lists->samples[i][0] = node->depth;
+        lists->samples[i][1] = sample_bits(node->bits, winding);
+        lists->ids[i] = node->id;
+    }
+    return count;
+}
+
 static void write_list(struct abuffer_task *task, struct abuffer_deep *lists, uint32_t texel)
 {
     struct gpu_device *device = task->builder->device;
     struct abuffer_store *store = task->store;
     uint32_t head;
     gpu_buffer_read(device, &task->builder->heads, texel * sizeof(head), &head, sizeof(head));
-    uint32_t count = abuffer_host_sort(lists->nodes, head, lists->sorted, lists->samples, lists->ids);
+    uint32_t count = sort_list(lists, head);
     uint32_t words[2] = {lists->place, count};
     gpu_buffer_write(device, &store->texels, (size_t)texel * ABUFFER_TEXEL_BYTES, words, sizeof(words));
     gpu_buffer_write(device, &store->samples, (size_t)lists->place * ABUFFER_SAMPLE_BYTES, lists->samples,

@@ -116,12 +116,6 @@ static void list_cleared(const struct abuffer_task *task, struct part parts[CLEA
     memcpy(parts, all, sizeof(all));
 }
 
-/* The host writes all texels. */
-static uint32_t cleared_count(const struct abuffer_task *task)
-{
-    return abuffer_host_is_used(task) ? CLEARED_BUFFERS - 1 : CLEARED_BUFFERS;
-}
-
 static uint32_t chunks_of(const struct gpu_buffer *buffer)
 {
     return (uint32_t)((buffer->size_bytes + CLEAR_BYTES - 1) / CLEAR_BYTES);
@@ -133,7 +127,7 @@ bool abuffer_clear_begin(struct abuffer_task *task, uint32_t *items, struct erro
     struct part parts[CLEARED_BUFFERS];
     list_cleared(task, parts);
     *items = 0;
-    for (uint32_t i = 0; i < cleared_count(task); i++)
+    for (uint32_t i = 0; i < CLEARED_BUFFERS; i++)
         *items += chunks_of(parts[i].buffer);
     return true;
 }
@@ -143,7 +137,7 @@ bool abuffer_clear_run(struct abuffer_task *task, uint32_t first, uint32_t end, 
     (void)error;
     struct part parts[CLEARED_BUFFERS];
     list_cleared(task, parts);
-    for (uint32_t i = 0, before = 0; i < cleared_count(task); before += chunks_of(parts[i].buffer), i++) {
+    for (uint32_t i = 0, before = 0; i < CLEARED_BUFFERS; before += chunks_of(parts[i].buffer), i++) {
         const uint32_t from = first > before ? first - before : 0, to = end > before ? end - before : 0;
         const size_t size = parts[i].buffer->size_bytes, from_bytes = from * CLEAR_BYTES;
         const size_t to_bytes = to * CLEAR_BYTES < size ? to * CLEAR_BYTES : size;
@@ -183,24 +177,17 @@ uint32_t abuffer_draw_fit(struct abuffer_task *task, uint32_t first, uint32_t it
 
 bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
-    struct gpu_define defines[4] = {{"ALL_IMAGES", "1"}};
-    const bool nodes_in_storage =
-        abuffer_host_is_used(task) &&
-        task->builder->nodes.size_bytes <= task->builder->device->facts.storage_block_bytes_max;
-    size_t n = 1;
+    struct gpu_define defines[3] = {{"ALL_IMAGES", "1"}};
     struct abuffer_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const struct abuffer_store *store = task->store;
     if (store->without_steep)
-        defines[n++] = (struct gpu_define){"WITHOUT_STEEP", "1"};
-    if (nodes_in_storage)
-        defines[n++] = (struct gpu_define){"NODES_IN_STORAGE", "1"};
+        defines[1] = (struct gpu_define){"WITHOUT_STEEP", "1"};
     struct axes_pass pass = {
         .fragment = "abuffer/build.frag",
         .defines = defines,
         .cell_world = store->cell_world,
         .resolution = store->resolution,
-        .triangles_left_out = abuffer_host_is_used(task),
         .set = set_lists,
         .context = task,
     };
@@ -209,13 +196,8 @@ bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, s
         pass.end_row = (uint32_t)((uint64_t)store->resolution * (task->band + 1) / task->band_count);
     }
     memcpy(pass.lower_world, store->lower_world, sizeof(pass.lower_world));
-    if (pass.triangles_left_out && !abuffer_host_draws(task, &pass, first, end, error))
-        return false;
     gpu_buffer_bind_image(device, &builder->heads, IMAGE_ABUFFER_HEADS, GL_R32UI);
-    if (nodes_in_storage)
-        gpu_buffer_bind_storage(&builder->nodes, BIND_ABUFFER_NODES);
-    else
-        gpu_buffer_bind_image(device, &builder->nodes, IMAGE_ABUFFER_NODES, GL_RGBA32UI);
+    gpu_buffer_bind_image(device, &builder->nodes, IMAGE_ABUFFER_NODES, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->sums, IMAGE_ABUFFER_SUMS, GL_R32I);
     gpu_buffer_bind_image(device, &task->store->subvoxels, IMAGE_ABUFFER_SUBVOXELS, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
@@ -228,7 +210,7 @@ bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, s
 bool abuffer_occupied_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
 {
     (void)error;
-    *items = abuffer_host_is_used(task) ? 0 : task->texel_count / ABUFFER_OCCUPIED_TEXELS;
+    *items = task->texel_count / ABUFFER_OCCUPIED_TEXELS;
     return true;
 }
 

@@ -20,8 +20,7 @@ static bool reserve(struct abuffer_task *task, struct error *error)
     /* The traversal reads samples two per texel. */
     return gpu_buffer_reserve(device, &store->samples, (nodes + nodes % 2) * ABUFFER_SAMPLE_BYTES, error) &&
            gpu_buffer_reserve(device, &store->ids, nodes * ABUFFER_ID_BYTES, error) &&
-           (abuffer_host_is_used(task) ||
-            gpu_buffer_reserve(device, &builder->longer, longer_max(task) * sizeof(uint32_t), error)) &&
+           gpu_buffer_reserve(device, &builder->longer, longer_max(task) * sizeof(uint32_t), error) &&
            gpu_buffer_reserve(device, &builder->deep, deep * sizeof(uint32_t), error);
 }
 
@@ -45,20 +44,12 @@ static const struct gpu_program *use(struct abuffer_task *task, const struct gpu
 
 bool abuffer_resolve_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
 {
-    const bool by_host = abuffer_host_is_used(task);
-    *items = by_host ? task->texel_count / ABUFFER_TILE_TEXELS : task->counts.occupied;
-    if (task->counts.nodes > 0)
-        return reserve(task, error);
-    if (by_host)
-        gpu_buffer_clear(task->builder->device, &task->store->texels, 0);
-    *items = 0;
-    return true;
+    *items = task->counts.nodes > 0 ? task->counts.occupied : 0;
+    return task->counts.nodes == 0 || reserve(task, error);
 }
 
 bool abuffer_resolve_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
-    if (abuffer_host_is_used(task))
-        return abuffer_host_runs(task, first, end, error);
     struct abuffer_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const struct gpu_program_source source = {.compute = "abuffer/resolve.comp"};
@@ -78,8 +69,7 @@ bool abuffer_resolve_run(struct abuffer_task *task, uint32_t first, uint32_t end
 bool abuffer_resolve_end(struct abuffer_task *task, struct error *error)
 {
     (void)error;
-    if (!abuffer_host_is_used(task))
-        abuffer_read_counts(task);
+    abuffer_read_counts(task);
     task->store->sample_count = task->counts.nodes;
     task->store->depth_max = task->counts.depth_max;
     return true;

@@ -82,19 +82,6 @@ bool abuffer_lists_reserve(struct abuffer_task *task, struct error *error);
 abuffer_stage_begin abuffer_resolve_begin, abuffer_up_to_eight_begin, abuffer_beyond_eight_begin;
 abuffer_stage_run abuffer_resolve_run, abuffer_up_to_eight_run, abuffer_beyond_eight_run;
 abuffer_stage_end abuffer_resolve_end;
-/* build_host.c. The same by the host, but for what is left to build_deep.c; items are tiles. */
-bool abuffer_host_is_used(const struct abuffer_task *task);
-bool abuffer_host_runs(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error);
-/* build_triangles.c. Draws the triangles among the primitives first .. end - 1 that are not cut out, by the host.
- */
-bool abuffer_host_draws(struct abuffer_task *task, const struct axes_pass *pass, uint32_t first, uint32_t end,
-                        struct error *error);
-struct abuffer_node { /* abuffer/layout.h */
-    uint32_t next, depth, bits, id;
-};
-/* One list, in order and with its winding; `sorted`: room for all of it. Returns how many there are. */
-uint32_t abuffer_host_sort(const struct abuffer_node *nodes, uint32_t head, struct abuffer_node *sorted,
-                           uint32_t (*samples)[2], uint32_t *ids);
 /* build_deep.c. Those of texels that have more than the device's passes sort. */
 abuffer_stage_begin abuffer_deep_begin;
 abuffer_stage_run abuffer_deep_run;

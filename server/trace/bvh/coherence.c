@@ -162,12 +162,3 @@ uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const s
                ? packet_rays_of(bvh->base.device, wave)
                : 1;
 }
-
-bool bvh_ray_pairs(const struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
-                   uint32_t packet_rays)
-{
-    /* A traversal that stops to ask for materials does so for one ray. */
-    const bool asks_materials = scene->has_cutout || (wave->kind == WAVE_ANY && scene->has_translucent);
-    return !is_paper(bvh) && packet_rays == 1 && scene->device->facts.software && !asks_materials &&
-           !is_of_small_frame(wave);
-}

@@ -9,13 +9,6 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-static struct bvh_form settings_of(const struct gpu_device *device, const struct tracer_options *options)
-{
-    const bool is_paper = options->bvh.form == TRACER_FORM_PAPER;
-    return (struct bvh_form){
-        .spheres = is_paper, .one_order = is_paper, .refit_by_height = !device->facts.software};
-}
-
 static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options,
                                  struct error *error)
 {
@@ -24,7 +17,8 @@ static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
     }
-    struct bvh_form settings = settings_of(device, options);
+    const bool is_paper = options->bvh.form == TRACER_FORM_PAPER;
+    const struct bvh_form settings = {.spheres = is_paper, .one_order = is_paper};
     scene_tree_init(&bvh->tree, device, &settings, &bvh->base.stats);
     return &bvh->base;
 }
@@ -106,7 +100,6 @@ static bool bvh_trace_begin(struct tracer *tracer, struct gpu_scene *scene, stru
 {
     struct bvh_state *own = (struct bvh_state *)state;
     own->packet_rays = bvh_packet_rays((struct bvh *)tracer, scene, &state->wave, error);
-    own->ray_pairs = bvh_ray_pairs((struct bvh *)tracer, scene, &state->wave, own->packet_rays);
     own->unfinished_rays = 0;
     return own->packet_rays > 0;
 }
@@ -234,7 +227,6 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         .traverse = "bvh/traverse.glsl",
         .defines = defines,
         .packet_rays = packet_rays,
-        .ray_pairs = own->ray_pairs,
         .rays_a_dispatch = TRACE_DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
@@ -256,7 +248,6 @@ static void bvh_announce(struct tracer *tracer, struct gpu_scene *scene, const s
     struct bvh *bvh = (struct bvh *)tracer;
     struct bvh_state state = {.base.wave = *wave, .packet_rays = bvh_packet_rays_expected(bvh, wave)};
     const struct ray_range rays = {.wave = &state.base.wave, .end = wave->ray_count};
-    state.ray_pairs = bvh_ray_pairs(bvh, scene, wave, state.packet_rays);
     (void)bvh_trace_range(tracer, scene, &state.base, &rays, NULL);
 }
 

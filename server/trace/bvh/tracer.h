@@ -16,7 +16,6 @@ struct bvh {
 struct bvh_state {
     struct trace_state base;
     uint32_t packet_rays;
-    bool ray_pairs; /* an invocation traverses two packets of one ray side by side */
     /* Rays that a dispatch has not finished: so many from the first on that has no final answer, 0: none. Where
      * they go on, what they have found, and whether any is left. */
     uint32_t unfinished_rays;
@@ -33,8 +32,4 @@ uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave);
  * sample. 0: failed. */
 uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                          struct error *error);
-/* Whether an invocation traverses two packets, of that many rays, side by side. */
-bool bvh_ray_pairs(const struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
-                   uint32_t packet_rays);
-
 #endif

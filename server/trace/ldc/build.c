@@ -81,8 +81,6 @@ bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error)
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
-    if (ldc_host_is_used(task))
-        return ldc_host_give_places(task, error);
     const struct gpu_program *program = ldc_use(device, "ldc/places.comp", error);
     if (!program || !gpu_buffer_reserve(device, &builder->places, texel_numbers, error) ||
         !gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error))

@@ -40,8 +40,6 @@ static bool fits(const struct ldc_task *task, uint64_t samples, uint64_t quads)
 
 static bool read_histogram(struct ldc_task *task, uint32_t texels_with[LDC_HISTOGRAM_BINS], struct error *error)
 {
-    if (ldc_host_is_used(task))
-        return ldc_host_histogram(task, texels_with, error);
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const struct gpu_program *program = ldc_use(device, "ldc/histogram.comp", error);

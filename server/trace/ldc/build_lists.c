@@ -87,7 +87,7 @@ static bool sort_deep(struct ldc_task *task, struct error *error)
 
 static ldc_unit *sort_or_pack(const struct ldc_task *task)
 {
-    return task->counts.layers_needed > LDC_PACK_SORTS && !ldc_host_is_used(task) ? sort_deep : ldc_pack;
+    return task->counts.layers_needed > LDC_PACK_SORTS ? sort_deep : ldc_pack;
 }
 
 /* Those without slots, to behind those with. */

@@ -82,8 +82,7 @@ static bool settle(struct ldc_task *task, struct error *error)
 {
     struct ldc_cube *cube = task->cube;
     task->next = NULL;
-    if (!ldc_host_is_used(task))
-        ldc_read_counts(task);
+    ldc_read_counts(task);
     if (!task->peeled && task->counts.samples > 0 && !sample(task, error))
         return false;
     cube->sample_count = task->counts.samples;
@@ -97,8 +96,6 @@ static bool settle(struct ldc_task *task, struct error *error)
 static bool pack(struct ldc_task *task, struct error *error)
 {
     task->next = settle;
-    if (ldc_host_is_used(task))
-        return ldc_host_pack(task, error);
     struct gpu_device *device = task->builder->device;
     struct ldc_builder *builder = task->builder;
     struct ldc_store *store = task->store;
@@ -129,7 +126,6 @@ static bool pack(struct ldc_task *task, struct error *error)
 bool ldc_pack(struct ldc_task *task, struct error *error)
 {
     task->next = pack;
-    if (!ldc_host_is_used(task) || task->counts.samples_max == 0)
-        clear_texels(task);
+    clear_texels(task);
     return reserve(task, task->counts.samples_max, task->counts.quads_max, error);
 }

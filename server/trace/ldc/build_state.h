@@ -74,13 +74,6 @@ bool ldc_limit(struct ldc_task *task, struct error *error);
 /* build_pack.c. This unit and those after it: from `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
 
-/* build_host.c. On software GL, with lists, in place of places.comp, histogram.comp, sort.comp and pack.comp: with
- * the same results but for the order of texels, and without `occupied`. What is counted is in task->counts. */
-bool ldc_host_is_used(const struct ldc_task *task);
-bool ldc_host_give_places(struct ldc_task *task, struct error *error);
-bool ldc_host_histogram(struct ldc_task *task, uint32_t texels_with[LDC_HISTOGRAM_BINS], struct error *error);
-bool ldc_host_pack(struct ldc_task *task, struct error *error);
-
 /* What a program that has ldc/sample.glsl needs to know of the scene; ends with {0}. */
 #define LDC_SAMPLE_DEFINES_MAX 5
 void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[LDC_SAMPLE_DEFINES_MAX]);

@@ -99,12 +99,6 @@ static bool reach(struct ldc_cells *cells, struct error *error)
     return raster_reach_pass(store->device, &nodes, pass, 0, (uint32_t)node_count(cells), error);
 }
 
-static bool reach_by_host(struct ldc_cells *cells, struct error *error)
-{
-    cells->next = NULL;
-    return ldc_cells_host_reach(cells, error);
-}
-
 /* Entries of cells that have one already. */
 static bool pass_further(struct ldc_cells *cells, const char *stage, struct error *error)
 {
@@ -127,12 +121,6 @@ static bool fill_further(struct ldc_cells *cells, struct error *error)
     return pass_further(cells, "CELLS_FURTHER", error);
 }
 
-static bool fill_by_host(struct ldc_cells *cells, struct error *error)
-{
-    cells->next = reach_by_host;
-    return ldc_cells_host_fill(cells, error);
-}
-
 static bool fill_first(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
@@ -152,12 +140,6 @@ static bool count_entries(struct ldc_cells *cells, struct error *error)
         return false;
     gpu_buffer_read(cells->store->device, &cells->counter, 0, counts, sizeof(*counts));
     return reserve_entries(cells, error);
-}
-
-static bool count_by_host(struct ldc_cells *cells, struct error *error)
-{
-    cells->next = fill_by_host;
-    return ldc_cells_host_count(cells, error) && reserve_entries(cells, error);
 }
 
 static bool mark_cells(struct ldc_cells *cells, struct error *error)
@@ -184,7 +166,7 @@ static bool reserve_blocks(struct ldc_cells *cells, struct error *error)
     if (!ldc_levels_reserve(store, cells->which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
         return false;
     clear_nodes(store, cube->first_node + nodes, counts->blocks);
-    cells->next = counts->blocks == 0 ? reach : cells->by_host ? count_by_host : mark_cells;
+    cells->next = counts->blocks == 0 ? reach : mark_cells;
     return true;
 }
 
@@ -208,8 +190,6 @@ static bool mark_blocks(struct ldc_cells *cells, struct error *error)
     clear_nodes(store, cube->first_node, nodes);
     if (cube->sample_count == 0)
         return reserve_blocks(cells, error);
-    if (cells->by_host)
-        return ldc_cells_host_blocks(cells, error) && reserve_blocks(cells, error);
     bind_samples(cells);
     bind_nodes(cells, GL_R32UI);
     return cells_pass(cells, "CELLS_BLOCKS", cube->sample_count, error);
@@ -235,8 +215,7 @@ static bool list_samples(struct ldc_cells *cells, struct error *error)
 
 static bool begin(struct ldc_cells *cells, struct error *error)
 {
-    const bool listed = cells->store->cubes[cells->which].sample_count > 0 && !cells->by_host;
-    cells->next = listed ? list_samples : mark_blocks;
+    cells->next = cells->store->cubes[cells->which].sample_count > 0 ? list_samples : mark_blocks;
     return gpu_buffer_upload(cells->store->device, &cells->counter, &cells->counts, sizeof(cells->counts), error);
 }
 
@@ -251,7 +230,6 @@ void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned 
         .grid = grid,
         .next = begin,
         .counts.lower_nodes = {grid, grid, grid, 0},
-        .by_host = gpu_host_builds(store->device),
     };
     cube->first_entry = cube->entry_count = 0;
     for (unsigned i = 0; i < which; i++)
@@ -272,8 +250,5 @@ void ldc_cells_finish(struct ldc_cells *cells)
         gpu_buffer_finish(cells->store->device, &cells->counter);
         gpu_buffer_finish(cells->store->device, &cells->list);
     }
-    free(cells->spans);
-    free(cells->further);
-    free(cells->sides);
     *cells = (struct ldc_cells){0};
 }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The cells of a cube that samples' planes pass: a ray in all three images at once skips empty space and finds
- * samples by them. Cells of ldc/layout.h, made by shaders/ldc/cells.comp and raster/reach.comp;
- * on software GL the host makes the same ones (cells_host.c). */
+ * samples by them. Cells of ldc/layout.h, made by shaders/ldc/cells.comp and raster/reach.comp. */
 #ifndef FARLIGHT_TRACE_LDC_CELLS_H
 #define FARLIGHT_TRACE_LDC_CELLS_H
 
@@ -31,29 +30,14 @@ struct ldc_cells {
     unsigned reach_passes; /* that are done */
     struct gpu_buffer list, counter;
     struct ldc_cell_counts counts;
-    bool by_host;
-    /* private to cells_host.c: of each sample; of each row of nodes in an image; of each node */
-    uint32_t *spans, *further;
-    uint8_t *sides;
 };
 
 /* Begins to write nodes, blocks and entries of cube `which`, whose samples are there, and where in it cells hold
- * something. `grid` is the number of nodes along a side; `on_device`: not by the host, whatever the device is. The
- * store must stay until it is done. */
+ * something. `grid` is the number of nodes along a side. The store must stay until it is done. */
 void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned which, uint32_t grid);
 /* A pass of it. Queues the work; two of them read counts back. */
 enum tracer_progress ldc_cells_go_on(struct ldc_cells *cells, struct error *error);
 /* Lets go of it, done or not. */
 void ldc_cells_finish(struct ldc_cells *cells);
-
-/* private to cells.c and cells_host.c: passes of the host, in this order. The nodes are clear and get their
- * blocks; then blocks, which are clear, get their entries, and counts say how many there are; then there is room
- * for these.
- */
-bool ldc_cells_host_blocks(struct ldc_cells *cells, struct error *error);
-bool ldc_cells_host_count(struct ldc_cells *cells, struct error *error);
-bool ldc_cells_host_fill(struct ldc_cells *cells, struct error *error);
-/* In place of raster/reach.comp; empty nodes are clear. */
-bool ldc_cells_host_reach(struct ldc_cells *cells, struct error *error);
 
 #endif

@@ -66,87 +66,6 @@ static uint64_t stage_items(const struct quadtree_uniforms *uniforms, uint32_t s
                : (uint64_t)(slice_texels(uniforms) >> 2 * (level > 0 ? level : 1)) * slices; /* four leaves each */
 }
 
-/* ---- what a slice shows ---- */
-
-static struct quadtree_seen whole_slice(const struct quadtree_uniforms *uniforms)
-{
-    return (struct quadtree_seen){.columns = uniforms->padded_width / 2, .rows = uniforms->padded_height / 2};
-}
-
-static bool is_whole(const struct quadtree_node_build *build, const struct quadtree_uniforms *uniforms)
-{
-    const struct quadtree_seen whole = whole_slice(uniforms);
-    return build->seen.columns == whole.columns && build->seen.rows == whole.rows;
-}
-
-/* From the first to the one behind the last, in texels; and a four more on both sides, which leaves at the rim are
- * compared with. */
-static void set_range(uint32_t first, uint32_t end, uint32_t whole, uint32_t *begin, uint32_t *count)
-{
-    const uint32_t last = end / 2 + 1 < whole ? end / 2 + 1 : whole - 1;
-    *begin = first / 2 > 0 ? first / 2 - 1 : 0;
-    *count = last + 1 - *begin;
-}
-
-static struct quadtree_seen seen_in(const uint32_t (*texels)[2], const struct quadtree_uniforms *u)
-{
-    uint32_t left = u->width, right = 0, top = u->height, bottom = 0;
-    for (uint32_t y = 0; y < u->height; y++) {
-        const uint32_t(*row)[2] = texels + (size_t)y * u->width;
-        uint32_t first = 0, end = u->width;
-        while (first < end && row[first][0] == VISIBLE_NOTHING)
-            first++;
-        if (first == end)
-            continue;
-        while (row[end - 1][0] == VISIBLE_NOTHING)
-            end--;
-        left = first < left ? first : left;
-        right = end > right ? end : right;
-        top = y < top ? y : top;
-        bottom = y + 1;
-    }
-    struct quadtree_seen seen = {0};
-    if (bottom > 0) {
-        const struct quadtree_seen whole = whole_slice(u);
-        set_range(left, right, whole.columns, &seen.first_column, &seen.columns);
-        set_range(top, bottom, whole.rows, &seen.first_row, &seen.rows);
-    }
-    return seen;
-}
-
-/* Software GL shares the host's memory, and the code of an invocation takes as long where there is nothing: most
- * of the second and third layers of a cube. */
-static struct quadtree_seen look_at_slice(const struct quadtree_store *store, uint32_t slice)
-{
-    const struct quadtree_uniforms *u = &store->uniforms;
-    const size_t bytes = (size_t)u->width * u->height * sizeof(uint32_t[2]);
-    uint32_t(*texels)[2] = store->device->facts.software && bytes <= INT32_MAX ? malloc(bytes) : NULL;
-    if (!texels)
-        return whole_slice(u);
-    glGetTextureSubImage(store->visible.name, 0, 0, 0, (GLint)slice, (GLsizei)u->width, (GLsizei)u->height, 1,
-                         GL_RG_INTEGER, GL_UNSIGNED_INT, (GLsizei)bytes, texels);
-    const struct quadtree_seen seen = seen_in((const uint32_t(*)[2])texels, u);
-    free(texels);
-    return seen;
-}
-
-static void set_seen(const struct gpu_program *program, const struct quadtree_seen *seen)
-{
-    gpu_uniform_uint(program, "first_column", seen->first_column);
-    gpu_uniform_uint(program, "first_row", seen->first_row);
-    gpu_uniform_uint(program, "columns", seen->columns);
-    gpu_uniform_uint(program, "rows", seen->rows);
-}
-
-/* Planes of nothing, from a node on. A fill is of whole pairs: a node before or behind them may become nothing as
- * well, which is of a level that is made later. */
-static void clear_nodes(struct gpu_device *device, struct gpu_buffer *nodes, uint64_t first, uint64_t count)
-{
-    static const uint32_t two_of_nothing[4] = {0x80000000u, 0, 0x80000000u, 0};
-    const uint64_t begin = first / 2 * 2, end = (first + count + 1) / 2 * 2;
-    gpu_buffer_fill(device, nodes, begin * NODE_BYTES, (end - begin) * NODE_BYTES, two_of_nothing);
-}
-
 /* ---- stages ---- */
 
 static uint32_t unit_items(const struct quadtree_store *store)
@@ -176,7 +95,6 @@ bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_sto
     }
     build->stage = 0;
     build->first = 0;
-    build->seen = whole_slice(uniforms);
     return gpu_buffer_reserve(device, &store->nodes, (count + uniforms->faces) * NODE_BYTES, error) &&
            gpu_buffer_reserve(device, &build->planes, (size_t)slice_texels(uniforms) * NODE_BYTES, error) &&
            gpu_buffer_reserve(device, &build->errors, above * ERROR_BYTES, error);
@@ -209,25 +127,14 @@ static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store
     const bool apart = has_levels(&store->uniforms); /* the next stage writes them to the tree */
     struct gpu_buffer *leaves = apart ? &build->planes : &store->nodes;
     const uint32_t first_leaf = apart ? 0 : slice * store->uniforms.slice_nodes;
-    if (build->first == 0 && !is_whole(build, &store->uniforms))
-        clear_nodes(store->device, leaves, first_leaf, slice_texels(&store->uniforms));
     gpu_buffer_bind_image(store->device, leaves, IMAGE_QUADTREE_PLANES, GL_RG32UI);
     gpu_uniform_uint(program, "first_leaf", first_leaf);
-    set_seen(program, &build->seen);
     gpu_uniform_uint(program, "slice", slice);
     gpu_uniform_uint(program, "layer", slice % store->uniforms.layers);
     gpu_uniform_uint(program, "first_item", (uint32_t)build->first);
     if (count > 0)
         gpu_dispatch(store->device, program, count);
     return true;
-}
-
-/* Leaves, level 1, and what its planes are off. */
-static void clear_slice(struct quadtree_node_build *build, struct quadtree_store *store, uint32_t slice)
-{
-    const uint64_t texels = slice_texels(&store->uniforms), above = store->uniforms.slice_nodes - texels;
-    clear_nodes(store->device, &store->nodes, (uint64_t)slice * store->uniforms.slice_nodes, texels + texels / 4);
-    gpu_buffer_clear_part(store->device, &build->errors, slice * above * ERROR_BYTES, texels / 4 * ERROR_BYTES, 0);
 }
 
 /* Level 1: of one slice, with its leaves. */
@@ -246,11 +153,6 @@ static bool make_level(struct quadtree_node_build *build, struct quadtree_store 
     gpu_uniform_uint(program, "slice", slice);
     gpu_uniform_uint(program, "level", level);
     gpu_uniform_uint(program, "first_item", (uint32_t)build->first);
-    if (level == 1) {
-        set_seen(program, &build->seen);
-        if (build->first == 0 && !is_whole(build, &store->uniforms))
-            clear_slice(build, store, slice);
-    }
     if (count > 0)
         gpu_dispatch(store->device, program, count);
     return true;
@@ -275,11 +177,7 @@ enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, str
     const uint32_t slices = slice_stages(uniforms),
                    slice = build->stage < slices ? build->stage / stages_a_slice(uniforms) : 0;
     const uint32_t level = stage_level(uniforms, build->stage);
-    if (level == 0 && build->first == 0)
-        build->seen = look_at_slice(store, slice);
-    const uint64_t items = build->stage < slices ? (uint64_t)build->seen.columns * build->seen.rows
-                                                 : stage_items(uniforms, build->stage);
-    const uint64_t left = items - build->first;
+    const uint64_t left = stage_items(uniforms, build->stage) - build->first;
     const uint64_t count = left < unit_items(store) ? left : unit_items(store);
     bool good;
     gpu_push_group(store->device, "quadtree nodes");

@@ -17,17 +17,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Nodes of level 1 of a slice, and fours of leaves, that something is seen in; and those around them. */
-struct quadtree_seen {
-    uint32_t first_column, first_row, columns, rows;
-};
-
 /* All-zero: nothing is reserved. The buffers stay from build to build. */
 struct quadtree_node_build {
     struct gpu_buffer planes, errors; /* quadtree/layout.h */
     uint32_t stage;                   /* what the next unit is of */
     uint64_t first;                   /* its first node there */
-    struct quadtree_seen seen;        /* of the slice in hand */
 };
 
 /* The nodes of all slices of a store. */

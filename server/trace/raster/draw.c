@@ -283,7 +283,7 @@ static bool draw_runs(struct axes_draw *draw, const struct gpu_scene *scene, con
     gpu_together_begin(draw->device);
     for (uint32_t i = 0; i < draw->run_count; i++) {
         const struct axes_run *run = &draw->runs[i];
-        if (!run_has_any(draw, run, first, end) || (pass->triangles_left_out && run->sort == AXES_TRIANGLES))
+        if (!run_has_any(draw, run, first, end))
             continue;
         const struct gpu_program *program = get_program(draw, scene, pass, run->sort, error);
         good = program != NULL;

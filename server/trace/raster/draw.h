@@ -67,7 +67,6 @@ struct axes_pass {
      * {0} */
     const struct gpu_define *defines;
     bool cutouts_ignored;             /* nothing is cut out: every primitive is drawn whole */
-    bool triangles_left_out;          /* those of AXES_TRIANGLES: the caller draws them itself */
     float lower_world[3], cell_world; /* of the cube */
     uint32_t resolution;              /* texels along a side of the images */
     uint32_t first_row, end_row;      /* of each image, what is drawn; 0, 0: all */

@@ -393,8 +393,6 @@ static bool dispatch_pass(struct rayspace *rayspace, struct gpu_scene *scene, st
     set_tree(program, &rayspace->tree);
     set_levels(program, &state->levels);
     gpu_uniform_float(program, "split_factor", SPLIT_FACTOR);
-    /* A pair of a pass takes software GL as long as a ray its whole way through a tree. */
-    gpu_uniform_uint(program, "rays_go_alone", scene->device->facts.software);
     gpu_dispatch_indirect(program, &state->control, offsetof(struct rayspace_control, pass_groups_x));
     if (!leaves_slots(state))
         return true;

@@ -12,7 +12,7 @@ static struct tracer *rayspace_create(struct gpu_device *device, const struct tr
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
     }
-    const struct bvh_form form = {.one_order = true, .refit_by_height = !device->facts.software};
+    const struct bvh_form form = {.one_order = true};
     scene_tree_init(&rayspace->tree, device, &form, &rayspace->base.stats);
     return &rayspace->base;
 }

@@ -74,7 +74,6 @@ struct bvh_shape {
 /* How a tree is refitted, bottom-up in steps; within a step elements need none of the others. */
 struct bvh_refit_step {
     uint32_t first, count; /* records */
-    bool in_order;         /* too few at each height: one after the other */
 };
 struct bvh_refit_plan {
     uint32_t *corners; /* 4 a triangle, in the tree's order: its vertices and its number in the mesh */
@@ -89,7 +88,6 @@ struct bvh_form {
     bool spheres;            /* bounds are spheres, not boxes */
     bool one_order;          /* for every direction */
     bool whole;              /* boxes in floats, not on a grid */
-    bool refit_by_height;    /* every height has a dispatch when a tree is refitted, however few elements it has */
     unsigned threads;        /* at most; small shapes take one */
     const atomic_bool *stop; /* once it is set a build fails, soon; NULL: never */
 };
@@ -137,7 +135,6 @@ bool bvh_tree_plan(struct bvh_tree *tree, const struct bvh_shape *shape, const s
                    struct error *error);
 void bvh_tree_write(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     uint32_t *elements, float *primitives);
-size_t bvh_primitive_texels(const struct bvh_shape *shape);
 bool bvh_tree_alloc(struct bvh_tree *tree, const struct bvh_form *settings); /* arrays of its own, for that */
 void bvh_tree_finish(struct bvh_tree *tree);
 #define BVH_PAD_RELATIVE 0x1p-21f
@@ -181,8 +178,7 @@ struct bvh_baked {
 
 /* leaves[e]: link of a leaf, 0: an inner element. False: out of memory. The plan stays empty (record_count 0)
  * where an element has more children than a shader's loop looks at. */
-bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves,
-                         bool by_height);
+bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves);
 void bvh_refit_plan_finish(struct bvh_refit_plan *plan);
 
 /* Chooses which inner nodes stay, and orders them. areas[n]: surface of the bound of binary node n, up to a

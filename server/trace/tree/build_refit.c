@@ -5,9 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Heights with fewer elements are refitted by one invocation in sequence: on software GL a dispatch for each takes
- * longer. A GPU would wait for memory at each element. */
-#define STEP_ELEMENTS_MIN 64u
 /* Software GL leaves the loops of an invocation after 65,535 rounds, without a word. */
 #define ROUNDS_MAX 30000u
 
@@ -42,29 +39,12 @@ static bool find_heights(struct heights *heights, const struct bvh_baked *baked)
     return true;
 }
 
-/* False: an element has too many children. */
-static bool find_steps(struct bvh_refit_plan *plan, const struct heights *heights, bool by_height)
+/* One for each height. False: an element has too many children. */
+static bool find_steps(struct bvh_refit_plan *plan, const struct heights *heights)
 {
-    struct bvh_refit_step *last = NULL;
-    uint32_t rounds = 0; /* of the last step */
-    for (uint32_t h = 1; h < heights->count; h++) {
-        uint32_t first = heights->begin[h], end = heights->begin[h + 1];
-        if (by_height || end - first >= STEP_ELEMENTS_MIN) {
-            plan->steps[plan->step_count++] = (struct bvh_refit_step){first, end - first, false};
-            last = NULL;
-            continue;
-        }
-        for (uint32_t i = first; i < end; i++) {
-            uint32_t own = 1 + heights->rounds[plan->records[i].element];
-            if (!last || rounds + own > ROUNDS_MAX) {
-                last = &plan->steps[plan->step_count++];
-                *last = (struct bvh_refit_step){i, 0, true};
-                rounds = 0;
-            }
-            last->count++;
-            rounds += own;
-        }
-    }
+    for (uint32_t h = 1; h < heights->count; h++)
+        plan->steps[plan->step_count++] =
+            (struct bvh_refit_step){heights->begin[h], heights->begin[h + 1] - heights->begin[h]};
     for (uint32_t i = 0; i < plan->record_count; i++)
         if (heights->rounds[i] > ROUNDS_MAX)
             return false;
@@ -84,8 +64,7 @@ static void fill_records(struct bvh_refit_plan *plan, const struct bvh_baked *ba
     }
 }
 
-bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves,
-                         bool by_height)
+bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves)
 {
     struct heights heights = {0};
     *plan = (struct bvh_refit_plan){.record_count = baked->element_count};
@@ -99,7 +78,7 @@ bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *ba
         plan->leaf_count = heights.begin[1];
         fill_records(plan, baked, leaves, &heights, next);
     }
-    if (!ok || !find_steps(plan, &heights, by_height))
+    if (!ok || !find_steps(plan, &heights))
         bvh_refit_plan_finish(plan);
     free(next);
     free(heights.of);

@@ -287,7 +287,7 @@ static bool make_plan(struct work *work)
         uint32_t count = node->count_axis >> 2;
         leaves[e] = count > 0 ? bvh_leaf(kind, node->link, count) : 0;
     }
-    ok = ok && bvh_refit_plan_make(&work->tree->plan, baked, leaves, work->settings->refit_by_height);
+    ok = ok && bvh_refit_plan_make(&work->tree->plan, baked, leaves);
     free(leaves);
     work->tree->wear = tree_wear(work);
     return ok && (work->tree->plan.record_count == 0 || list_corners(work));
@@ -311,7 +311,7 @@ static bool build_binary(struct work *work)
     return ok;
 }
 
-size_t bvh_primitive_texels(const struct bvh_shape *shape)
+static size_t bvh_primitive_texels(const struct bvh_shape *shape)
 {
     const size_t each = shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS;
     return shape->primitive_count * each * (shape->deforms ? 2 : 1);

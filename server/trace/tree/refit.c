@@ -49,13 +49,11 @@ static uint32_t bind_part(unsigned binding, const struct gpu_buffer *buffer, uin
     return before;
 }
 
-static void dispatch(struct gpu_device *device, const struct gpu_program *program, uint32_t first, uint32_t count,
-                     bool in_order)
+static void dispatch(struct gpu_device *device, const struct gpu_program *program, uint32_t first, uint32_t count)
 {
     gpu_uniform_uint(program, "first_record", first);
     gpu_uniform_uint(program, "record_count", count);
-    gpu_uniform_uint(program, "each", in_order ? count : 1);
-    gpu_dispatch(device, program, in_order ? 1 : count);
+    gpu_dispatch(device, program, count);
 }
 
 bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
@@ -80,10 +78,10 @@ bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const 
     gpu_uniform_uint(leaves, "close_texels", place->close_texels);
     gpu_uniform_uint(leaves, "first_vertex", place->first_vertex);
     gpu_uniform_uint(leaves, "close_offset", place->close_offset);
-    dispatch(device, leaves, 0, refit->leaf_count, false);
+    dispatch(device, leaves, 0, refit->leaf_count);
     gpu_uniform_uint(above, "first_box", first_box);
     for (uint32_t i = 0; i < refit->step_count; i++)
-        dispatch(device, above, refit->steps[i].first, refit->steps[i].count, refit->steps[i].in_order);
+        dispatch(device, above, refit->steps[i].first, refit->steps[i].count);
     return true;
 }
 

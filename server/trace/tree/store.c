@@ -326,20 +326,6 @@ static enum tracer_progress upload_tree(struct bvh_store *store, uint64_t step_e
     return tracer_progress_of(bvh_refit_init(&entry->refit, store->device, &tree->plan, error));
 }
 
-/* How many primitives there will be is known before the trees are. Software GL clears memory as it allocates it:
- * that is done beside the first run. */
-static bool reserve_primitives(struct bvh_store *store, struct error *error)
-{
-    const struct bvh_store_build *build = &store->build;
-    uint64_t texels = 0;
-    if (!store->device->facts.software || store->entry_count > 0)
-        return true;
-    for (uint32_t i = 0; i < build->count; i++)
-        texels += bvh_primitive_texels(&build->jobs[i].shape);
-    return check_limits(store, 0, texels, error) &&
-           gpu_buffer_reserve(store->device, &store->primitives, texels * TEXEL_BYTES, error);
-}
-
 /* Of trees over the shapes of jobs[i] for the geometries which[i]; both arrays become the store's. */
 static bool begin_build(struct bvh_store *store, struct bvh_job *jobs, uint32_t *which, uint32_t count,
                         struct error *error)
@@ -354,7 +340,7 @@ static bool begin_build(struct bvh_store *store, struct bvh_job *jobs, uint32_t 
     }
     if (!store->build.run)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the trees of %u geometries", count);
-    return reserve_primitives(store, error);
+    return true;
 }
 
 static bool finish_run(struct bvh_store *store, struct stage_times *times, struct error *error)

@@ -476,10 +476,9 @@ static bool bring(struct gpu_scene *gpu, const struct scene *scene)
 {
     struct error error = {0};
     bool done = false;
-    size_t awaited_bytes = 0;
     gpu_reserve_begin(device, 1);
     bool brought = gpu_scene_bring(gpu, scene, 0, &done, NULL, &error);
-    bool put_off = gpu_reserve_end(device, &awaited_bytes);
+    bool put_off = gpu_reserve_end(device);
     assert_true(brought ? !put_off : put_off && error.kind == ERROR_BUSY);
     return brought && done;
 }

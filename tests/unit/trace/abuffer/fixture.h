@@ -231,8 +231,7 @@ static inline void expect_consistent(const struct contents *contents)
     free(taken);
 }
 
-/* depths_within: in cells, by how much those of two samples may differ. */
-static inline void expect_same_within(const struct contents *a, const struct contents *b, float depths_within)
+static inline void expect_same(const struct contents *a, const struct contents *b)
 {
     size_t voxels = (size_t)a->store.voxels_along * a->store.voxels_along * a->store.voxels_along;
     assert_int_equal(a->store.sample_count, b->store.sample_count);
@@ -241,7 +240,7 @@ static inline void expect_same_within(const struct contents *a, const struct con
         uint32_t count = a->texels[i][1], first = a->texels[i][0], other = b->texels[i][0];
         assert_int_equal(count, b->texels[i][1]);
         for (uint32_t k = 0; k < count; k++) {
-            assert_true(fabsf(depth_of(a, first + k) - depth_of(b, other + k)) <= depths_within);
+            assert_true(depth_of(a, first + k) == depth_of(b, other + k));
             assert_int_equal(a->samples[first + k][1], b->samples[other + k][1]);
         }
         assert_memory_equal(&a->ids[first], &b->ids[other], 4 * count);
@@ -249,11 +248,6 @@ static inline void expect_same_within(const struct contents *a, const struct con
     assert_memory_equal(a->sums, b->sums, 16 * voxels);
     assert_memory_equal(a->subvoxels, b->subvoxels,
                         abuffer_has_subvoxels(&a->store) ? sizeof(*a->subvoxels) * voxels : sizeof(*a->subvoxels));
-}
-
-static inline void expect_same(const struct contents *a, const struct contents *b)
-{
-    expect_same_within(a, b, 0.0f);
 }
 
 #endif

@@ -195,51 +195,6 @@ TEST(a_tree_that_is_worn_out_is_built_anew)
     fixture_finish(&fixture);
 }
 
-static void *elements_of(const struct fixture *fixture, size_t *bytes)
-{
-    const struct gpu_buffer *elements = &((const struct bvh *)fixture->tracer)->tree.store.elements;
-    void *copy = malloc(elements->size_bytes);
-    *bytes = elements->size_bytes;
-    gpu_buffer_read(device, elements, 0, copy, *bytes);
-    return copy;
-}
-
-static uint32_t steps_in_order(const struct fixture *fixture)
-{
-    const struct bvh_store *store = &((const struct bvh *)fixture->tracer)->tree.store;
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < store->entry_count; i++)
-        for (uint32_t k = 0; k < store->entries[i].refit.step_count; k++)
-            count += store->entries[i].refit.steps[k].in_order;
-    return count;
-}
-
-TEST(no_invocation_of_a_gpu_refits_one_element_after_the_other)
-{
-    const struct gpu_facts facts = device->facts;
-    if (!facts.software) { /* whose invocations need not see what they have written to a texture's buffer */
-        printf("skipped: a GPU refits nothing in order, to compare with\n");
-        skip();
-    }
-    struct fixture fixtures[2];
-    size_t bytes[2];
-    void *elements[2];
-    for (int i = 0; i < 2; i++) {
-        gpu_facts_choose(&device->facts, i == 0);
-        fixture_init(&fixtures[i], &(struct tracer_options){0}, 0);
-        pose(&fixtures[i], 0.2f, 0.2f);
-        elements[i] = elements_of(&fixtures[i], &bytes[i]);
-        assert_int_equal(steps_in_order(&fixtures[i]) > 0, i == 0);
-    }
-    device->facts = facts;
-    assert_int_equal(bytes[0], bytes[1]);
-    assert_memory_equal(elements[0], elements[1], bytes[0]);
-    for (int i = 2; i-- > 0;) {
-        free(elements[i]);
-        fixture_finish(&fixtures[i]);
-    }
-}
-
 TEST(answers_do_not_depend_on_earlier_poses)
 {
     for (unsigned form = TRACER_FORM_FAST; form <= TRACER_FORM_PAPER; form++) {

@@ -129,7 +129,7 @@ TEST_LONG(a_surface_is_in_one_image_of_the_papers)
     assert_true(one < expect_scene_like_oracle(test_scene_soup(), &defaults, NULL));
 }
 
-/* ---- one pass against peeling, and against what the host packs ---- */
+/* ---- one pass against peeling ---- */
 
 static struct scene *many_layers(void)
 {
@@ -137,11 +137,9 @@ static struct scene *many_layers(void)
 }
 
 /* Peeled is also what lists have no room for. */
-static void build_by(struct fixture *fixture, struct contents *contents, ldc_unit *way, bool on_device)
+static void build_by(struct fixture *fixture, struct contents *contents, ldc_unit *way)
 {
-    const bool builds_on_host = device->facts.builds_on_host;
     struct error error = {0};
-    device->facts.builds_on_host = builds_on_host && !on_device;
     place(fixture, LDC_CUBE_STATIC, RESOLUTION);
     gpu_scene_bind(&fixture->gpu);
     enum tracer_progress progress =
@@ -152,14 +150,13 @@ static void build_by(struct fixture *fixture, struct contents *contents, ldc_uni
         if (unit == 0) /* it has begun */
             fixture->builder->task.next = way;
     }
-    device->facts.builds_on_host = builds_on_host;
     expect_ok(progress == TRACER_DONE, &error);
     contents_read(contents, &fixture->store, LDC_CUBE_STATIC);
     expect_consistent(contents);
 }
 
 /* All layers, and the nearest ones alone. */
-TEST_LONG(peels_and_lists_of_the_host_and_of_the_device_are_the_same_samples)
+TEST_LONG(peels_and_lists_are_the_same_samples)
 {
     struct scene *(*const scenes[])(void) = {test_scene_spheres, test_scene_translucent, test_scene_deformed,
                                              many_layers};
@@ -169,12 +166,10 @@ TEST_LONG(peels_and_lists_of_the_host_and_of_the_device_are_the_same_samples)
         for (uint32_t layers = 0; layers <= 3; layers += 3) {
             struct contents peeled, listed;
             fixture.options.limits.ldc_layers = layers;
-            build_by(&fixture, &peeled, ldc_peel, false);
-            for (int on_device = 0; on_device < 2; on_device++) {
-                build_by(&fixture, &listed, ldc_lists, on_device);
-                expect_same(&peeled, &listed);
-                contents_free(&listed);
-            }
+            build_by(&fixture, &peeled, ldc_peel);
+            build_by(&fixture, &listed, ldc_lists);
+            expect_same(&peeled, &listed);
+            contents_free(&listed);
             contents_free(&peeled);
         }
         fixture_finish(&fixture);

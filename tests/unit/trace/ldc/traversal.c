@@ -102,31 +102,6 @@ TEST(where_cells_do_not_fit_blocks_are_traversed)
     fixture_finish(&fixture);
 }
 
-TEST_LONG(the_host_and_the_device_make_the_same_cells)
-{
-    const bool builds_on_host = device->facts.builds_on_host;
-    struct scene *(*const scenes[])(void) = {test_scene_soup, test_scene_spheres};
-    random_rays(rays);
-    for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
-        struct fixture fixture;
-        fixture_init(&fixture, scenes[i]());
-        device->facts.builds_on_host = false;
-        build_all(&fixture, &(struct tracer_options){0});
-        device->facts.builds_on_host = builds_on_host;
-        const uint32_t entry_count = fixture.store.cubes[LDC_CUBE_STATIC].entry_count;
-        trace(&fixture, rays, expected);
-        assert_in_range(hits_in(expected), RAY_COUNT / 8, RAY_COUNT);
-        build_all(&fixture, &(struct tracer_options){0});
-        assert_int_equal(fixture.store.cubes[LDC_CUBE_STATIC].entry_count, entry_count);
-        trace(&fixture, rays, hits);
-        for (uint32_t k = 0; k < RAY_COUNT; k++)
-            if (hits[k].distance != expected[k].distance) /* samples may lie at other places */
-                fail_msg("scene %zu, ray %u: %.9g for %.9g", i, k, (double)hits[k].distance,
-                         (double)expected[k].distance);
-        fixture_finish(&fixture);
-    }
-}
-
 /* The paper's test: a hit is where the ray comes as near to a sample's depth as a cell is wide, in its texel. Rays
  * straight down on a slope meet samples' own depths; of rays along the slope those hit that are half a cell above
  * it, and not those that are two cells above. */
