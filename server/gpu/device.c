@@ -90,7 +90,7 @@ void gpu_facts_choose(struct gpu_facts *facts, bool software)
     facts->step_scale = software ? 1 : 64;
     /* Software GL has no latency to hide, and its caches are the processor's; a GPU wants enough rays to fill
      * itself. */
-    facts->slice_rays_max = software ? 1u << 15 : 1u << 20;
+    facts->slice_rays_max = software ? 1u << 16 : 1u << 20;
     facts->range_rays_first = software ? 4096 : UINT32_MAX;
     /* Seconds of a slow GPU, if every ray took all of its rounds: a thousandth of them is usual. No driver ends
      * what a processor does. */

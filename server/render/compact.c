@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/compact.h"
 
-#include "render/compact_host.h"
-
+#include "host_passes/host_passes.h"
 #include "shared/bindings.h"
 #include "shared/path.h"
 
@@ -97,11 +96,28 @@ static void write_state(struct render_context *context)
                      sizeof(context->known_state));
 }
 
-static bool list_hits(struct render_context *context, struct error *error)
+/* Passes by the host, which has to know the counts. */
+static const struct host_passes *host_of(const struct render_context *context)
 {
+    return context->counts_on_host ? host_passes_of(context->device) : NULL;
+}
+
+static bool list_hits(const struct host_passes *host, struct render_context *context, struct error *error)
+{
+    struct gpu_device *device = context->device;
     struct wave_state *state = &context->known_state;
-    if (!compact_host_hits(context, error))
+    const struct hit *hits = gpu_buffer_open(device, &context->hits, error);
+    uint32_t *list = hits ? gpu_buffer_open(device, &context->hit_list, error) : NULL;
+    uint32_t *places = list ? gpu_buffer_open(device, &context->hit_places, error) : NULL;
+    if (places)
+        context->hit_count = host->list_hits(hits, context->ray_count, list, places);
+    if (hits)
+        gpu_buffer_unmap(device, &context->hits);
+    if (list)
+        gpu_buffer_unmap(device, &context->hit_list);
+    if (!places)
         return false;
+    gpu_buffer_unmap(device, &context->hit_places);
     state->hits = counts_of(context->hit_count);
     state->hit_blocks = counts_of(blocks_of(context->hit_count));
     write_state(context);
@@ -110,8 +126,9 @@ static bool list_hits(struct render_context *context, struct error *error)
 
 bool compact_hits(struct render_context *context, struct error *error)
 {
-    if (compact_host_is_used(context))
-        return list_hits(context, error);
+    const struct host_passes *host = host_of(context);
+    if (host)
+        return list_hits(host, context, error);
     const struct gpu_program *program = context_use(context, "render/hit_count.comp", error);
     if (!program)
         return false;
@@ -141,13 +158,27 @@ static bool decide_order(struct render_context *context, struct error *error)
     return true;
 }
 
-static bool place_children(struct render_context *context, struct gpu_buffer *child_counts, bool sorts,
-                           struct error *error)
+static bool write_places(const struct host_passes *host, struct render_context *context, const uint32_t *counts,
+                         struct error *error)
+{
+    uint32_t(*offsets)[2] = gpu_buffer_open(context->device, &context->block_offsets, error);
+    if (!offsets)
+        return false;
+    host->place_children(counts, context->hit_count, context->known_state.sorted != 0, offsets);
+    gpu_buffer_unmap(context->device, &context->block_offsets);
+    return true;
+}
+
+static bool place_children(const struct host_passes *host, struct render_context *context,
+                           struct gpu_buffer *child_counts, bool sorts, struct error *error)
 {
     struct wave_state *state = &context->known_state;
+    const uint32_t *counts = gpu_buffer_open(context->device, child_counts, error);
     uint32_t children, shadow_rays;
-    if (!compact_host_count(context, child_counts, &children, &shadow_rays, error))
+    if (!counts)
         return false;
+    host->count_children(counts, context->hit_count, &children, &shadow_rays);
+    gpu_buffer_unmap(context->device, child_counts);
     if (sorts && children > 0) {
         if (!decide_order(context, error))
             return false;
@@ -157,23 +188,28 @@ static bool place_children(struct render_context *context, struct gpu_buffer *ch
         state->stopped = WAVE_STOPPED_FULL;
         children = 0;
     }
-    if (children > 0 && !compact_host_places(context, child_counts, state->sorted != 0, error))
+    counts = children > 0 ? gpu_buffer_open(context->device, child_counts, error) : NULL;
+    if (children > 0 && !counts)
         return false;
+    const bool placed = !counts || write_places(host, context, counts, error);
+    if (counts)
+        gpu_buffer_unmap(context->device, child_counts);
     state->rays = counts_of(children);
     state->ray_blocks = counts_of(blocks_of(children));
     state->all_secondary_rays += children;
     state->all_shadow_rays += shadow_rays;
     write_state(context);
     context->ray_count = children;
-    return gpu_check(context->device, "compacting", error);
+    return placed && gpu_check(context->device, "compacting", error);
 }
 
 bool compact_children(struct render_context *context, const struct compact_order *order,
                       struct gpu_buffer *child_counts, struct error *error)
 {
     gpu_buffer_bind_storage(child_counts, BIND_CHILD_COUNTS);
-    if (compact_host_is_used(context))
-        return place_children(context, child_counts, order->sorts, error);
+    const struct host_passes *host = host_of(context);
+    if (host)
+        return place_children(host, context, child_counts, order->sorts, error);
     if (order->sorts && !decide_order(context, error))
         return false;
     const struct gpu_program *program = context_use(context, "render/compact_count.comp", error);
@@ -226,7 +262,7 @@ void compact_rays(struct render_context *context, struct wave *wave)
 
 void compact_announce_hits(struct render_context *context)
 {
-    if (compact_host_is_used(context))
+    if (host_of(context))
         return;
     (void)context_use(context, "render/hit_count.comp", NULL);
     (void)use_scan(context, true, NULL);
@@ -239,7 +275,7 @@ void compact_announce_children(struct render_context *context, bool sorts)
         (void)context_use(context, "render/shadow_count.comp", NULL);
     if (sorts)
         (void)context_use(context, "render/compact_sample.comp", NULL);
-    if (compact_host_is_used(context))
+    if (host_of(context))
         return;
     (void)context_use(context, "render/compact_count.comp", NULL);
     (void)use_scan(context, false, NULL);

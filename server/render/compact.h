@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Lists made on the device by prefix sums: their order is that of what they are made from, every time, and they
- * have no holes; on software GL by the host (compact_host.h). How long they are the device notes in
+ * have no holes; or by the host (host_passes). How long they are the device notes in
  * context->wave_state, from which the passes over them are dispatched. */
 #ifndef FARLIGHT_RENDER_COMPACT_H
 #define FARLIGHT_RENDER_COMPACT_H

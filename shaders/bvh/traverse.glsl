@@ -47,6 +47,13 @@ uniform vec3 bvh_top_grid_lower;
 uniform vec3 bvh_top_cells_per_unit;
 #endif
 
+// Shadow rays that are traversed one by one have few octants in common: all read the first octant's copy, whose order
+// is as good for finding any hit, and which stays in the cache. Measured on software GL with 146K triangles: ambient
+// occlusion takes 0.9 of the time. (Closest hits take 1.5 of it without their order.)
+#if defined ANY_HIT && PACKET_RAYS == 1 && !defined BVH_SPHERES
+#define ONE_ORDER
+#endif
+
 #define NOT_INSIDE 0xffffffffu
 
 #ifdef BVH_BUDGET
@@ -76,6 +83,8 @@ void begin_tree(inout tree_traversal traversal, uint first_element, uint element
 {
 #ifdef BVH_SPHERES
     traversal.first = first_element;
+#elif defined ONE_ORDER
+    traversal.first = first_element * BVH_OCTANTS;
 #else
     traversal.first = first_element * BVH_OCTANTS + octant * element_count;
 #endif
@@ -123,7 +132,13 @@ uint test_element(inout tree_traversal traversal, bundle b, distances_left left,
     for (int k = 0; k < PACKET_RAYS; k++)
         any_hit = sphere_is_hit(b.rays[k], lower, r[k].t_min, end_of(r[k], found[k])) || any_hit;
 #elif defined BVH_PACKED
-    bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz & 0xffffu)), vec3(ivec3(element.xyz >> 16u)), left.t_min, left.t_max);
+#ifdef ONE_ORDER
+    uvec3 first_corner = uvec3(b.octant << 4, b.octant << 3, b.octant << 2) & 16u; // 16: the other one
+#else
+    const uvec3 first_corner = uvec3(0u);
+#endif
+    bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz >> first_corner & 0xffffu)),
+                              vec3(ivec3(element.xyz >> (16u - first_corner) & 0xffffu)), left.t_min, left.t_max);
 #else
     bvec3 negative = notEqual(uvec3(b.octant) & uvec3(1u, 2u, 4u), uvec3(0u));
     bool any_hit = box_is_hit(b, mix(lower_corner, upper_corner, negative),

@@ -33,6 +33,7 @@ MAY_INCLUDE = {
     BASE: ("protocol/common",),
     GPU: (BASE,),
     SCENE: (BASE,),
+    "server/host_passes": (GPU, SHARED),
     GPU_SCENE: ("protocol/common", BASE, GPU, SCENE, SHARED),
     TRACE: (BASE, GPU, GPU_SCENE, SHARED),
     "server/trace/raster": (BASE, GPU, GPU_SCENE, TRACE, SHARED, "shaders/raster"),
@@ -40,7 +41,7 @@ MAY_INCLUDE = {
     "server/trace/*": (
         "protocol/common", BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", "server/trace/tree", SHARED, "shaders/*",
     ),
-    "server/render": (BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", SHARED),
+    "server/render": (BASE, GPU, "server/host_passes", SCENE, GPU_SCENE, TRACE, "server/trace/raster", SHARED),
     "server/check": (BASE, GPU, SCENE, "server/render"),
     "server/encode": (BASE, "protocol/pixels"),
     "server/net": (BASE, "protocol", "protocol/sealed"),
