@@ -81,8 +81,7 @@ static int list_devices(void)
             printf("   first hits are traced from %.3g primitives a pixel on, from %.3g with several samples\n",
                    (double)measured.traced_from[0], (double)measured.traced_from[1]);
         else
-            printf("   first hits are %s\n", list[i].software ? "traced of scenes with many primitives a pixel"
-                                                              : "rasterised, until the first start measures");
+            printf("   first hits are rasterised, until the first start measures\n");
     }
     return count ? EXIT_SUCCESS : (fprintf(stderr, "farlightd: no device gives OpenGL 4.5\n"), EXIT_FAILURE);
 }

@@ -12,8 +12,6 @@
 #define ACROSS 128u
 #define AROUND_FEW 16u
 #define ACROSS_FEW 8u
-#define SIDE_HARDWARE 512u
-#define SIDE_SOFTWARE 128u
 #define SAMPLES_SEVERAL 16u
 #define REPEATS 4u /* of which the first compiles; the fastest counts, as others may use the device too */
 /* Of depths that are the same: some roundings of a distance. */
@@ -25,7 +23,7 @@
 /* Nothing but first hits, and their depth. */
 static struct frame_request request_of(const struct gpu_device *device, bool several, enum first_hits_way way)
 {
-    const uint32_t side = device->info.software ? SIDE_SOFTWARE : SIDE_HARDWARE;
+    const uint32_t side = (uint32_t)sqrt(device->facts.slice_rays_max) / 2;
     struct frame_request request = check_request(TRACER_BVH, side, side);
     request.samples = several ? SAMPLES_SEVERAL : 1;
     request.primary = way == FIRST_HITS_TRACED ? PRIMARY_TRACE : PRIMARY_RASTER;
@@ -128,7 +126,7 @@ struct gpu_measured first_hits_limits(const struct first_hits *measured)
 
 bool first_hits_keep(struct gpu_device *device, const struct first_hits *measured)
 {
-    if (device->info.software || device->measured.known)
+    if (device->measured.known)
         return true;
     device->measured = first_hits_limits(measured);
     return !device->measured.known || gpu_measured_store(&device->info, &device->measured);
@@ -138,7 +136,7 @@ void first_hits_decide(struct gpu_device *device)
 {
     struct first_hits measured;
     struct error error = {0};
-    if (device->measured.known || device->info.software)
+    if (device->measured.known)
         return;
     if (!first_hits_measure(device, &measured, &error)) {
         log_write(LOG_WARNING, "check", "first hits were not measured, and are rasterised: %s", error.text);

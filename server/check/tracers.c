@@ -258,7 +258,7 @@ static void report_ways(struct check_report *report, struct gpu_device *device, 
     const struct gpu_measured limits = first_hits_limits(measured);
     (void)first_hits_keep(device, measured); /* a service to the next start, which measures else */
     for (int several = 0; several < 2; several++) {
-        char choice[96] = "software GL has a limit of its own";
+        char choice[96] = "rasterised";
         if (device->measured.known)
             snprintf(choice, sizeof(choice), "traced from %.3g primitives a pixel on",
                      (double)device->measured.traced_from[several]);

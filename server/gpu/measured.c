@@ -13,6 +13,13 @@
 
 #define LINE "first hits are traced from %f primitives a pixel on, from %f with several samples\n"
 
+/* One sample and four of scans of 47K to 871K triangles at 320x240 and 640x480: rasterising, in which one thread
+ * of software GL transforms all vertices, is as fast as tracing at 0.6 primitives a pixel, and takes 1.8 times as
+ * long at
+ * 3. Where there are fewer in all, neither takes long, and pictures stay those of views, which rasterise. */
+static const struct gpu_measured of_software = {
+    .known = true, .traced_from = {0.6f, 0.6f}, .primitives_min = 100000};
+
 static bool file_path(char *path, size_t size, const struct gpu_device_info *info)
 {
     char folder[3072], text[512];
@@ -30,8 +37,10 @@ bool gpu_measured_load(const struct gpu_device_info *info, struct gpu_measured *
 {
     char path[4096];
     struct gpu_measured read = {.known = true};
-    *measured = (struct gpu_measured){0};
-    FILE *file = !info->software && file_path(path, sizeof(path), info) ? fopen(path, "re") : NULL;
+    *measured = info->software ? of_software : (struct gpu_measured){0};
+    if (info->software)
+        return true;
+    FILE *file = file_path(path, sizeof(path), info) ? fopen(path, "re") : NULL;
     if (!file)
         return false;
     bool whole = fscanf(file, LINE, &read.traced_from[0], &read.traced_from[1]) == 2;
@@ -63,6 +72,6 @@ bool gpu_measured_store(const struct gpu_device_info *info, const struct gpu_mea
 bool gpu_measured_traces(const struct gpu_measured *measured, bool several_samples, uint64_t primitives,
                          uint64_t pixels)
 {
-    return measured->known &&
+    return measured->known && primitives >= measured->primitives_min &&
            (double)primitives >= (double)measured->traced_from[several_samples] * (double)pixels;
 }

@@ -38,27 +38,14 @@ static uint64_t primitives_shown(const struct gpu_scene *scene)
     return count;
 }
 
-/* Of software GL nothing is measured, so that a picture does not depend on the machine. One sample and four of
- * scans of 47K to 871K triangles at 320x240 and 640x480: rasterising, in which one thread transforms all vertices,
- * is as fast as tracing at 0.6 primitives a pixel, and takes 1.8 times as long at 3. */
-#define SOFTWARE_TRACED_FROM 0.6f
-/* Where there are fewer in all, neither takes long, and pictures stay those of views, which rasterise. */
-#define SOFTWARE_TRACED_PRIMITIVES 100000u
-
 /* Where it is left to us. A tracer that samples would show its cells. */
 static bool traces_first_hits(const struct render_context *context)
 {
     const struct tracer_impl *impl = context->tracer->impl;
-    const struct gpu_measured software = {.known = true,
-                                          .traced_from = {SOFTWARE_TRACED_FROM, SOFTWARE_TRACED_FROM}};
-    const struct gpu_device *device = context->device;
-    const uint64_t primitives = primitives_shown(context->scene);
-    const bool by_rule =
-        device->info.software && !device->measured.known && primitives >= SOFTWARE_TRACED_PRIMITIVES;
     const uint64_t pixels = (uint64_t)context->request.width * context->request.height;
     return impl->traces_on_host ||
-           (impl->finds_first_hits &&
-            gpu_measured_traces(by_rule ? &software : &device->measured, context->spread, primitives, pixels));
+           (impl->finds_first_hits && gpu_measured_traces(&context->device->measured, context->spread,
+                                                          primitives_shown(context->scene), pixels));
 }
 
 bool choices_rasterise(const struct render_context *context)

@@ -9,7 +9,7 @@ EACH_TEST(fixture_clear, NULL)
 /* As of a device that was measured: primitives a pixel from which tracing is faster. */
 static void take_as_measured(float one, float several)
 {
-    device->measured = (struct gpu_measured){true, {one, several}};
+    device->measured = (struct gpu_measured){.known = true, .traced_from = {one, several}};
 }
 
 static struct frame_result render(struct fixture *fixture, unsigned tracer, enum primary_kind primary)
@@ -50,7 +50,6 @@ static const struct {
     {TRACER_BVH, true, 0.0f, 1e9f, 4, 96, 72, PRIMARY_RASTER},
     {TRACER_BVH, true, 1e9f, MIXTURE_SHARE - 1e-6f, 4, 96, 72, PRIMARY_TRACE},
     {TRACER_BVH, true, 1e9f, MIXTURE_SHARE + 1e-6f, 4, 96, 72, PRIMARY_RASTER},
-    {TRACER_BVH, false, 0.0f, 0.0f, 16, 4, 3, PRIMARY_RASTER}, /* many primitives a pixel are not enough */
     {TRACER_NAIVE, true, 0.0f, 0.0f, 4, 96, 72, PRIMARY_RASTER},
     {TRACER_LDC, true, 0.0f, 0.0f, 4, 96, 72, PRIMARY_RASTER},
     {TRACER_ABUFFER, true, 0.0f, 0.0f, 4, 96, 72, PRIMARY_RASTER},

@@ -49,7 +49,7 @@ static int remove_folder(void **state)
 ALL_TESTS(make_folder, remove_folder)
 
 static const struct gpu_device_info gpu = {.name = "A GPU", .vendor = "its maker", .version = "4.5 of today"};
-static const struct gpu_measured found = {true, {1.5f, 0.25f}};
+static const struct gpu_measured found = {.known = true, .traced_from = {1.5f, 0.25f}};
 
 TEST(what_was_measured_is_there_at_the_next_start)
 {
@@ -72,13 +72,16 @@ TEST(another_driver_version_is_another_device)
     assert_false(back.known);
 }
 
-TEST(nothing_is_known_of_software_gl)
+TEST(software_gl_has_a_rule_whatever_was_measured)
 {
     struct gpu_measured back;
     struct gpu_device_info software = gpu;
     assert_true(gpu_measured_store(&gpu, &found));
     software.software = true;
-    assert_false(gpu_measured_load(&software, &back));
+    assert_true(gpu_measured_load(&software, &back));
+    assert_false(gpu_measured_traces(&back, false, 99999, 1000)); /* so few take no time either way */
+    assert_false(gpu_measured_traces(&back, false, 100000, 200000));
+    assert_true(gpu_measured_traces(&back, false, 100000, 100000));
 }
 
 TEST(a_file_that_is_cut_or_makes_no_sense_is_as_good_as_none)
