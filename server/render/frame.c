@@ -460,8 +460,7 @@ static bool read_band(struct frame_renderer *renderer, struct error *error)
         renderer->plane++;
     }
     return picture_resolve_band(picture, context, plane, band, error) &&
-           (renderer->reads_behind ? pass_on(renderer, true, plane, band, error)
-                                   : picture_read_band(picture, context, plane, band, error));
+           pass_on(renderer, true, plane, band, error);
 }
 
 bool frame_step_waits(const struct frame_renderer *renderer)

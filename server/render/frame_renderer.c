@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The resources that renderers share, a renderer's life, and its resources on the device. */
+#include "host_passes/host_passes.h"
 #include "render/frame_request.h"
 #include "render/frame_state.h"
 
@@ -72,10 +73,7 @@ struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct 
     renderer->device = shared->device;
     renderer->shared = shared;
     renderer->tracers.history = &shared->changes;
-    /* Software GL copies at once, and would do so twice. */
-    renderer->reads_behind = !shared->device->facts.software;
-    /* Nor is there anything to wait for: its dispatches are done when they return. */
-    renderer->queues_ahead = renderer->reads_behind;
+    renderer->queues_ahead = !host_passes_of(shared->device); /* which need the counts */
     return renderer;
 }
 

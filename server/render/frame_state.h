@@ -75,7 +75,6 @@ struct frame_renderer {
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
-    bool reads_behind;                              /* bands are copied while the device has other work */
     bool queues_ahead;                              /* see counts_on_host of the context */
     /* the frame in hand */
     enum frame_phase phase;

@@ -57,12 +57,11 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
 bool picture_reserve_pixels(struct picture *picture, const struct render_context *context, struct error *error);
 /* Announces the programs that accumulate and resolve (gpu_program_announce). */
 void picture_announce(const struct picture *picture, struct render_context *context);
-/* resolve.c: band of a plane -> picture->resolved; readback.c: from there to picture->pixels. */
+/* resolve.c: band of a plane -> picture->resolved. */
 bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error);
-bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
-                       struct error *error);
-/* Or in two steps, between which the device may have other work: `resolved` is free again after the first. */
+/* readback.c: from there to picture->pixels in two steps, between which the device may have other work: `resolved`
+ * is free again after the first. */
 bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
                        uint32_t plane, uint32_t band, struct error *error);
 bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,

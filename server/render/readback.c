@@ -55,16 +55,6 @@ void picture_cut(struct picture *picture, const struct frame_request *request)
     picture->size_bytes = (size_t)(to - picture->pixels);
 }
 
-bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
-                       struct error *error)
-{
-    uint8_t *pixels = band_pixels(picture, context, plane, band);
-    context_span_begin(context, STAGE_READBACK);
-    gpu_buffer_read(context->device, &picture->resolved, 0, pixels, band_bytes(picture, context, plane, band));
-    context_span_end(context);
-    return gpu_check_reset(context->device, "reading the picture", error);
-}
-
 bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
                        uint32_t plane, uint32_t band, struct error *error)
 {

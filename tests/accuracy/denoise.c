@@ -192,7 +192,6 @@ TEST_LONG(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
     fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
     struct frame_result whole = rendered(fixture, DENOISE_ON, 6, 3);
     frame_renderer_queue_ahead(fixture->renderer, true);
-    frame_renderer_read_behind(fixture->renderer, true);
     struct frame_result queued = rendered(fixture, DENOISE_ON, 6, 3);
     assert_same_picture(&whole, &queued);
     frame_renderer_set_capacity(fixture->renderer, 777, 1000);

@@ -76,7 +76,6 @@ TEST(planes_are_those_of_the_pixels_at_any_size)
     for (size_t i = 0; i < count; i++) {
         fixture->request.width = sizes[i][0];
         fixture->request.height = sizes[i][1];
-        frame_renderer_read_behind(fixture->renderer, i % 2);
         struct frame_result pixels = fixture_render(fixture);
         assert_int_equal(pixels.ycbcr, YCBCR_NONE);
         for (enum ycbcr kind = YCBCR_VIDEO; kind <= YCBCR_JPEG; kind++) {
