@@ -3,7 +3,7 @@
 //
 // The host (trace/program.c) sets the defines:
 //   TRAVERSE             "bvh/traverse.glsl", the structure's traversal
-//   TRACER_BVH, TRACER_NAIVE, ..  and others of the tracer's own choice
+//   and others of the tracer's own choice
 //   ANY_HIT              the wave asks for transmittance, not for the closest surface
 //   HAS_SPHERES          some geometry is made of spheres
 //   HAS_DISCS            there are discs

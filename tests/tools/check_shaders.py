@@ -20,17 +20,17 @@ BATCH = 40  # programs in one run of the compiler
 END_OF_FILE = "end_of_file_"  # a name that separates what the preprocessor writes of one file from that of the next
 SHADERS = pathlib.Path("shaders")
 # Program -> its stages, and the defines of which it has one combination always.
-TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RAYS": "1", **parts}
+TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "PACKET_RAYS": "1", **parts}
            for parts in ({}, {"NAIVE_PARTS": "1"})] + [
-    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": packet, **bounds}
+    {"TRAVERSE": '"bvh/traverse.glsl"', "PACKET_RAYS": packet, **bounds}
     for packet in ("1", "8")
     for bounds in ({"BVH_PACKED": "1"}, {})] + [
-    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": "2", "BVH_SPHERES": "1"}] + [
-    {"TRAVERSE": '"ldc/traverse.glsl"', "TRACER_LDC": "1", "LDC_CUBES": cubes, "PACKET_RAYS": "1", **way}
+    {"TRAVERSE": '"bvh/traverse.glsl"', "PACKET_RAYS": "2", "BVH_SPHERES": "1"}] + [
+    {"TRAVERSE": '"ldc/traverse.glsl"', "LDC_CUBES": cubes, "PACKET_RAYS": "1", **way}
     for cubes in "12" for way in ({"LDC_CELLS": "1"}, {}, {"LDC_TOLERANCE": "1"})] + [
-    {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"},
-    {"TRAVERSE": '"quadtree/traverse.glsl"', "TRACER_QUADTREE": "1", "PACKET_RAYS": "1"}] + [
-    {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
+    {"TRAVERSE": '"rayspace/traverse.glsl"', "PACKET_RAYS": "1"},
+    {"TRAVERSE": '"quadtree/traverse.glsl"', "PACKET_RAYS": "1"}] + [
+    {"TRAVERSE": '"abuffer/traverse.glsl"', "PACKET_RAYS": "1", **search}
     for search in ({}, {"ABUFFER_PARITY": "1"})]
 CHOICES = {
     "trace/wave.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
@@ -56,7 +56,7 @@ CHOICES = {
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",),
         "HAS_ANISOTROPY_MAP": ("HAS_ANISOTROPY",), "LIGHT_GROUPS": ("LIGHT_LAYERS",)}
 # Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
-WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE")}
+WITHOUT = {f'"{tracer}/traverse.glsl"': ("HAS_MOTION",) for tracer in ("ldc", "abuffer", "quadtree")}
 # Of a sample a pixel, without a lens and other layers of the picture.
 WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
 WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
@@ -182,7 +182,7 @@ def variants(program):
                     for parts in itertools.product(*CHOICES.get(program, [[{}]]))]
     all_chosen = {name for combination in combinations for name in combination}
     for chosen in combinations:
-        never = [name for one in chosen for name in WITHOUT.get(one, ())] + [
+        never = [name for one in chosen for name in WITHOUT.get(one, ()) + WITHOUT.get(chosen[one], ())] + [
             name for name in WITHOUT_IN.get(program.split("/")[0], ()) if program not in IN_ALL_THE_SAME[name]]
         optional = [name for name in optional_defines(stages, chosen, all_chosen) if name not in never]
         for on in [[], optional] + [[name] for name in optional if len(optional) > 1]:

@@ -46,8 +46,8 @@ static uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store)
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                        const struct tracer_options *options, struct error *error)
 {
-    struct gpu_define defines[4] = {{"TRACER_ABUFFER", "1"}};
-    size_t n = 1;
+    struct gpu_define defines[3] = {0};
+    size_t n = 0;
     if (store->resolution == 0)
         defines[n++] = (struct gpu_define){"ABUFFER_EMPTY", "1"};
     if (options->abuffer.form == TRACER_FORM_PAPER)

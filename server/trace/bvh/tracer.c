@@ -204,8 +204,8 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     const struct bvh_state *own = (const struct bvh_state *)state;
     const uint32_t packet_rays = own->packet_rays;
     const enum budget budget = budget_of(bvh, state);
-    struct gpu_define defines[10] = {{"TRACER_BVH", "1"}};
-    size_t n = 1;
+    struct gpu_define defines[9] = {0};
+    size_t n = 0;
     if (settings->spheres)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
     if (bvh_is_packed(settings))

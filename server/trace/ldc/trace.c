@@ -71,8 +71,8 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
     char number_of_cubes[12];
     snprintf(number_of_cubes, sizeof(number_of_cubes), "%u", cube_count);
     const struct ldc_level_layout layout = ldc_level_layout_of(store, cubes[0]->resolution, options);
-    struct gpu_define defines[6] = {{"TRACER_LDC", "1"}, {"LDC_CUBES", number_of_cubes}};
-    size_t n = 2;
+    struct gpu_define defines[4] = {{"LDC_CUBES", number_of_cubes}};
+    size_t n = 1;
     if (layout.cells)
         defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
     if (options->ldc.form == TRACER_FORM_PAPER)

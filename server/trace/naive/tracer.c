@@ -87,8 +87,7 @@ static bool naive_trace_range(struct tracer *tracer, struct gpu_scene *scene, st
                               const struct ray_range *rays, struct error *error)
 {
     struct naive *naive = (struct naive *)tracer;
-    const struct gpu_define defines[] = {
-        {"TRACER_NAIVE", "1"}, {naive->has_parts ? "NAIVE_PARTS" : NULL, "1"}, {NULL, NULL}};
+    const struct gpu_define defines[] = {{naive->has_parts ? "NAIVE_PARTS" : NULL, "1"}, {NULL, NULL}};
     const struct trace_program_source source = {.traverse = "naive/traverse.glsl", .defines = defines};
     const struct gpu_program *program = trace_program_get(scene, &state->wave, &source, error);
     struct naive_part part = {0};

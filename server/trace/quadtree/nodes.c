@@ -73,15 +73,6 @@ static uint32_t unit_items(const struct quadtree_store *store)
     return UNIT_ITEMS * store->device->facts.step_scale;
 }
 
-uint32_t quadtree_nodes_units(const struct quadtree_store *store)
-{
-    const uint32_t items = unit_items(store);
-    uint64_t units = 0;
-    for (uint32_t stage = 0; stage < stage_count(&store->uniforms); stage++)
-        units += (stage_items(&store->uniforms, stage) + items - 1) / items;
-    return (uint32_t)units;
-}
-
 bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error)
 {
     const struct quadtree_uniforms *uniforms = &store->uniforms;

@@ -26,7 +26,6 @@ struct quadtree_node_build {
 
 /* The nodes of all slices of a store. */
 uint64_t quadtree_nodes_count(const struct quadtree_uniforms *uniforms);
-uint32_t quadtree_nodes_units(const struct quadtree_store *store);
 /* Reserves store->nodes and what the build needs, before the first unit. */
 bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error);
 /* A unit; queues the work. `minmax`: boxes only, but for leaves and where nothing is. */

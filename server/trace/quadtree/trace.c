@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-#define SOURCE_DEFINES 4
+#define SOURCE_DEFINES 3
 
 /* The buffer of counts. */
 struct counts {
@@ -111,7 +111,6 @@ static struct trace_program_source source_of(const struct tracer_options *option
                                              struct gpu_define defines[SOURCE_DEFINES])
 {
     size_t n = 0;
-    defines[n++] = (struct gpu_define){"TRACER_QUADTREE", "1"};
     if (quadtree_hits_planes(&options->quadtree))
         defines[n++] = (struct gpu_define){"QUADTREE_PLANES", "1"};
     if (options->quadtree.faces == QUADTREE_FACES_VIEW)

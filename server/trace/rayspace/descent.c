@@ -532,8 +532,7 @@ bool rayspace_descent_finish(struct rayspace *rayspace, struct gpu_scene *scene,
                              struct error *error)
 {
     const struct wave *wave = &state->base.wave;
-    const struct gpu_define own[] = {{"TRACER_RAYSPACE", "1"}, {0}};
-    const struct trace_program_source source = {.traverse = "rayspace/traverse.glsl", .defines = own};
+    const struct trace_program_source source = {.traverse = "rayspace/traverse.glsl"};
     const struct ray_range all = {.wave = wave, .end = wave->ray_count};
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
