@@ -6,6 +6,7 @@
 #include "protocol/plain_text.h"
 
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
 #define NOTES_SHOWN 20u
@@ -77,10 +78,26 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
     return (loading->job->scene || start_import(loading, error)) && connect_to(loading, error);
 }
 
+/* An edit that --light-group has made is named by that option. */
+static bool blame_light_group(const struct cli_job *job, struct fl_error *error)
+{
+    char text[sizeof(error->field)];
+    for (size_t i = 0; i < job->edit_count; i++) {
+        const struct fl_assignment *edit = &job->edits[i];
+        const size_t group = (size_t)edit->values[0];
+        if (strcmp(edit->field, "light_group") == 0 && group > 0 && group <= job->light_group_count &&
+            strcmp(error->field, fl_assignment_print(edit, text, sizeof(text))) == 0)
+            snprintf(error->field, sizeof(error->field), "--light-group %s=%.100s", job->light_groups[group - 1],
+                     edit->which);
+    }
+    return false;
+}
+
 /* Makes the job's edits in a scene that has just been loaded. */
 static bool apply_edits(const struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
-    return job->edit_count == 0 || fl_scene_edit(scene, job->edits, job->edit_count, NULL, error);
+    return job->edit_count == 0 || fl_scene_edit(scene, job->edits, job->edit_count, NULL, error) ||
+           blame_light_group(job, error);
 }
 
 static void tell_warnings(struct cli_loading *loading)

@@ -87,7 +87,7 @@ class Layers(OneDaemon):
 
     def test_wrong_light_groups_are_refused(self):
         many = [word for n in range(8) for word in ("--light-group", f"g{n}=light")]
-        for options, status, text in ((["--light-group", "a=lihgt"], 2, "did you mean 'light'?"),
+        for options, status, text in ((["--light-group", "a=lihgt"], 2, "--light-group a=lihgt: the scene has no node 'lihgt' (did you mean 'light'?"),
                                       (["--light-group", "a=no such node"], 2, "'glass sphere', 'block'"),
                                       (["--light-group", "a.b=light"], 2, "letters, digits and _"),
                                       (["--light-group", "rest=light"], 2, "choose another name"),
