@@ -49,10 +49,11 @@ struct gpu_facts {
     uint32_t texture_size_max; /* texels along an edge of a 2D texture */
     uint32_t texture_layers_max;
     /* Numbers by which passes choose sizes, see gpu_facts_choose. */
-    uint32_t step_scale; /* a step of a pass has so many times the items that two cores have with software GL */
-    uint32_t slice_rays_max;      /* of a slice of a picture */
-    uint32_t range_rays_first;    /* rays of a wave that are traced before the host looks at the clock; UINT32_MAX:
-                                     the    host cannot, because a dispatch returns before it is done */
+    uint32_t step_scale; /* a step of a pass has so many times the items that suit two cores with software GL */
+    uint32_t slice_rays_max; /* of a slice of a picture */
+    /* Rays of a wave that are traced before the host looks at the clock; UINT32_MAX: it cannot, because a dispatch
+     * returns before it is done. */
+    uint32_t range_rays_first;
     uint64_t dispatch_rounds_max; /* rounds of rays' loops in a dispatch, or the driver ends it; 0: no limit */
     uint32_t packet_rays;         /* of a packet that bvh traverses where packets pay; 1: they never do */
     uint32_t band_slots_max; /* samples' places in a band of a picture, which is turned into pixels in one step */
