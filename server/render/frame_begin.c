@@ -266,14 +266,14 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
     return choices_slice_rays(renderer->device, renderer->work->context.request.compare);
 }
 
-/* As many as the depth has, one where nothing sends rays on, and as many more as a slice has needed. */
+/* As many as the depth has, one where nothing sends rays on, and as many as a slice has needed beyond that. */
 static uint32_t waves_queued(const struct frame_renderer *renderer)
 {
     const struct render_context *context = &renderer->work->context;
     const uint32_t depth =
         context->request.depth < WAVES_QUEUED_MAX ? context->request.depth + 1 : WAVES_QUEUED_MAX;
     const bool bounces = wave_passes_expect_bounces(&renderer->work->passes, context);
-    return at_least(context->waves_queued, bounces ? depth : 1);
+    return at_least(renderer->waves_needed, bounces ? depth : 1);
 }
 
 /* Rasterised samples are together only if that needs no more strips: in each all of the scene is drawn. */

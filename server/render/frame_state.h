@@ -76,6 +76,7 @@ struct frame_renderer {
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
     bool queues_ahead;                              /* see counts_on_host of the context */
+    uint32_t waves_needed;                          /* by a slice of this renderer, where more than were queued */
     /* the frame in hand */
     enum frame_phase phase;
     struct frame_work *work; /* owned until it ends */
