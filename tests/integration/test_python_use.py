@@ -79,6 +79,9 @@ class Arguments(Case):
         made = [scene.get(scene.add_mesh(SQUARE[:3], colours=colours)).arrays[6] for colours in (
             shades, shades.astype(np.uint8), shades / 255, np.column_stack((shades, [255] * 3)))]
         self.assertEqual([one.hash for one in made], [made[0].hash] * 4)
+        self.assertEqual(made[0].size_bytes, 3 * 4)
+        dark = scene.get(scene.add_mesh(SQUARE[:3], colours=shades / 25500)).arrays[6]  # which bytes would make 0 or 1
+        self.assertEqual(dark.size_bytes, 3 * 4 * 2)
         image = [scene.get(scene.add_texture(one)).arrays[0].hash for one in (shades, shades / 255, np.repeat(shades[..., None], 3, axis=2))]
         self.assertEqual(image, image[:1] * 3)
 

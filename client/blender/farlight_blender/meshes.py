@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import bpy
 import numpy as np
+from farlight.arrays import colours as pack_colours
 from farlight.scene import Object, Scene
 from farlight.messages import BlobRef, ObjectKind
 
@@ -37,14 +38,14 @@ def _normals(mesh: bpy.types.Mesh) -> Any:
 
 
 def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
-    """Four bytes for each corner; None: there are no such ones."""
+    """Four linear numbers of 0 .. 1 for each corner; None: there are no such ones."""
     attribute = mesh.color_attributes.get(name) or mesh.color_attributes.active_color
     if attribute is None:
         return None
     values = read(attribute.data, "color", 4)
     if attribute.domain == "POINT":
         values = values[read(mesh.loops, "vertex_index", 1, np.int32)]
-    return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
+    return np.clip(values, 0, 1)
 
 
 def shape(mesh: bpy.types.Mesh) -> Any:
@@ -86,8 +87,8 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Op
         bent[..., 3:] = steady("bent", bent[..., 3:])
         corners.update(with_moves(bent))
     # Corners that are the same in everything are one vertex.
-    rows = np.column_stack([np.ascontiguousarray(one, np.uint8 if name == "colours" else np.float32).view(np.uint8)
-                            for name, one in corners.items() if one is not None])
+    rows = np.column_stack([np.ascontiguousarray(one, np.float32).view(np.uint8)
+                            for one in corners.values() if one is not None])
     _, first, vertex = np.unique(rows.view(f"V{rows.shape[1]}").ravel(), return_index=True, return_inverse=True)
     return {**{name: None if one is None else one[first] for name, one in corners.items()},
             "triangles": vertex[triangles[order]], "materials": numbers[slots[order]]}
@@ -105,8 +106,10 @@ def with_targets(scene: Scene, arrays: dict[str, Any]) -> dict[str, Any]:
     if moves is None:
         return {}
     targets = moves.reshape(len(moves), -1, 2, 3).transpose(2, 1, 0, 3)  # positions and normals x targets x vertices x 3
+    colours = None if arrays.get("colours") is None else pack_colours(arrays["colours"], "colours", len(arrays["colours"]))
     by_place = {0: (arrays["positions"], "<f4"), 1: (arrays["triangles"], "<u4"), 2: (arrays["normals"], "<f4"),
-                3: (arrays.get("tangents"), "<f4"), 4: (arrays.get("texcoords"), "<f4"), 6: (arrays.get("colours"), "|u1"),
+                3: (arrays.get("tangents"), "<f4"), 4: (arrays.get("texcoords"), "<f4"),
+                6: (colours, "" if colours is None else colours.dtype.str),
                 9: (targets[0], "<f4"), 10: (targets[1], "<f4")}
     given = [by_place.get(place, (None, "")) for place in range(11)]
     return {"target_count": targets.shape[1],

@@ -111,14 +111,17 @@ def image(values: Numbers, field: str) -> Array:
 
 
 def colours(values: Numbers, field: str, count: int) -> Array:
-    """count x 4 of uint8: of x 3 or x 4."""
+    """count x 4 of uint16, or of uint8 where these hold all of it: of x 3 or x 4."""
     wanted = f"the shape ({count}, 3) or ({count}, 4), uint8 or floats of 0 .. 1"
     array = numbers(values, field, wanted)
     if array.ndim != 2 or array.shape[0] != count or array.shape[1] not in (3, 4):
         raise InvalidValue(f"an array of {array.dtype} with the shape {array.shape}; allowed: {wanted}", field=field)
-    made = np.full((count, 4), 255, np.uint8)
-    made[:, :array.shape[1]] = as_bytes(array, field)
-    return made
+    made = np.full((count, 4), 65535, "<u2")
+    if array.dtype.kind == "f":
+        made[:, :array.shape[1]] = np.rint(np.clip(np.nan_to_num(array), 0, 1) * 65535)
+    else:
+        made[:, :array.shape[1]] = as_bytes(array, field) * np.uint16(257)
+    return made if (made % 257).any() else (made // 257).astype(np.uint8)
 
 
 def sky(values: Numbers, field: str) -> Array:
