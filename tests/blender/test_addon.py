@@ -748,6 +748,41 @@ class Passes(Case):
         np.testing.assert_allclose(albedo[36, 48, :3], (0.6, 0.3, 0.1), atol=1e-3)
 
 
+    def test_light_groups_are_passes_that_add_up_and_are_those_of_cycles(self):
+        scene = empty((0.3, 0.3, 0.3))
+        grid("ground", 20, diffuse(GROUND))
+        ball("ball", diffuse((0.8, 0.8, 0.8, 1)))
+        add_light("POINT", 500, (2, -2, 4), shadow_soft_size=0.2).lightgroup = "lamp"
+        scene.world.lightgroup = "sky"
+        scene.farlight.denoise = "off"
+        layer = bpy.context.view_layer
+        for name in ("lamp", "sky"):
+            layer.lightgroups.add(name=name)
+        names = ("Combined_lamp", "Combined_sky", "Image")
+        found = {}
+        for engine in ("FARLIGHT", "CYCLES"):
+            scene.render.engine = engine
+            scene.use_nodes = True
+            tree = scene.node_tree
+            source = tree.nodes["Render Layers"]
+            layer.update_render_passes()
+            files = tree.nodes.new("CompositorNodeOutputFile")
+            files.base_path = scenes.FOLDER.name
+            files.format.file_format, files.format.color_depth = "OPEN_EXR", "32"
+            files.file_slots.clear()
+            for name in names:
+                files.file_slots.new(name)
+                tree.links.new(source.outputs[name], files.inputs[name])
+            render(engine)
+            tree.nodes.remove(files)
+            found[engine] = [blocks(load(pathlib.Path(scenes.FOLDER.name) / f"{name}0001.exr")[..., :3]) for name in names]
+        scene.use_nodes = False
+        lamp, sky, whole = found["FARLIGHT"]
+        np.testing.assert_allclose(lamp + sky, whole, rtol=1e-4)
+        for ours, theirs in zip(found["FARLIGHT"], found["CYCLES"]):
+            self.assertLess((np.abs(ours - theirs) / np.maximum(theirs, DARK)).mean(), 0.02)
+
+
 class Sending(Case):
     """What the daemon receives, by its own count."""
 

@@ -101,4 +101,4 @@ def update(mirror: Mirror, key: Hashable, camera: bpy.types.Object, view: Lens) 
     made = mirror.scene.set(SetCamera(camera=number, fov_y=view.fov_y, height=view.ortho_height,
                                       near=camera.data.clip_start, name=camera.name[:100]))
     assert made is not None
-    return mirror.place(key, made, camera.matrix_world, camera.name, lambda matrix: matrix.normalized())
+    return mirror.place(key, made, camera.matrix_world, camera, lambda matrix: matrix.normalized())

@@ -18,11 +18,17 @@ from .viewport import Viewport
 
 NOTHING_THERE = 1e10  # what Blender's depth has where there is no surface
 ALBEDO = "Denoising Albedo"
+NOTES_LIGHT = ("path", "distributed")  # integrators whose samples have one path each
 FULLY_DENOISED = 128  # from so many samples on a daemon's `auto` leaves noise as it is
 
 
-def _wanted_layers(layer: bpy.types.RenderLayer) -> tuple[str, ...]:
-    names = {"albedo": ALBEDO, "normal": "Normal", "depth": "Depth"}
+def _names(groups: dict[str, int]) -> dict[str, str]:
+    """Of passes, by the layer that each is made of; those of light groups are called as Cycles calls them."""
+    return {"albedo": ALBEDO, "normal": "Normal", "depth": "Depth",
+            **{f"light-group{number}": f"Combined_{name}" for name, number in groups.items()}}
+
+
+def _wanted_layers(layer: bpy.types.RenderLayer, names: dict[str, str]) -> tuple[str, ...]:
     return ("beauty", *(one for one, name in names.items() if name in layer.passes))
 
 
@@ -50,7 +56,7 @@ def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Moti
     return {**job, **moves.job(steps)}
 
 
-def _passes(frame: Frame, view: cameras.Lens, is_transparent: bool) -> dict[str, Any]:
+def _passes(frame: Frame, view: cameras.Lens, names: dict[str, str], is_transparent: bool) -> dict[str, Any]:
     """Arrays by the names of Blender's passes, rows from the top."""
     made = {"Combined": frame.colour}
     if not is_transparent:  # what is seen of the world is no hole in the picture, however dark it is
@@ -64,6 +70,9 @@ def _passes(frame: Frame, view: cameras.Lens, is_transparent: bool) -> dict[str,
         made["Normal"] = np.stack((normal[..., 0], -normal[..., 2], normal[..., 1]), axis=-1)  # z up again
     if "albedo" in words:
         made[ALBEDO] = frame.albedo
+    for word in words:
+        if word.startswith("light-group"):
+            made[names[word]] = frame.layer(word)[..., :3]
     return {name: view.cut(image) for name, image in made.items()}
 
 
@@ -107,6 +116,8 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self.register_pass(scene, layer, "Normal", 3, "XYZ", "VECTOR")
         if scene.farlight.use_pass_albedo:
             self.register_pass(scene, layer, ALBEDO, 3, "RGB", "COLOR")
+        for group in layer.lightgroups:
+            self.register_pass(scene, layer, f"Combined_{group.name}", 3, "RGB", "COLOR")
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """One picture of one view layer."""
@@ -180,6 +191,8 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         layer = depsgraph.view_layer_eval.name
         if scene.farlight.use_pass_albedo:
             self.add_pass(ALBEDO, 3, "RGB", layer=layer)
+        for group in depsgraph.view_layer_eval.lightgroups:
+            self.add_pass(f"Combined_{group.name}", 3, "RGB", layer=layer)
         result = self.begin_result(0, 0, view.part_width, view.part_height, layer=layer)
         try:
             self._show(result, daemon, image, node, view, _job(scene, view, moves))
@@ -204,8 +217,12 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         count = job["last_frame"] + 1
         self.say(f"{job['samples'] * count} samples")
         mean = _Mean(count) if "clips" in job else None
-        for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer), **job):
-            images = _passes(frame, view, job["background"] == Background.TRANSPARENT)
+        groups = image.light_groups if job["integrator"] in NOTES_LIGHT else {}
+        if len(groups) < len(image.light_groups):
+            self._warn(f"light groups are black: the integrator {job['integrator']} does not note them, and path does")
+        names = _names(groups)
+        for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer, names), **job):
+            images = _passes(frame, view, names, job["background"] == Background.TRANSPARENT)
             _write(layer, mean.add(images) if mean else images)
             self.update_result(result)
             self.update_progress((frame.number + 1) / count)

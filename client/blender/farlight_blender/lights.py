@@ -31,6 +31,7 @@ SUN_MAX = 1.5  # of half the angle: the scene is outside of the sphere
 CONES = (((0, 0), (0, 0.5)), ((0, 0), (0, 0.85)), ((0, 0), (0.5, 0.5)), ((0.3, 0), (1, 0)))
 HAS_COSINE = bpy.app.version < (4, 0)  # spots of Cycles were weaker by the cosine from their axis until then
 SPOT_MAX = 1.57  # radians from the axis: the protocol's spots end there
+GROUPS_MAX = 7  # layers of light groups
 
 Part = tuple[LightKind, float, dict[str, Any]]  # kind, factor of the colour, other fields
 
@@ -98,6 +99,14 @@ def _parts(mirror: Mirror, source: bpy.types.Light, scale: Any, reach: float) ->
     return [(LightKind.POINT, intensity, {})]
 
 
+def groups(mirror: Mirror, layer: bpy.types.ViewLayer) -> dict[str, int]:
+    """Light groups of a view layer, by their names."""
+    names = [one.name for one in layer.lightgroups]
+    for name in names[GROUPS_MAX:]:
+        mirror.note(f"the light group {name} is one too many: there may be {GROUPS_MAX}")
+    return {name: number for number, name in enumerate(names[:GROUPS_MAX], 1)}
+
+
 def update(mirror: Mirror, key: Hashable, thing: bpy.types.Object, matrix: Any, radius: float) -> None:
     """Sets a light and its node. radius: of the scene, from its origin."""
     source = thing.data
@@ -116,6 +125,6 @@ def update(mirror: Mirror, key: Hashable, thing: bpy.types.Object, matrix: Any, 
                                          name=thing.name[:100], **values))
         assert made is not None
         lights.append(made)
-    node = mirror.place(key, lights[0], matrix, thing.name, rigid)
+    node = mirror.place(key, lights[0], matrix, thing, rigid)
     for place, one in enumerate(lights[1:]):
         mirror.scene.add_node(one, parent=node, node=mirror.number(ObjectKind.NODE, (key, "with", place)), name=thing.name[:100])

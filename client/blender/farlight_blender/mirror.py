@@ -103,6 +103,7 @@ class Mirror:
     def __init__(self) -> None:
         self.scene = farlight.Scene()
         self.notes: list[str] = []
+        self.light_groups: dict[str, int] = {}  # the view layer's, of which a node or the world has the number
         self._steady: dict[tuple[int, str], Any] = {}
         self._numbers: dict[tuple[ObjectKind, Hashable], int] = {}
         self._last: dict[ObjectKind, int] = {}
@@ -145,16 +146,17 @@ class Mirror:
         if text not in self.notes:
             self.notes.append(text)
 
-    def place(self, key: Hashable, shows: Object, matrix: Any, name: str, rigid: Optional[Callable[[Any], Any]] = None,
-              *, bends: bool = False) -> Object:
-        """Shows a thing at a place in Blender's world. rigid: what is left of a place, for a light or the camera. bends: its mesh has
-        targets."""
+    def place(self, key: Hashable, shows: Object, matrix: Any, thing: bpy.types.Object,
+              rigid: Optional[Callable[[Any], Any]] = None, *, bends: bool = False) -> Object:
+        """Shows what stands for a thing at a place in Blender's world. rigid: what is left of a place, for a light or the camera.
+        bends: its mesh has targets."""
         node = self.number(ObjectKind.NODE, key)
         if self._motion is not None and not self._motion.follow(key, node, rigid):
-            self.note(f"{name}: it is sheared, and while it moves it is not")
+            self.note(f"{thing.name}: it is sheared, and while it moves it is not")
         if self._motion is not None and bends:
             self._motion.bend(key, node)
-        return self.scene.add_node(shows, np.array(rigid(matrix) if rigid else matrix), parent=self._root(), node=node, name=name[:100])
+        return self.scene.add_node(shows, np.array(rigid(matrix) if rigid else matrix), parent=self._root(), node=node,
+                                   name=thing.name[:100], light_group=self.light_groups.get(thing.lightgroup, 0))
 
     def _root(self) -> Object:
         return Object(ObjectKind.NODE, self.number(ObjectKind.NODE, ROOT))
@@ -169,6 +171,7 @@ class Mirror:
         self._seen.clear()
         self._asked.clear()
         self.notes.clear()
+        self.light_groups = lights.groups(self, depsgraph.view_layer_eval)
         self.scene.set(SetNode(node=self._root().number, kind=NodeKind.GROUP, name="Blender",
                                parent_from_node=[float(one) for one in WORLD_FROM_BLENDER[:3].ravel()]))
         world.update(self, depsgraph.scene_eval)
@@ -197,19 +200,19 @@ class Mirror:
             mesh, bends = shared[0].mesh(thing)
             if mesh is not None:
                 extent.add(mesh, thing, place)
-                self.place(key, mesh, place, thing.name, bends=bends)
+                self.place(key, mesh, place, thing, bends=bends)
         elif instance.show_self and thing.type in WITHOUT_FACES:
             shown, bends = shared[1].own(thing)
             if shown is not None:
                 extent.add(shown, thing, place)
-                self.place(key, shown, place, thing.name, bends=bends)
+                self.place(key, shown, place, thing, bends=bends)
         elif instance.show_self and thing.type == "LIGHT":
             found.append((key, thing, place.copy()))
         elif instance.show_self and thing.type in NOT_DRAWN:
             self.note(f"{thing.name}: {NOT_DRAWN[thing.type]}")
         for name, hairs, bends in shared[1].hairs(thing) if _has_hairs(instance) else ():
             if hairs is not None:
-                self.place(_hairs_key(key, name), hairs, place, thing.name, bends=bends)
+                self.place(_hairs_key(key, name), hairs, place, thing, bends=bends)
 
     def _sweep(self) -> None:
         self._remembered = {key: made for key, made in self._remembered.items() if key in self._asked}

@@ -131,7 +131,41 @@ class FARLIGHT_PT_passes(_Panel):  # pylint: disable=invalid-name
         self._rows(context.scene.farlight, "use_pass_albedo")
 
 
-_CLASSES = (FarlightPreferences, FarlightSettings, FARLIGHT_PT_sampling, FARLIGHT_PT_motion, FARLIGHT_PT_passes)
+class FARLIGHT_PT_light_groups(_Panel):  # pylint: disable=invalid-name
+    """In the view layer's properties: the groups that there are."""
+    bl_label, bl_context = "Light Groups", "view_layer"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The form."""
+        layer, row = context.view_layer, self.layout.row()
+        row.template_list("UI_UL_list", "lightgroups", layer, "lightgroups", layer, "active_lightgroup_index", rows=3)
+        buttons = row.column(align=True)
+        buttons.operator("scene.view_layer_add_lightgroup", icon="ADD", text="")
+        buttons.operator("scene.view_layer_remove_lightgroup", icon="REMOVE", text="")
+
+
+class _LightGroup(_Panel):
+    bl_label = "Light Group"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The form."""
+        owner = context.object if self.bl_context == "object" else context.world
+        if owner is not None:
+            self.layout.prop_search(owner, "lightgroup", context.view_layer, "lightgroups", results_are_suggestions=True)
+
+
+class FARLIGHT_PT_group_of_object(_LightGroup):  # pylint: disable=invalid-name
+    """In an object's properties."""
+    bl_context = "object"
+
+
+class FARLIGHT_PT_group_of_world(_LightGroup):  # pylint: disable=invalid-name
+    """In the world's properties."""
+    bl_context = "world"
+
+
+_CLASSES = (FarlightPreferences, FarlightSettings, FARLIGHT_PT_sampling, FARLIGHT_PT_motion, FARLIGHT_PT_passes,
+            FARLIGHT_PT_light_groups, FARLIGHT_PT_group_of_object, FARLIGHT_PT_group_of_world)
 
 
 def _others() -> Any:

@@ -34,13 +34,14 @@ def update(mirror: Mirror, scene: bpy.types.Scene) -> None:
     if world is None:
         mirror.scene.set_environment((0, 0, 0))
         return
+    group = mirror.light_groups.get(world.lightgroup, 0)
     if world.use_nodes and world.node_tree and nodes.volume(world.node_tree):
         mirror.note("the world's volume is not drawn")
     background = nodes.surface(world.node_tree) if world.use_nodes and world.node_tree else None
     if background is None or background.type != "BACKGROUND":
         if background is not None:
             mirror.note(f"the world's node {background.name} is not known: its viewport colour is used")
-        mirror.scene.set_environment(tuple(world.color))
+        mirror.scene.set_environment(tuple(world.color), light_group=group)
         return
     strength = nodes.number(background.inputs["Strength"])
     start = nodes.source(background.inputs["Color"])
@@ -49,9 +50,10 @@ def update(mirror: Mirror, scene: bpy.types.Scene) -> None:
             mirror.note("a mirror ball is taken as an equirectangular picture")
         image: Any = images.linear(start.node.image)
         if image is not None:
-            mirror.scene.set_environment((strength,) * 3, image, rotation=QUARTER_TURN + _turn(mirror, start.node))
+            mirror.scene.set_environment((strength,) * 3, image, rotation=QUARTER_TURN + _turn(mirror, start.node),
+                                         light_group=group)
             return
     colour, is_known = nodes.colour(background.inputs["Color"])
     if not is_known:
         mirror.note("the world's colour comes from nodes that are not known")
-    mirror.scene.set_environment(tuple(one * strength for one in colour))
+    mirror.scene.set_environment(tuple(one * strength for one in colour), light_group=group)
