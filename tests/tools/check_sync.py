@@ -30,7 +30,7 @@ FRAMES = (
     ("accuracy/frame_ycbcr:", "pictures as YCbCr"),
     ("unit/trace/bvh/refit:", "refits of a hierarchy"),
     ("unit/gpu_scene/motion:", "scenes that move and deform"),
-    ("unit/trace/abuffer/host:", "builds of A-buffers by a GPU's passes"),
+    ("unit/trace/abuffer/build:", "builds of A-buffers"),
 )
 # Its waves are queued: where the host makes their lists it waits for each.
 WITHOUT_BARRIERS = "accuracy/frame_ahead:rays_behind_the_last_queued"

@@ -8,6 +8,8 @@ import collections
 import pathlib
 import re
 
+import check_sync
+
 PARTS = 7  # of the rest: one a day
 
 # How a test runs: its environment, and what the daemon must then say that it renders with.
@@ -115,6 +117,9 @@ def faults(names):
         for pattern in table:
             if not any(re.fullmatch(pattern, name) for name in every):
                 yield f"tests/tools/suite.py: no test is called {pattern}"
+    for test in (*(frame[0] for frame in check_sync.FRAMES), check_sync.WITHOUT_BARRIERS):
+        if test.split(":")[0] not in names:
+            yield f"tests/tools/check_sync.py: no test is called {test}"
     targets = re.findall(r"^\.PHONY:(.*)", pathlib.Path("Makefile").read_text(), re.MULTILINE)
     for target in " ".join(targets).split():
         if re.fullmatch(STEP_NAMES, target) and not any(step.target.split()[0] == target for step in STEPS):
