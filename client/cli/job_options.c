@@ -284,8 +284,8 @@ static error_t add_edit(struct cli_job *job, const char *field, const char *valu
     return fl_assignment_parse(value, &job->edits[job->edit_count++], &job->error) ? 0 : EINVAL;
 }
 
-/* "key" of "key=Sun,Lamp*", its length is that of a name: the group's number, a new one if the name is new;
-   0: it cannot be. */
+/* The number of the group whose name `value` begins with; a new name gets a new number. 0: there are too many. The
+ * caller has checked that `length` is that of a name. */
 static unsigned light_group_of(struct cli_job *job, const char *value, size_t length)
 {
     char name[CLI_LIGHT_GROUP_NAME] = "";

@@ -23,7 +23,8 @@
 /* Nothing but first hits, and their depth. */
 static struct frame_request request_of(const struct gpu_device *device, bool several, enum first_hits_way way)
 {
-    const uint32_t side = (uint32_t)sqrt(device->facts.slice_rays_max) / 2;
+    const uint32_t side =
+        (uint32_t)sqrt(device->facts.slice_rays_max) / 2; /* a quarter of a slice: what fills the device */
     struct frame_request request = check_request(TRACER_BVH, side, side);
     request.samples = several ? SAMPLES_SEVERAL : 1;
     request.primary = way == FIRST_HITS_TRACED ? PRIMARY_TRACE : PRIMARY_RASTER;

@@ -15,7 +15,7 @@
 
 struct gpu_device_info {
     int index;      /* what --device takes */
-    bool software;  /* no GPU renders, whatever facts.software lets passes choose */
+    bool software;  /* no GPU renders, whatever facts.software is */
     char name[128]; /* GL_RENDERER */
     char vendor[64];
     char version[128]; /* GL_VERSION */
@@ -32,9 +32,8 @@ struct gpu_texel_formats {
 
 /* Facts asked once. */
 struct gpu_facts {
-    /* Passes choose what suits llvmpipe: SSBO loads are gathers, dispatches are synchronous. False for software GL
-     * as well where the environment has FARLIGHT_LIKE_GPU=1, so that tests try what GPUs do on any machine, and
-     * for zink. */
+    /* The numbers below are those of llvmpipe (gpu_facts_choose). False for software GL as well where the
+     * environment has FARLIGHT_LIKE_GPU=1, so that tests try what GPUs do on any machine, and for zink. */
     bool software;
     bool robust; /* context tells of its loss */
     bool debug_output;

@@ -11,16 +11,17 @@
 #include "gpu/device.h"
 #include "shared/hit.h"
 
-/* On what buffers hold; places are counted from 0. */
+/* Each works on what buffers hold; places are counted from 0. */
 struct host_passes {
-    /* render/hit_count.comp, compact_scan.comp and hit_list.comp: lists the rays that hit something, and tells
-     * each its place in that list or HIT_PLACE_NONE. Returns how many there are. */
+    /* In place of render/hit_count.comp, compact_scan.comp and hit_list.comp: lists the rays that hit something,
+     * and tells each ray its place in that list, or HIT_PLACE_NONE. Returns how many hit. */
     uint32_t (*list_hits)(const struct hit *hits, uint32_t ray_count, uint32_t *hit_list, uint32_t *hit_places);
-    /* render/compact_count.comp and compact_scan.comp: how many children and shadow rays hits have.. */
+    /* In place of the sums of render/compact_count.comp and compact_scan.comp: how many children and shadow rays
+     * the hits have. */
     void (*count_children)(const uint32_t *child_counts, uint32_t hit_count, uint32_t *children,
                            uint32_t *shadow_rays);
-    /* .. and the place of the first child of each block of COMPACT_BLOCK hits. `sorted`: of each octant's; then
-     * octant by octant. */
+    /* In place of their scan: where the children of each block of COMPACT_BLOCK hits begin. `sorted`: where those
+     * of each octant do, octant by octant. */
     void (*place_children)(const uint32_t *child_counts, uint32_t hit_count, bool sorted,
                            uint32_t (*block_offsets)[2]);
 };

@@ -158,15 +158,18 @@ static bool decide_order(struct render_context *context, struct error *error)
     return true;
 }
 
-static bool write_places(const struct host_passes *host, struct render_context *context, const uint32_t *counts,
-                         struct error *error)
+static bool write_places(const struct host_passes *host, struct render_context *context,
+                         struct gpu_buffer *child_counts, struct error *error)
 {
-    uint32_t(*offsets)[2] = gpu_buffer_open(context->device, &context->block_offsets, error);
-    if (!offsets)
-        return false;
-    host->place_children(counts, context->hit_count, context->known_state.sorted != 0, offsets);
-    gpu_buffer_unmap(context->device, &context->block_offsets);
-    return true;
+    const uint32_t *counts = gpu_buffer_open(context->device, child_counts, error);
+    uint32_t(*offsets)[2] = counts ? gpu_buffer_open(context->device, &context->block_offsets, error) : NULL;
+    if (offsets) {
+        host->place_children(counts, context->hit_count, context->known_state.sorted != 0, offsets);
+        gpu_buffer_unmap(context->device, &context->block_offsets);
+    }
+    if (counts)
+        gpu_buffer_unmap(context->device, child_counts);
+    return offsets != NULL;
 }
 
 static bool place_children(const struct host_passes *host, struct render_context *context,
@@ -188,19 +191,15 @@ static bool place_children(const struct host_passes *host, struct render_context
         state->stopped = WAVE_STOPPED_FULL;
         children = 0;
     }
-    counts = children > 0 ? gpu_buffer_open(context->device, child_counts, error) : NULL;
-    if (children > 0 && !counts)
+    if (children > 0 && !write_places(host, context, child_counts, error))
         return false;
-    const bool placed = !counts || write_places(host, context, counts, error);
-    if (counts)
-        gpu_buffer_unmap(context->device, child_counts);
     state->rays = counts_of(children);
     state->ray_blocks = counts_of(blocks_of(children));
     state->all_secondary_rays += children;
     state->all_shadow_rays += shadow_rays;
     write_state(context);
     context->ray_count = children;
-    return placed && gpu_check(context->device, "compacting", error);
+    return gpu_check(context->device, "compacting", error);
 }
 
 bool compact_children(struct render_context *context, const struct compact_order *order,

@@ -135,7 +135,8 @@ static bool do_again(struct frame_renderer *renderer, const struct slice_ahead *
             context->trace_state->patient = true;
             slices_ahead_forget(&renderer->work->ahead);
         } else {
-            renderer->waves_needed = context->waves_queued *= 2;
+            context->waves_queued *= 2;
+            renderer->waves_needed = context->waves_queued;
         }
         slices_put_back(&renderer->slices, &context->slice);
         compact_go_on(context);

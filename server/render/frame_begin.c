@@ -266,7 +266,8 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
     return choices_slice_rays(renderer->device, renderer->work->context.request.compare);
 }
 
-/* As many as the depth has, one where nothing sends rays on, and as many as a slice has needed beyond that. */
+/* A wave for each bounce and one before them, or one alone where nothing sends rays on; more if a slice has needed
+ * more. */
 static uint32_t waves_queued(const struct frame_renderer *renderer)
 {
     const struct render_context *context = &renderer->work->context;

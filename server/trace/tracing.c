@@ -146,10 +146,10 @@ static void learn(struct trace_state *state, uint32_t rays, uint64_t step_ns, ui
 {
     uint32_t *step_rays = &state->step_rays[state->wave.family];
     const uint32_t first = state->device->facts.range_rays_first;
-    const uint64_t last = *step_rays ? *step_rays : first, minimum = minimum_rays(state);
-    const uint64_t wanted = rays * step_ns / (took_ns + 1), maximum = STEP_RAYS_GROWTH * last;
     if (first == UINT32_MAX)
         return;
+    const uint64_t last = *step_rays ? *step_rays : first, minimum = minimum_rays(state);
+    const uint64_t wanted = rays * step_ns / (took_ns + 1), maximum = STEP_RAYS_GROWTH * last;
     const uint64_t next = wanted < maximum ? wanted : maximum;
     *step_rays = (uint32_t)(next < minimum ? minimum : next < STEP_RAYS_MAX ? next : STEP_RAYS_MAX);
 }

@@ -11,7 +11,7 @@
 #include "shared/bindings.h"
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer records; // bvh_refit_record
-layout(std430, binding = BIND_TRACER_1) coherent buffer box_block { uvec4 boxes[]; };
+layout(std430, binding = BIND_TRACER_1) buffer box_block { uvec4 boxes[]; };
 uniform uint first_record;
 uniform uint record_count;
 uniform uint first_box; // texel where this tree's begin

@@ -311,7 +311,7 @@ TEST(samples_are_not_added_to_those_from_before_others_moved_something)
     frame_renderer_destroy(second);
 }
 
-/* Of several bands and planes, in turns, and after one that was dropped. */
+/* The pictures have several bands and planes, are read back in turns, and after one that was dropped. */
 TEST_LONG(pictures_that_are_read_back_beside_others_are_the_same)
 {
     struct fixture *fixture = *state;

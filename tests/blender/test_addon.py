@@ -720,33 +720,37 @@ class Settings(Case):
 
 
 class Passes(Case):
-    def test_depth_normal_and_albedo_arrive_in_the_compositor(self):
-        scene = empty((0.5, 0.5, 0.5))
-        scene.camera.location, scene.camera.rotation_euler = (0, 0, 8), (0, 0, 0)
-        grid("ground", 4, diffuse((0.6, 0.3, 0.1, 1)), turn=(0.3, 0, 0))
-        scene.render.engine = "FARLIGHT"
-        layer = bpy.context.view_layer
-        layer.use_pass_z = layer.use_pass_normal = scene.farlight.use_pass_albedo = True
+    def passes(self, engine, *names):
+        """As the compositor has them."""
+        scene = bpy.context.scene
+        scene.render.engine = engine
         scene.use_nodes = True
         tree = scene.node_tree
         source = tree.nodes["Render Layers"]
-        layer.update_render_passes()
+        bpy.context.view_layer.update_render_passes()
         files = tree.nodes.new("CompositorNodeOutputFile")
         files.base_path = scenes.FOLDER.name
         files.format.file_format, files.format.color_depth = "OPEN_EXR", "32"
         files.file_slots.clear()
-        for name in ("Depth", "Normal", "Denoising Albedo"):
+        for name in names:
             files.file_slots.new(name)
             tree.links.new(source.outputs[name], files.inputs[name])
-        render()
+        render(engine)
+        tree.nodes.remove(files)
         scene.use_nodes = False
-        depth, normal, albedo = (load(pathlib.Path(scenes.FOLDER.name) / f"{name}0001.exr")
-                                 for name in ("Depth", "Normal", "Denoising Albedo"))
+        return [load(pathlib.Path(scenes.FOLDER.name) / f"{name}0001.exr") for name in names]
+
+    def test_depth_normal_and_albedo_arrive_in_the_compositor(self):
+        scene = empty((0.5, 0.5, 0.5))
+        scene.camera.location, scene.camera.rotation_euler = (0, 0, 8), (0, 0, 0)
+        grid("ground", 4, diffuse((0.6, 0.3, 0.1, 1)), turn=(0.3, 0, 0))
+        layer = bpy.context.view_layer
+        layer.use_pass_z = layer.use_pass_normal = scene.farlight.use_pass_albedo = True
+        depth, normal, albedo = self.passes("FARLIGHT", "Depth", "Normal", "Denoising Albedo")
         self.assertAlmostEqual(float(depth[36, 48, 0]), 8, delta=0.05)  # half a pixel of a slope
         self.assertEqual(float(depth[0, 0, 0]), 1e10)
         np.testing.assert_allclose(normal[36, 48, :3], (0, -math.sin(0.3), math.cos(0.3)), atol=1e-3)
         np.testing.assert_allclose(albedo[36, 48, :3], (0.6, 0.3, 0.1), atol=1e-3)
-
 
     def test_light_groups_are_passes_that_add_up_and_are_those_of_cycles(self):
         scene = empty((0.3, 0.3, 0.3))
@@ -759,24 +763,7 @@ class Passes(Case):
         for name in ("lamp", "sky"):
             layer.lightgroups.add(name=name)
         names = ("Combined_lamp", "Combined_sky", "Image")
-        found = {}
-        for engine in ("FARLIGHT", "CYCLES"):
-            scene.render.engine = engine
-            scene.use_nodes = True
-            tree = scene.node_tree
-            source = tree.nodes["Render Layers"]
-            layer.update_render_passes()
-            files = tree.nodes.new("CompositorNodeOutputFile")
-            files.base_path = scenes.FOLDER.name
-            files.format.file_format, files.format.color_depth = "OPEN_EXR", "32"
-            files.file_slots.clear()
-            for name in names:
-                files.file_slots.new(name)
-                tree.links.new(source.outputs[name], files.inputs[name])
-            render(engine)
-            tree.nodes.remove(files)
-            found[engine] = [blocks(load(pathlib.Path(scenes.FOLDER.name) / f"{name}0001.exr")[..., :3]) for name in names]
-        scene.use_nodes = False
+        found = {engine: [blocks(one[..., :3]) for one in self.passes(engine, *names)] for engine in ("FARLIGHT", "CYCLES")}
         lamp, sky, whole = found["FARLIGHT"]
         np.testing.assert_allclose(lamp + sky, whole, rtol=1e-4)
         for ours, theirs in zip(found["FARLIGHT"], found["CYCLES"]):

@@ -10,7 +10,7 @@ import bpy
 import farlight
 import numpy as np
 from farlight.frame import Frame
-from farlight.messages import Accumulation, Background
+from farlight.messages import Accumulation, Background, Layer
 
 from . import cameras, motion, session, settings
 from .mirror import Mirror, forget_all, mirror, moment
@@ -18,14 +18,15 @@ from .viewport import Viewport
 
 NOTHING_THERE = 1e10  # what Blender's depth has where there is no surface
 ALBEDO = "Denoising Albedo"
+GROUP = "Combined_"  # and the name of a light group, as Cycles calls that pass
 NOTES_LIGHT = ("path", "distributed")  # integrators whose samples have one path each
 FULLY_DENOISED = 128  # from so many samples on a daemon's `auto` leaves noise as it is
 
 
 def _names(groups: dict[str, int]) -> dict[str, str]:
-    """Of passes, by the layer that each is made of; those of light groups are called as Cycles calls them."""
+    """The pass of each layer but the beauty."""
     return {"albedo": ALBEDO, "normal": "Normal", "depth": "Depth",
-            **{f"light-group{number}": f"Combined_{name}" for name, number in groups.items()}}
+            **{Layer(Layer.LIGHT_REST + number).word: GROUP + name for name, number in groups.items()}}
 
 
 def _wanted_layers(layer: bpy.types.RenderLayer, names: dict[str, str]) -> tuple[str, ...]:
@@ -70,9 +71,7 @@ def _passes(frame: Frame, view: cameras.Lens, names: dict[str, str], is_transpar
         made["Normal"] = np.stack((normal[..., 0], -normal[..., 2], normal[..., 1]), axis=-1)  # z up again
     if "albedo" in words:
         made[ALBEDO] = frame.albedo
-    for word in words:
-        if word.startswith("light-group"):
-            made[names[word]] = frame.layer(word)[..., :3]
+    made.update({names[word]: frame.layer(word)[..., :3] for word in words if names.get(word, "").startswith(GROUP)})
     return {name: view.cut(image) for name, image in made.items()}
 
 
@@ -117,7 +116,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         if scene.farlight.use_pass_albedo:
             self.register_pass(scene, layer, ALBEDO, 3, "RGB", "COLOR")
         for group in layer.lightgroups:
-            self.register_pass(scene, layer, f"Combined_{group.name}", 3, "RGB", "COLOR")
+            self.register_pass(scene, layer, GROUP + group.name, 3, "RGB", "COLOR")
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """One picture of one view layer."""
@@ -192,7 +191,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         if scene.farlight.use_pass_albedo:
             self.add_pass(ALBEDO, 3, "RGB", layer=layer)
         for group in depsgraph.view_layer_eval.lightgroups:
-            self.add_pass(f"Combined_{group.name}", 3, "RGB", layer=layer)
+            self.add_pass(GROUP + group.name, 3, "RGB", layer=layer)
         result = self.begin_result(0, 0, view.part_width, view.part_height, layer=layer)
         try:
             self._show(result, daemon, image, node, view, _job(scene, view, moves))

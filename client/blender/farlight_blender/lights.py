@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
-from farlight.messages import LightKind, ObjectKind, SetLight
+from farlight.messages import Layer, LightKind, ObjectKind, SetLight
 from mathutils import Vector
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ SUN_MAX = 1.5  # of half the angle: the scene is outside of the sphere
 CONES = (((0, 0), (0, 0.5)), ((0, 0), (0, 0.85)), ((0, 0), (0.5, 0.5)), ((0.3, 0), (1, 0)))
 HAS_COSINE = bpy.app.version < (4, 0)  # spots of Cycles were weaker by the cosine from their axis until then
 SPOT_MAX = 1.57  # radians from the axis: the protocol's spots end there
-GROUPS_MAX = 7  # layers of light groups
+GROUPS_MAX = Layer.LIGHT_GROUP7 - Layer.LIGHT_REST
 
 Part = tuple[LightKind, float, dict[str, Any]]  # kind, factor of the colour, other fields
 

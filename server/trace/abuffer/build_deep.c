@@ -24,7 +24,7 @@ static int compare(const void *a, const void *b)
     return (left->id > right->id) - (left->id < right->id);
 }
 
-/* As abuffer/run.glsl has it. */
+/* The twin of sample_bits() in abuffer/run.glsl. */
 static uint32_t sample_bits(uint32_t bits, int64_t winding)
 {
     int64_t stored = winding + ABUFFER_WINDING_ZERO, maximum = ABUFFER_WINDING_MASK;

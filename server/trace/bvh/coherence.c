@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* How many rays of a wave an invocation traverses, as a packet or side by side. The choice depends on the rays and
+/* How many rays of a wave an invocation traverses, as a packet. The choice depends on the rays and
  * the scene alone, never on the clock, so that a picture is the same every time: it is made once for the whole
  * wave, before its first step. */
 #include "trace/bvh/tracer.h"

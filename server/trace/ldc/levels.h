@@ -6,8 +6,8 @@
  * Million reflected rays a second on two cores of software GL, a dragon of 47,000 triangles at a resolution of
  * 1024: blocks 0.15, cells 4.1. Image by image a ray visits 130 nodes and 54 texels, whose depths it meets but
  * whose planes it misses; by cells, for all images at once, it visits 16 nodes and blocks and 3 cells, and ends
- * with the first intersection. For that cells take 0.2 seconds to build by shaders, and about half of that by the
- * host, where blocks take 0.02; and 16 bytes for each cell that a sample's plane passes, about two per sample. */
+ * with the first intersection. For that cells take 0.2 seconds to build, where blocks take 0.02; and 16 bytes for
+ * each cell that a sample's plane passes, about two per sample. */
 #ifndef FARLIGHT_TRACE_LDC_LEVELS_H
 #define FARLIGHT_TRACE_LDC_LEVELS_H
 

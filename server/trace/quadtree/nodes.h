@@ -4,7 +4,7 @@
  * then each level above it of all slices. GL thread.
  *
  * On software GL leaves take 27 ns of a core a texel, 62 where the scene has spheres and discs as well, since all
- * branches are taken; the levels above them take 15. So there the host looks where a slice shows anything. */
+ * branches are taken; the levels above them take 15. */
 #ifndef FARLIGHT_TRACE_QUADTREE_NODES_H
 #define FARLIGHT_TRACE_QUADTREE_NODES_H
 
@@ -28,7 +28,7 @@ struct quadtree_node_build {
 uint64_t quadtree_nodes_count(const struct quadtree_uniforms *uniforms);
 /* Reserves store->nodes and what the build needs, before the first unit. */
 bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error);
-/* A unit; queues the work. `minmax`: boxes only, but for leaves and where nothing is. */
+/* A unit; queues the work. */
 enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, struct quadtree_store *store,
                                           struct gpu_scene *scene, struct error *error);
 void quadtree_nodes_finish(struct quadtree_node_build *build, struct gpu_device *device); /* leaves it empty */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Draws what a view sees of the scene: which primitive of which instance, and its depth, reversed (1 at the near
- * distance). A part at a time on software GL. GL thread. */
+ * distance). A part at a time. GL thread. */
 #ifndef FARLIGHT_TRACE_RASTER_VIEW_H
 #define FARLIGHT_TRACE_RASTER_VIEW_H
 
@@ -34,7 +34,7 @@ struct raster_span {
 /* Where drawing goes on, and how large a part is. All-zero is valid; it keeps what it has learnt. */
 struct raster_view {
     uint32_t sort, span, primitive; /* span: an instance where there are no spans */
-    uint32_t part_vertices;         /* that are drawn in one part on software GL; 0: not known yet */
+    uint32_t part_vertices;         /* that are drawn in one part, times step_scale; 0: not known yet */
 };
 
 struct raster_view_target {

@@ -39,7 +39,7 @@ static bool find_heights(struct heights *heights, const struct bvh_baked *baked)
     return true;
 }
 
-/* One for each height. False: an element has too many children. */
+/* Each height is a step. False: an element has too many children. */
 static bool find_steps(struct bvh_refit_plan *plan, const struct heights *heights)
 {
     for (uint32_t h = 1; h < heights->count; h++)

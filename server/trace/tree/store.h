@@ -34,9 +34,8 @@ struct bvh_entry {
     float grid_cost, leaf_extent; /* as struct bvh_tree has them */
 };
 
-/* Trees that are planned, then written: by software GL to the buffers themselves, else to arrays that are
- * uploaded.
- */
+/* Trees that are planned, then written: to the buffers themselves where the host shares their memory, else to
+ * arrays that are uploaded. */
 struct bvh_store_build {
     struct bvh_job *jobs; /* owned; NULL: there are none */
     uint32_t *which;      /* owned; geometry of each */
