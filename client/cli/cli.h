@@ -155,8 +155,9 @@ struct cli_progress {
     bool drawn;
     uint64_t begin_ns, shown_ns, first_ns;
     uint32_t total;
-    float error;           /* as it was last told, that many seconds after the beginning */
-    double error_s, slope; /* it falls as that power of the time */
+    float error;             /* as it was last told, that many seconds after the beginning */
+    double error_s, slope;   /* it falls as that power of the time */
+    uint64_t resident_bytes; /* the most that a line has told */
 };
 
 struct cli_job;
@@ -176,9 +177,9 @@ struct cli_noise {
     uint32_t held, total;
 };
 void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *noise);
-/* A line in the log for a picture that is complete: its number, seconds, the memory of the command and of what it
- * has started, and its file. Nothing where a bar is drawn. */
-void cli_progress_frame(const struct cli_progress *progress, uint32_t frame, double seconds, const char *path);
+/* A line in the log for a picture that is complete: its number, seconds, the most memory that the command and
+ * what it has started had at any line, and its file. Nothing where a bar is drawn. */
+void cli_progress_frame(struct cli_progress *progress, uint32_t frame, double seconds, const char *path);
 /* Removes the bar, so that other output can be written. */
 void cli_progress_clear(struct cli_progress *progress);
 /* The bar of a finished command stays; any other is removed. */

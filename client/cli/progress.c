@@ -211,11 +211,14 @@ static uint64_t resident_bytes(void)
     return bytes;
 }
 
-void cli_progress_frame(const struct cli_progress *progress, uint32_t frame, double seconds, const char *path)
+void cli_progress_frame(struct cli_progress *progress, uint32_t frame, double seconds, const char *path)
 {
     if (progress->silent || progress->form == CLI_PROGRESS_BAR)
         return;
-    fprintf(stderr, "frame %u: %.2f s, %.0f MB, ", frame, seconds, (double)resident_bytes() * 1e-6);
+    /* The last pictures may be written when their daemon has ended. */
+    const uint64_t now_bytes = resident_bytes();
+    progress->resident_bytes = now_bytes > progress->resident_bytes ? now_bytes : progress->resident_bytes;
+    fprintf(stderr, "frame %u: %.2f s, %.0f MB, ", frame, seconds, (double)progress->resident_bytes * 1e-6);
     plain_text_print(stderr, path);
     fputc('\n', stderr);
 }
