@@ -1,17 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/registry.h"
 
+#include "base/hashmap.h"
+
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-struct object {
-    enum gpu_object_kind kind;
-    unsigned name;
-};
-
+/* A map, as hundreds of jobs have 100,000 objects, and end together. */
 struct gpu_registry {
-    struct object *objects;
-    size_t count, capacity;
+    struct hashmap objects; /* by kind and name; the values say nothing */
+    size_t counts[GPU_OBJECT_KIND_COUNT];
 };
 
 struct gpu_registry *gpu_registry_create(void)
@@ -23,8 +21,13 @@ void gpu_registry_destroy(struct gpu_registry *registry)
 {
     if (!registry)
         return;
-    free(registry->objects);
+    hashmap_finish(&registry->objects);
     free(registry);
+}
+
+static uint64_t key_of(enum gpu_object_kind kind, unsigned name)
+{
+    return (uint64_t)kind << 32 | name;
 }
 
 static unsigned create_name(enum gpu_object_kind kind)
@@ -91,46 +94,36 @@ static void delete_name(enum gpu_object_kind kind, GLuint name)
 
 unsigned gpu_object_create(struct gpu_registry *registry, enum gpu_object_kind kind)
 {
-    if (registry->count == registry->capacity) {
-        size_t capacity = registry->capacity ? registry->capacity * 2 : 64;
-        struct object *objects = realloc(registry->objects, capacity * sizeof(*objects));
-        if (!objects)
-            return 0;
-        registry->objects = objects;
-        registry->capacity = capacity;
-    }
     unsigned name = create_name(kind);
-    if (name)
-        registry->objects[registry->count++] = (struct object){kind, name};
+    if (!name)
+        return 0;
+    if (!hashmap_put(&registry->objects, key_of(kind, name), registry)) {
+        delete_name(kind, name);
+        return 0;
+    }
+    registry->counts[kind]++;
     return name;
 }
 
 void gpu_object_destroy(struct gpu_registry *registry, enum gpu_object_kind kind, unsigned name)
 {
-    if (!name)
+    if (!name || !hashmap_remove(&registry->objects, key_of(kind, name)))
         return;
-    /* The newest objects tend to go first. */
-    for (size_t i = registry->count; i-- > 0;) {
-        if (registry->objects[i].kind == kind && registry->objects[i].name == name) {
-            delete_name(kind, name);
-            registry->objects[i] = registry->objects[--registry->count];
-            return;
-        }
-    }
+    delete_name(kind, name);
+    registry->counts[kind]--;
 }
 
 void gpu_registry_destroy_all(struct gpu_registry *registry)
 {
-    while (registry->count > 0) {
-        struct object object = registry->objects[--registry->count];
-        delete_name(object.kind, object.name);
-    }
+    size_t cursor = 0;
+    uint64_t key;
+    while (hashmap_next(&registry->objects, &cursor, &key, NULL))
+        delete_name((enum gpu_object_kind)(key >> 32), (GLuint)key);
+    hashmap_finish(&registry->objects);
+    *registry = (struct gpu_registry){0};
 }
 
 size_t gpu_registry_count(const struct gpu_registry *registry, enum gpu_object_kind kind)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < registry->count; i++)
-        count += registry->objects[i].kind == kind;
-    return count;
+    return registry->counts[kind];
 }
