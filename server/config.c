@@ -69,19 +69,20 @@ static const struct option options[] = {
     {"engine", "encode_threads", START, OPTION_U32, AT(encode_threads), "0", 0, 64, "",
      "Threads that encode frames, of which one user or key has all but one at most; 0: one per core, 2 to 4"},
 
-    {"memory", "scene", ANYTIME, OPTION_BYTES, AT(scene_bytes), "25%", MIB, 16 * TIB, "bytes",
-     "Host memory of one scene, and of all together without their blobs; a percentage is of the host's memory"},
-    {"memory", "blobs", ANYTIME, OPTION_BYTES, AT(limits.blob_bytes), "25%", MIB, 16 * TIB, "bytes",
+    {"memory", "scene", ANYTIME, OPTION_BYTES, AT(scene_bytes), "10%", MIB, 16 * TIB, "bytes",
+     "Host memory of one scene, and of all together without their blobs. A percentage is of what the daemon may have: of "
+     "the host's memory, or of the limit of its control group (cgroup) if that is lower"},
+    {"memory", "blobs", ANYTIME, OPTION_BYTES, AT(limits.blob_bytes), "20%", MIB, 16 * TIB, "bytes",
      "Host memory of all blobs together: vertices, texels and the like"},
     {"memory", "blob_cache", ANYTIME, OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
      "The part of it for blobs that are no longer used, kept for a user's next connection"},
-    {"memory", "transactions", ANYTIME, OPTION_BYTES, AT(limits.transaction_bytes), "10%", MIB, 16 * TIB, "bytes",
+    {"memory", "transactions", ANYTIME, OPTION_BYTES, AT(limits.transaction_bytes), "5%", MIB, 16 * TIB, "bytes",
      "Host memory of the edits of all clients that wait to be committed"},
-    {"memory", "frames", ANYTIME, OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
+    {"memory", "frames", ANYTIME, OPTION_BYTES, AT(limits.frame_bytes), "15%", MIB, 16 * TIB, "bytes",
      "Host memory of the frames of all jobs; a job that may need more waits for others to end"},
     {"memory", "device", START, OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
-     "Device memory; 0: 70 % of the device's own, of the host's for software GL, 85 % of what is free where the driver "
-     "tells no more, 2 GiB (at most a quarter of the host's) where it tells nothing"},
+     "Device memory; 0: 70 % of the device's own, 85 % of what is free where the driver tells no more, 2 GiB (at most 25 % "
+     "of what the daemon may have of the host's) where it tells nothing. Software GL has 25 % of the latter"},
     {"memory", "programs", START, OPTION_BYTES, AT(program_bytes), "256M", 0, 16 * TIB, "bytes",
      "Size of the compiled programs that are kept on the disk, in the folder farlight of $XDG_CACHE_HOME or ~/.cache; "
      "beyond it, those that were used longest ago are removed. 0: no limit"},
@@ -182,7 +183,7 @@ static bool parse_bool(const char *text, bool *value)
     return *value || strcmp(text, "no") == 0 || strcmp(text, "false") == 0 || strcmp(text, "0") == 0;
 }
 
-/* "16M", "25%" (of the host's memory, for bytes), "1024" */
+/* "16M", "25%" (of the memory that this process may have, for bytes), "1024" */
 static bool parse_number(const char *text, bool bytes, uint64_t *value)
 {
     if (!isdigit((unsigned char)text[0]))
@@ -457,13 +458,6 @@ static void print_value(const struct config *config, const struct option *option
     }
 }
 
-static bool is_default(const struct config *config, const struct option *option)
-{
-    struct config defaults;
-    config_defaults(&defaults);
-    return is_same(config, &defaults, option);
-}
-
 /* The lines stay short, as who reads a file takes no lines of any length. */
 static void print_comment(const char *text, FILE *stream)
 {
@@ -491,6 +485,8 @@ static void print_doc(const struct option *option, FILE *stream)
 
 bool config_dump(const struct config *config, FILE *stream)
 {
+    struct config defaults;
+    config_defaults(&defaults);
     fprintf(stream, "# farlightd %s. Options that are commented out have their defaults.\n", FARLIGHT_VERSION);
     for (size_t i = 0; i < OPTION_COUNT; i++) {
         const struct option *option = &options[i];
@@ -498,7 +494,7 @@ bool config_dump(const struct config *config, FILE *stream)
             fprintf(stream, "\n[%s]\n", option->section);
         print_doc(option, stream);
         /* A default is written as in the table, since some depend on the host. */
-        if (is_default(config, option)) {
+        if (is_same(config, &defaults, option)) {
             fprintf(stream, "#%s = %s\n", option->key, option->default_text);
             continue;
         }

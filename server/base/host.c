@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/host.h"
 
+#include "base/cgroup.h"
+
 #include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +23,9 @@ bool host_user_runtime_folder(char *folder, size_t folder_bytes)
 uint64_t host_memory_bytes(void)
 {
     long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-    return pages > 0 && page_bytes > 0 ? (uint64_t)pages * (uint64_t)page_bytes : BYTES_IF_UNKNOWN;
+    uint64_t bytes = pages > 0 && page_bytes > 0 ? (uint64_t)pages * (uint64_t)page_bytes : BYTES_IF_UNKNOWN;
+    uint64_t group_bytes = cgroup_memory_limit_bytes("/proc/self/cgroup", "/sys/fs/cgroup");
+    return group_bytes < bytes ? group_bytes : bytes;
 }
 
 void host_thread_gives_way(void)

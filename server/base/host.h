@@ -12,7 +12,8 @@
 #define HOST_RUNTIME_FOLDER "/run/farlight"
 bool host_user_runtime_folder(char *folder, size_t folder_bytes); /* false: there is none */
 
-/* Physical memory; 8 GiB where the system does not tell. */
+/* Memory that this process may have: the host's (8 GiB where the system does not tell), or the limit of its
+ * control group if that is lower. */
 uint64_t host_memory_bytes(void);
 
 /* Lowers the priority of the calling thread, and of those that it starts later, so that frames go first. On Linux

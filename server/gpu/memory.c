@@ -5,8 +5,12 @@
 
 #include <epoxy/gl.h>
 
-/* Of all memory that there is: the rest is for other programs, and for what drivers keep beside what is asked. */
+/* Share of a device's own memory: the rest is for other programs, and for what drivers keep beside what is asked.
+ */
 #define SHARE_PERCENT 70
+/* Share of the host's memory for software GL. Scenes, blobs, edits and frames have 50 % of it (server/config.c); a
+ * quarter is left to what none of these limits counts, and to other programs. */
+#define HOST_SHARE_PERCENT 25
 /* Of what is free: other programs have theirs already. */
 #define FREE_SHARE_PERCENT 85
 /* Where nothing is told. Devices with OpenGL 4.5 and less memory of their own are rare; an integrated one shares
@@ -46,6 +50,7 @@ uint64_t gpu_memory_default_limit(const struct gpu_memory *memory, uint64_t host
     const uint64_t of_host = host_bytes / UNTOLD_HOST_PARTS;
     switch (memory->source) {
     case GPU_MEMORY_HOST:
+        return memory->bytes / 100 * HOST_SHARE_PERCENT;
     case GPU_MEMORY_TOTAL:
         return memory->bytes / 100 * SHARE_PERCENT;
     case GPU_MEMORY_FREE:

@@ -5,7 +5,9 @@
 
 #include "config.h"
 
+#include "base/host.h"
 #include "base/log.h"
+#include "gpu/memory.h"
 #include "tests/harness/test.h"
 
 #include <stdlib.h>
@@ -44,6 +46,18 @@ TEST(the_defaults_are_within_their_own_bounds)
     assert_int_not_equal(config.scene_bytes, 0);
     assert_string_equal(config.device, "auto");
     assert_false(config.insecure);
+}
+
+/* With software GL, whose device is the host's memory. */
+TEST(the_default_limits_of_memory_are_three_quarters_of_what_there_is_at_most)
+{
+    struct config config;
+    config_defaults(&config);
+    const struct gpu_memory memory = {GPU_MEMORY_HOST, host_memory_bytes()};
+    const uint64_t all_bytes = config.scene_bytes + config.limits.blob_bytes + config.limits.transaction_bytes +
+                               config.limits.frame_bytes + gpu_memory_default_limit(&memory, memory.bytes);
+    assert_in_range(all_bytes, memory.bytes / 100 * 70, memory.bytes / 100 * 75);
+    assert_in_range(config.limits.blob_cache_bytes, 1, config.limits.blob_bytes);
 }
 
 TEST(a_file_sets_numbers_with_units_texts_and_switches)
