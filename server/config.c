@@ -154,6 +154,9 @@ static const struct option options[] = {
      "Minimum rate of a message that takes longer"},
     {"network", "idle", ANYTIME, OPTION_U32, AT(connection.idle_ms), "120000", 0, 86400000, "ms",
      "Silence after which a client that waits for nothing is disconnected; 0: never"},
+    {"network", "lost_after", ANYTIME, OPTION_U32, AT(connection.lost_ms), "600000", 0, 86400000, "ms",
+     "Silence after which a client that waits for a frame or an answer is disconnected, though it is pinged twice in that "
+     "time; 0: never"},
     {"network", "queued_soft", ANYTIME, OPTION_BYTES, AT(connection.queued_soft_bytes), "16M", MIB, 16 * GIB, "bytes",
      "Output waiting for a client beyond which nothing more is read from it, .."},
     {"network", "queued_soft_time", ANYTIME, OPTION_U32, AT(connection.queued_soft_ms), "10000", 10, 600000, "ms",

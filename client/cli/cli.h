@@ -196,11 +196,12 @@ struct cli_output {
     enum cli_image image;
 };
 
-/* How long a lost daemon is waited for, without a new frame in between. */
+/* When a daemon counts as lost, and how long a lost one is waited for, without a new frame in between. */
 struct cli_retries {
     bool has_count, has_duration;
     unsigned count; /* in a row */
     double for_s;
+    unsigned lost_after_ms; /* as of fl_connect */
 };
 
 /* Options of an animation. */
@@ -417,6 +418,8 @@ uint32_t cli_retry_pause_ms(unsigned failures, uint32_t min_ms);
 bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interrupted */
 /* A value of --retry-for; false: the error says what is allowed. */
 bool cli_read_retry_for(const char *value, struct cli_retries *retries, struct fl_error *error);
+/* The same of --lost-after. */
+bool cli_read_lost_after(const char *value, struct cli_retries *retries, struct fl_error *error);
 /* The time for a connection of which `left_s` are left to retry: at least a second, at most the library's own
  * time, which 0 stands for. */
 unsigned cli_connect_timeout_ms(double left_s);
@@ -427,7 +430,7 @@ struct cli_daemon {
     const char *server, *key_file; /* as typed */
     struct cli_retries retries;
 };
-/* --server, --key and --retry-for: a child parser; its input is a struct cli_daemon. */
+/* --server, --key, --retry-for and --lost-after: a child parser; its input is a struct cli_daemon. */
 extern const struct argp cli_daemon_argp;
 /* Interruptible from then on. Tries again for the time of --retry-for, if that was given. Without --server
  * FARLIGHT_SERVER counts; if neither names a daemon, a private one is started, or (`must_be_named`) it is

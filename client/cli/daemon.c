@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { KEY_KEY = 0x400, KEY_RETRY_FOR };
+enum { KEY_KEY = 0x400, KEY_RETRY_FOR, KEY_LOST_AFTER };
 
 static const struct argp_option options[] = {
     {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
@@ -15,6 +15,8 @@ static const struct argp_option options[] = {
      "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
     {"retry-for", KEY_RETRY_FOR, "DURATION", 0,
      "Wait for a daemon that is not there for this long, in seconds or as 5m or 2h (default 0)", 0},
+    {"lost-after", KEY_LOST_AFTER, "DURATION", 0,
+     "Give up a daemon that answers nothing for this long, not even a ping (default 1m)", 0},
     {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)
@@ -23,7 +25,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     struct fl_error error = {0};
     if (key == KEY_RETRY_FOR && !cli_read_retry_for(value, &daemon->retries, &error))
         argp_failure(state, CLI_USAGE, 0, "--retry-for: %s", error.text);
-    if (key == KEY_RETRY_FOR)
+    if (key == KEY_LOST_AFTER && !cli_read_lost_after(value, &daemon->retries, &error))
+        argp_failure(state, CLI_USAGE, 0, "--lost-after: %s", error.text);
+    if (key == KEY_RETRY_FOR || key == KEY_LOST_AFTER)
         return 0;
     if (key != 's' && key != KEY_KEY)
         return ARGP_ERR_UNKNOWN;
@@ -72,7 +76,8 @@ struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const 
     const struct fl_connect_options wanted = {.server = server,
                                               .key_file = cli_key_file(server, daemon->key_file),
                                               .name = name,
-                                              .interrupt_fd = cli_interrupt_fd()};
+                                              .interrupt_fd = cli_interrupt_fd(),
+                                              .lost_after_ms = daemon->retries.lost_after_ms};
     return daemon->retries.has_duration ? connect_within(wanted, daemon->retries.for_s, error)
                                         : fl_connect(&wanted, error);
 }

@@ -55,6 +55,7 @@ enum key {
     KEY_CLIP_SPEED,
     KEY_LAYERS,
     KEY_LIGHT_GROUP,
+    KEY_LOST_AFTER,
     KEY_RETRY_FOR,
     KEY_RETRIES,
     KEY_METADATA,
@@ -98,6 +99,11 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"key", KEY_KEY, "FILE", 0,
      "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)",
+     CLI_GROUP_OUTPUT},
+    {"lost-after", KEY_LOST_AFTER, "DURATION", 0,
+     "Take a daemon for lost that answers nothing for this long, not even a ping, in seconds or as 5m or 2h "
+     "(default "
+     "1m)",
      CLI_GROUP_OUTPUT},
     {"retry-for", KEY_RETRY_FOR, "DURATION", 0,
      "Reconnect to a lost daemon for this long, in seconds or as 5m or 2h (default 5m, view: until it ends; 0: "
@@ -444,6 +450,11 @@ static error_t set_retry_duration(struct cli_job *job, const char *field, const 
     return cli_read_retry_for(value, &job->retries, &job->error) ? 0 : name_field(job, field);
 }
 
+static error_t set_lost_after(struct cli_job *job, const char *field, const char *value)
+{
+    return cli_read_lost_after(value, &job->retries, &job->error) ? 0 : name_field(job, field);
+}
+
 static error_t set_option(struct cli_job *job, int key, const char *field, const char *value)
 {
     switch (key) {
@@ -567,6 +578,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return job->full_metadata || strcmp(value, "stable") == 0
                    ? 0
                    : cli_usage(job, field, "'%s' is not known (known: stable, full)", value);
+    case KEY_LOST_AFTER:
+        return set_lost_after(job, field, value);
     case KEY_RETRY_FOR:
         return set_retry_duration(job, field, value);
     case KEY_RETRIES:

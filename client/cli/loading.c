@@ -35,6 +35,7 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
                                                .name = "farlight",
                                                .interrupt_fd = cli_interrupt_fd(),
                                                .timeout_ms = loading->timeout_ms,
+                                               .lost_after_ms = job->retries.lost_after_ms,
                                                .daemon_arguments = loading->daemon_arguments};
     loading->connect_begin_ns = monotonic_now_ns();
     loading->connection = fl_connect(&connect, error);

@@ -11,7 +11,8 @@
 #define LONGEST_PAUSE_MS 30000u
 #define DOUBLINGS_MAX 6u
 #define RETRY_MAX_S 2592000.0 /* 30 days */
-#define USUAL_TIMEOUT_S 30.0  /* of fl_connect */
+#define LOST_AFTER_MIN_S 3.0
+#define USUAL_TIMEOUT_S 30.0 /* of fl_connect */
 
 bool cli_is_temporary(const struct fl_error *error)
 {
@@ -33,6 +34,18 @@ bool cli_read_retry_for(const char *value, struct cli_retries *retries, struct f
 {
     retries->has_duration = true;
     return fl_text_duration(value, RETRY_MAX_S, &retries->for_s, error);
+}
+
+bool cli_read_lost_after(const char *value, struct cli_retries *retries, struct fl_error *error)
+{
+    double seconds;
+    if (!fl_text_duration(value, RETRY_MAX_S, &seconds, error))
+        return false;
+    if (seconds < LOST_AFTER_MIN_S)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is too short for two pings: at least %g seconds",
+                            value, LOST_AFTER_MIN_S);
+    retries->lost_after_ms = (unsigned)(seconds * 1e3);
+    return true;
 }
 
 unsigned cli_connect_timeout_ms(double left_s)

@@ -176,7 +176,8 @@ static bool connect_to(struct thumbnails *wanted, struct fl_error *error)
     const struct fl_connect_options connect = {.server = job->server,
                                                .key_file = cli_key_file(job->server, job->key_file),
                                                .name = "farlight",
-                                               .interrupt_fd = cli_interrupt_fd()};
+                                               .interrupt_fd = cli_interrupt_fd(),
+                                               .lost_after_ms = job->retries.lost_after_ms};
     wanted->connection = fl_connect(&connect, error);
     return wanted->connection != NULL;
 }

@@ -16,7 +16,6 @@
 #define SETTLE_NS                                                                                                 \
     150000000ull /* exporters write a file in one go, and the files of one model soon after another */
 #define WAIT_MS 50u
-#define PING_NS 2000000000ull
 #define FOLDER_EVENTS                                                                                             \
     (IN_CLOSE_WRITE | IN_MODIFY | IN_MOVED_TO | IN_MOVED_FROM | IN_CREATE | IN_DELETE | IN_ATTRIB | IN_ONLYDIR)
 
@@ -124,18 +123,9 @@ bool cli_watch_has_changed(struct cli_watch *watch, uint64_t now_ns)
 
 bool cli_watch_wait(struct cli_watch *watch, struct fl_connection *connection, struct fl_error *error)
 {
-    uint64_t now_ns = monotonic_now_ns(), ping_ns = now_ns;
-    for (; !cli_watch_has_changed(watch, now_ns); now_ns = monotonic_now_ns()) {
-        uint64_t round_trip_ns;
+    while (!cli_watch_has_changed(watch, monotonic_now_ns()))
         if (!fl_connection_wait(connection, WAIT_MS, error))
             return false;
-        if (now_ns - ping_ns < PING_NS)
-            continue;
-        /* Waits this short ask for none. */
-        ping_ns = now_ns;
-        if (!fl_ping(connection, &round_trip_ns, error))
-            return false;
-    }
     return true;
 }
 

@@ -13,6 +13,9 @@
 #include <unistd.h>
 
 #define DEFAULT_TIMEOUT_MS 30000u
+#define DEFAULT_LOST_AFTER_MS 60000u
+#define LONGEST_SILENCE_NS 30000000000ull
+#define PING_REQUEST UINT32_MAX /* beyond all requests of a connection, and of an importer's */
 /* A killed daemon's connections close before it has ended, which takes a busy machine a while. */
 #define LAST_WORDS_MS 2000
 #define DEFAULT_REMOTE_SOCKET "/run/farlight/farlight.sock"
@@ -121,15 +124,62 @@ void fl_connection_send_late(struct fl_connection *connection, uint32_t request,
         fl_connection_break(connection, &error);
 }
 
+/* Two pings at least before the daemon counts as lost, and one in time for the daemon's own limit of silence. */
+static uint64_t silence_ns(const struct fl_connection *connection)
+{
+    const uint64_t third_ns = connection->lost_after_ns / 3;
+    const uint64_t idle_ns = connection->limits.idle_seconds * UINT64_C(1000000000);
+    const uint64_t longest_ns = idle_ns > 0 && idle_ns / 3 < LONGEST_SILENCE_NS ? idle_ns / 3 : LONGEST_SILENCE_NS;
+    return third_ns < longest_ns ? third_ns : longest_ns;
+}
+
+static bool push_ping(struct fl_connection *connection, struct fl_error *error)
+{
+    struct message ping = {.type = MESSAGE_PING};
+    ping.ping.sent_ns = monotonic_now_ns();
+    /* Without room there is a message before it that the daemon has not taken. */
+    return !fl_stream_has_room(&connection->stream) ||
+           fl_stream_push(&connection->stream, PING_REQUEST, 0, &ping, error);
+}
+
+bool fl_connection_heed_silence(struct fl_connection *connection, struct fl_error *error)
+{
+    /* While our buffer is full we hear nothing, whatever was sent. */
+    const bool heard = connection->stream.heard || (fl_stream_events(&connection->stream) & POLLIN) == 0;
+    if (connection->lost_after_ns == 0 || (!heard && monotonic_now_ns() < connection->look_ns))
+        return true;
+    connection->stream.heard = false;
+    /* Time in which nobody listened, as while this process was stopped, is no silence of the daemon's. */
+    connection->silent_ns = heard ? 0 : connection->silent_ns + silence_ns(connection);
+    connection->look_ns = monotonic_now_ns() + silence_ns(connection);
+    if (heard)
+        return true;
+    if (connection->silent_ns < connection->lost_after_ns)
+        return push_ping(connection, error);
+    fl_error_set(error, FL_ERROR_CONNECTION, "",
+                 "the daemon counts as lost: it answered nothing, no ping either, for %g s",
+                 (double)connection->lost_after_ns * 1e-9);
+    fl_error_remedy(error, "see whether its process and the link to it still work");
+    error->retryable = true; /* a daemon was there */
+    return fl_connection_break(connection, error);
+}
+
 /* One round of poll and transfer. */
 static bool serve(struct fl_connection *connection, uint64_t deadline_ns, struct fl_error *error)
 {
     if (!fl_connection_push_late(connection, error))
         return false;
+    const uint64_t until_ns = connection->look_ns < deadline_ns ? connection->look_ns : deadline_ns;
     struct pollfd polled = {.fd = connection->stream.fd, .events = fl_stream_events(&connection->stream)};
-    if (!fl_wait(&polled, 1, connection->interrupt_fd, deadline_ns, error) ||
-        !fl_stream_transfer(&connection->stream, error))
+    const bool is_late = !fl_wait(&polled, 1, connection->interrupt_fd, until_ns, error);
+    if ((is_late && error->code != FL_ERROR_TIMEOUT) || !fl_stream_transfer(&connection->stream, error))
         return fl_connection_break(connection, error);
+    if (!fl_connection_heed_silence(connection, error))
+        return false;
+    if (is_late && until_ns == deadline_ns)
+        return fl_connection_break(connection, error);
+    if (is_late)
+        *error = (struct fl_error){0};
     return true;
 }
 
@@ -181,6 +231,8 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
             return -1;
         return 1;
     }
+    case MESSAGE_PONG:
+        return header->request == PING_REQUEST ? 1 : consume_frames(connection, header, message, error);
     case MESSAGE_CREDIT:
         if (message->credit.channel == FL_UPLOAD_CHANNEL && message->credit.total > connection->upload_credit)
             connection->upload_credit = message->credit.total;
@@ -435,6 +487,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     connection->interrupt_fd = options->interrupt_fd;
     connection->can_h264 = options->can_h264;
     connection->last_channel = FL_UPLOAD_CHANNEL;
+    connection->look_ns = UINT64_MAX;
     snprintf(connection->address, sizeof(connection->address), "%s",
              options->server ? options->server : "private");
     if (!open_link(connection, options, deadline_ns, error) ||
@@ -447,6 +500,9 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
         fl_connection_destroy(connection);
         return NULL;
     }
+    connection->lost_after_ns =
+        (options->lost_after_ms > 0 ? options->lost_after_ms : DEFAULT_LOST_AFTER_MS) * UINT64_C(1000000);
+    connection->look_ns = monotonic_now_ns() + silence_ns(connection);
     connection->start_ns = monotonic_now_ns() - begin_ns;
     return connection;
 }

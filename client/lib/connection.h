@@ -33,6 +33,9 @@ struct fl_connection {
     bool can_h264;                    /* this client and the daemon */
     struct fl_error broken;           /* why the connection is broken; code NONE: it works */
     struct message_stats_reply stats; /* the last answer */
+    uint64_t lost_after_ns;           /* of silence; 0: messages may not be sent yet */
+    uint64_t silent_ns;               /* counted while we listen, at most a part of it at a time */
+    uint64_t look_ns;                 /* when the next part of silence is over; UINT64_MAX: none is counted yet */
     uint64_t start_ns;
     bool local;
     bool said_goodbye;
@@ -87,9 +90,10 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
 /* Sends a question of one message and waits for its answer, for half a minute. */
 bool fl_connection_ask(struct fl_connection *connection, const struct message *question,
                        enum message_type expected, struct fl_received *received, struct fl_error *error);
-/* After this time a client sends something, as the daemon disconnects silent clients; and it notices if the daemon
- * is gone. */
-uint64_t fl_connection_silence_ns(const struct fl_connection *connection);
+/* Ends a round of waiting, which lasts until connection->look_ns at most: pings a daemon that was not heard for a
+ * while, which also keeps the daemon from disconnecting us for our silence. False: nothing was heard from it for
+ * lost_after_ns, and the connection is broken. */
+bool fl_connection_heed_silence(struct fl_connection *connection, struct fl_error *error);
 /* The daemon's error as ours; returns false. */
 bool fl_error_from_message(struct fl_error *error, const struct message_error *message);
 

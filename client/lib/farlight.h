@@ -89,6 +89,9 @@ struct fl_connect_options {
     bool can_h264;       /* frames of views may come in H.264, for the caller to decode */
     int interrupt_fd;    /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */
     unsigned timeout_ms; /* to connect, start and shake hands; 0: 30 s */
+    /* Silence after which the daemon counts as lost, though calls ping it: FL_ERROR_CONNECTION. A daemon answers
+     * pings however long it renders. 0: 60 s. */
+    unsigned lost_after_ms;
     const char *const *daemon_arguments; /* for a private daemon, NULL-terminated, at most 28; NULL: none */
 };
 
@@ -112,8 +115,8 @@ FL_API const char *fl_connection_address(const struct fl_connection *connection)
 FL_API bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,
                                      size_t address_bytes);
 /* Serves the connection for this long, as every call does while it waits: it receives changes of scenes, answers
- * the daemon's pings, and sends enough that the daemon does not disconnect it. False: it was interrupted, or the
- * daemon is gone. */
+ * the daemon's pings, and pings a silent daemon, so that neither takes the other for lost. False: it was
+ * interrupted, or the daemon is gone. */
 FL_API bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error);
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);

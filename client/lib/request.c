@@ -4,7 +4,6 @@
 #include "protocol/common/clock.h"
 
 #define ANSWER_NS 30000000000ull
-#define SILENCE_NS 30000000000ull
 
 bool fl_connection_ask(struct fl_connection *connection, const struct message *question,
                        enum message_type expected, struct fl_received *received, struct fl_error *error)
@@ -40,9 +39,9 @@ bool fl_stats(struct fl_connection *connection, const struct message_stats_reply
     return true;
 }
 
-/* Drains the connection until that time; messages that arrive meanwhile are dropped. */
-static bool listen_until(struct fl_connection *connection, uint64_t end_ns, struct fl_error *error)
+bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error)
 {
+    const uint64_t end_ns = monotonic_now_ns() + timeout_ms * UINT64_C(1000000);
     struct fl_received dropped;
     while (fl_connection_receive(connection, &dropped, end_ns, error))
         continue;
@@ -50,26 +49,6 @@ static bool listen_until(struct fl_connection *connection, uint64_t end_ns, stru
         return false;
     *error = (struct fl_error){0};
     return true;
-}
-
-uint64_t fl_connection_silence_ns(const struct fl_connection *connection)
-{
-    const uint64_t idle_ns = connection->limits.idle_seconds * UINT64_C(1000000000);
-    return idle_ns > 0 && idle_ns / 3 < SILENCE_NS ? idle_ns / 3 : SILENCE_NS;
-}
-
-bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error)
-{
-    const uint64_t end_ns = monotonic_now_ns() + timeout_ms * UINT64_C(1000000);
-    const uint64_t silence_ns = fl_connection_silence_ns(connection);
-    for (;;) {
-        const uint64_t now_ns = monotonic_now_ns();
-        if (now_ns + silence_ns >= end_ns)
-            return listen_until(connection, end_ns, error);
-        uint64_t round_trip_ns;
-        if (!listen_until(connection, now_ns + silence_ns, error) || !fl_ping(connection, &round_trip_ns, error))
-            return false;
-    }
 }
 
 bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,

@@ -15,11 +15,10 @@ struct load {
     struct fl_connection *connection;
     struct fl_importer *importer;
     struct fl_relay relay;
-    uint64_t credit_passed;   /* the upload credit that the importer was given */
-    uint64_t upload_begin_ns; /* 0: nothing was sent */
-    uint64_t commit_begin_ns; /* 0: no commit is waiting for its answer */
-    uint32_t commit_request;  /* as the daemon knows it */
-    uint64_t ping_due_ns;
+    uint64_t credit_passed;           /* the upload credit that the importer was given */
+    uint64_t upload_begin_ns;         /* 0: nothing was sent */
+    uint64_t commit_begin_ns;         /* 0: no commit is waiting for its answer */
+    uint32_t commit_request;          /* as the daemon knows it */
     struct fl_error refusal;          /* the daemon's first error for an importer's request */
     struct fl_imported *imported;     /* of this import; NULL: it is not remembered */
     const struct fl_imported *before; /* of the one before it; NULL: all is new */
@@ -185,44 +184,26 @@ static bool drain_daemon(struct load *load, struct fl_error *error)
 
 /* ---- both ---- */
 
-/* An importer may read and compute longer than the daemon's timeout for silent clients. The ping's number is out
- * of the range of the importer's requests; its answer is dropped. */
-static bool ping_in_time(struct load *load, struct fl_error *error)
-{
-    struct message ping = {.type = MESSAGE_PING};
-    const uint64_t now_ns = monotonic_now_ns();
-    if (now_ns < load->ping_due_ns)
-        return true;
-    load->ping_due_ns = now_ns + fl_connection_silence_ns(load->connection);
-    if (!fl_stream_has_room(&load->connection->stream))
-        return true; /* it is not silent */
-    ping.ping.sent_ns = now_ns;
-    return fl_stream_push(&load->connection->stream, UINT32_MAX, 0, &ping, error);
-}
-
 static bool exchange(struct load *load, struct fl_error *error)
 {
-    if (!ping_in_time(load, error))
-        return false;
-    struct fl_stream *daemon = &load->connection->stream, *importer = &load->importer->stream;
+    struct fl_connection *connection = load->connection;
+    struct fl_stream *daemon = &connection->stream, *importer = &load->importer->stream;
     struct pollfd polled[2] = {{.fd = daemon->fd, .events = fl_stream_events(daemon)},
                                {.fd = importer->fd, .events = fl_stream_events(importer)}};
     const uint64_t deadline_ns = load->importer->deadline_ns;
-    const uint64_t until_ns = load->ping_due_ns < deadline_ns ? load->ping_due_ns : deadline_ns;
-    if (!fl_wait(polled, 2, load->connection->interrupt_fd, until_ns, error)) {
-        if (error->code == FL_ERROR_TIMEOUT && until_ns < deadline_ns) {
-            *error = (struct fl_error){0};
-            return true;
-        }
-        if (error->code == FL_ERROR_TIMEOUT)
+    const uint64_t until_ns = connection->look_ns < deadline_ns ? connection->look_ns : deadline_ns;
+    if (!fl_wait(polled, 2, connection->interrupt_fd, until_ns, error)) {
+        if (error->code == FL_ERROR_TIMEOUT && until_ns == deadline_ns)
             fl_error_set(error, FL_ERROR_TIMEOUT, fl_importer_name(load->importer), "the import timed out");
-        return false;
+        if (error->code != FL_ERROR_TIMEOUT || until_ns == deadline_ns)
+            return false;
+        *error = (struct fl_error){0};
     }
     if (!fl_stream_transfer(daemon, error))
-        return fl_connection_break(load->connection, error);
+        return fl_connection_break(connection, error);
     if (!fl_stream_transfer(importer, error))
         return fl_importer_explain(load->importer, error);
-    return true;
+    return fl_connection_heed_silence(connection, error);
 }
 
 static bool relay_all(struct load *load, struct fl_error *error)
@@ -277,7 +258,6 @@ static bool pass_all(struct load *load, struct fl_scene *scene, struct fl_error 
 {
     struct fl_connection *connection = scene->connection;
     load->connection = connection;
-    load->ping_due_ns = monotonic_now_ns() + fl_connection_silence_ns(connection);
     load->relay = (struct fl_relay){
         .scene = scene->scene, .request_base = connection->last_request, .upload_base = connection->upload_sent};
     const bool loaded = relay_all(load, error);

@@ -166,9 +166,11 @@ bool fl_stream_write(struct fl_stream *stream, struct fl_error *error)
     while ((next = next_bytes(stream, &bytes))) {
         const ssize_t sent = send(stream->fd, next, bytes, MSG_NOSIGNAL);
         if (sent >= 0) {
+            stream->heard |= stream->is_blocked;
+            stream->is_blocked = false;
             advance(stream, (size_t)sent);
         } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
-            return true;
+            return stream->is_blocked = true;
         } else if (errno == EPIPE || errno == ECONNRESET) {
             /* Its last messages may still be in our receive buffer: they are read before the loss is reported. */
             drop_output(stream);
@@ -266,6 +268,7 @@ bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error)
         size_t bytes = FL_STREAM_BUFFER_BYTES - stream->in_end;
         uint8_t *space = stream->link ? sealed_link_space(stream->link, &bytes) : stream->in + stream->in_end;
         const ssize_t got = recv(stream->fd, space, bytes, 0);
+        stream->heard |= got > 0;
         if (got > 0 && !take(stream, (size_t)got, error))
             return false;
         if (got > 0)

@@ -17,10 +17,12 @@ struct sealed_link;
 #define FL_STREAM_BUFFER_BYTES (2u * FRAMING_MESSAGE_MAX_BYTES)
 
 struct fl_stream {
-    int fd;                           /* owned; -1: none */
-    uint32_t accept;                  /* bits of enum message_from: the allowed senders of received messages */
-    const char *peer;                 /* for error texts: "the daemon"; static */
-    bool ended;                       /* the peer will send nothing more */
+    int fd;           /* owned; -1: none */
+    uint32_t accept;  /* bits of enum message_from: the allowed senders of received messages */
+    const char *peer; /* for error texts: "the daemon"; static */
+    bool ended;       /* the peer will send nothing more */
+    bool is_blocked;  /* the last bytes that were to be sent found no space */
+    bool heard;       /* the peer sent bytes, or took some that had found no space; for the caller */
     uint8_t *in, *out, *scratch_data; /* FL_STREAM_BUFFER_BYTES, the same, SCRATCH_BYTES */
     size_t in_start, in_end, out_start, out_end;
     struct scratch scratch;

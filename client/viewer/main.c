@@ -332,6 +332,7 @@ static void fill(struct command_line *line)
     viewer->speed = job->clip_count > 0 ? job->clips[0].speed : 1;
     viewer->has_retry_for = job->retries.has_duration;
     viewer->retry_for_s = job->retries.for_s;
+    viewer->lost_after_ms = job->retries.lost_after_ms;
     viewer->interrupt_fd = cli_interrupt_fd();
     viewer->interrupt_signal = cli_interrupt_signal;
     viewer->note = job->quiet ? NULL : on_note;

@@ -139,7 +139,8 @@ static void *open_all(void *argument)
                                                .name = "farlight view",
                                                .can_h264 = true,
                                                .interrupt_fd = options->interrupt_fd,
-                                               .timeout_ms = connect_timeout_ms(session)};
+                                               .timeout_ms = connect_timeout_ms(session),
+                                               .lost_after_ms = options->lost_after_ms};
     set_progress(session, options->server ? options->server : "starting a daemon", 0);
     session->connection = fl_connect(&connect, &session->open_error);
     if (session->connection)

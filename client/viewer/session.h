@@ -25,6 +25,7 @@ struct session_options {
      * all. */
     bool has_retry_for;
     double retry_for_s;
+    unsigned lost_after_ms; /* as of fl_connect */
     int interrupt_fd;
     void (*note)(void *user, const struct fl_note *note); /* of the first load; called from another thread */
     /* Why changed files could not be loaded: the scene stays as it was. */

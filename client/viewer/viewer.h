@@ -39,8 +39,9 @@ struct viewer_options {
     bool headless;
     const char *replay; /* path; NULL: a person */
     bool quiet;
-    bool has_retry_for; /* else a daemon that was there is tried for ever, and one that was not is not */
-    double retry_for_s; /* likewise */
+    bool has_retry_for;     /* else a daemon that was there is tried for ever, and one that was not is not */
+    double retry_for_s;     /* likewise */
+    unsigned lost_after_ms; /* as of fl_connect */
     int interrupt_fd;
     int (*interrupt_signal)(void); /* which one came; 0: none */
     void (*note)(void *user, const struct fl_note *note);

@@ -40,6 +40,7 @@ struct session *viewer_open_session(struct viewer *viewer, const char *dropped, 
                                             .scene_name = dropped ? NULL : options->scene_name,
                                             .has_retry_for = options->has_retry_for && !dropped,
                                             .retry_for_s = options->retry_for_s,
+                                            .lost_after_ms = options->lost_after_ms,
                                             .interrupt_fd = options->interrupt_fd,
                                             .note = options->note};
     return session_create(&session, error);

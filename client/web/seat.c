@@ -306,7 +306,8 @@ static bool come_to_scene(struct seat *seat, struct fl_error *error)
                                                .key_file = seat->options.key_file,
                                                .name = "farlight-web",
                                                .can_h264 = true,
-                                               .interrupt_fd = seat->end_fd};
+                                               .interrupt_fd = seat->end_fd,
+                                               .lost_after_ms = seat->options.job->retries.lost_after_ms};
     seat->connection = fl_connect(&connect, error);
     if (seat->connection)
         seat->scene = fl_scene_attach(seat->connection, seat->options.scene, error);

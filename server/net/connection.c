@@ -335,6 +335,7 @@ static void receive(struct connection *connection)
             connection->in_used += (size_t)got;
         connection->received_bytes += (uint64_t)got;
         connection->last_received_ns = clock_now_ns();
+        connection->unanswered = 0;
         process(connection);
         if ((size_t)got < free_bytes)
             return; /* usually nothing is left; otherwise the loop reports it again */

@@ -23,6 +23,7 @@ struct connection_limits {
     uint32_t progress_grace_ms;    /* time that a message may take whatever its size; .. */
     uint32_t progress_bytes_per_s; /* .. after it, the minimum rate */
     uint32_t idle_ms;        /* silence of a client that waits for nothing, or that does not read; 0: no limit */
+    uint32_t lost_ms;        /* silence of a client that waits for something, though it is pinged; 0: no limit */
     uint32_t queued_soft_ms; /* how long more than queued_soft_bytes may wait for it */
     uint64_t queued_soft_bytes; /* nothing is read from a client while more than this waits for it */
     uint64_t queued_hard_bytes;
@@ -54,7 +55,7 @@ struct connection_handler {
     void (*invalid)(void *context, const struct framing_header *header, const struct decode_error *error);
     /* Little bulk is queued: queue more now. */
     void (*room)(void *context);
-    /* Whether the client waits for an answer or a frame, so that its silence is no sign of a lost client. */
+    /* Whether the client waits for an answer or a frame: it may be silent as long as it answers pings. */
     bool (*owed)(const void *context);
     /* The last call. The connection is freed when it returns. */
     void (*closed)(void *context);
@@ -97,6 +98,8 @@ struct connection {
     uint64_t closing_since_ns;
 
     uint64_t connected_ns, last_received_ns, last_sent_ns;
+    uint64_t looked_ns;  /* when it was last seen whether a ping is due */
+    unsigned unanswered; /* pings since the client was heard last */
     uint64_t received_bytes, sent_bytes;
 };
 

@@ -12,6 +12,10 @@
 #define NS_PER_S UINT64_C(1000000000)
 /* Timeout for the delivery of a goodbye. */
 #define GOODBYE_NS (2 * NS_PER_S)
+/* A client that waits hears a ping after each third of the time after which it counts as lost. */
+#define PINGS 2u
+/* One that is not read from cannot be answered: it hears so often that the daemon is there. */
+#define HELD_PING_NS NS_PER_S
 /* Shortest interval between two checks; the longest is a minute. */
 #define CHECK_MIN_NS (10 * NS_PER_MS)
 #define CHECK_MAX_NS (60 * NS_PER_S)
@@ -37,6 +41,53 @@ static bool is_idle(const struct connection *connection, uint64_t now_ns)
     uint64_t idle_ns = connection->limits->idle_ms * NS_PER_MS;
     return idle_ns && since(connection->last_received_ns, now_ns) >= idle_ns &&
            since(connection->last_sent_ns, now_ns) >= idle_ns && !connection->handler->owed(connection->context);
+}
+
+static uint64_t later(uint64_t a_ns, uint64_t b_ns)
+{
+    return a_ns > b_ns ? a_ns : b_ns;
+}
+
+/* UINT64_MAX: never. */
+static uint64_t ping_interval_ns(const struct connection *connection)
+{
+    if (connection->held)
+        return HELD_PING_NS;
+    return connection->limits->lost_ms ? connection->limits->lost_ms * NS_PER_MS / (PINGS + 1) : UINT64_MAX;
+}
+
+static void send_ping(struct connection *connection, uint64_t now_ns)
+{
+    struct message message;
+    message_init(&message, MESSAGE_PING);
+    message.ping.sent_ns = now_ns;
+    connection_send(connection, 0, 0, &message);
+}
+
+/* Pings a client that waits for something, or finds that it has answered none. Pings are counted, not time: when
+ * this process was stopped, what the client said meanwhile is read before the next one is due. */
+static void check_answers(struct connection *connection, uint64_t now_ns)
+{
+    uint64_t last_ns = later(connection->last_received_ns, connection->looked_ns);
+    char text[128];
+    if (since(last_ns, now_ns) < ping_interval_ns(connection))
+        return;
+    connection->looked_ns = now_ns;
+    if (connection->held || connection->over_soft_since_ns) {
+        connection->unanswered = 0;
+        if (!connection->out.queued_bytes)
+            send_ping(connection, now_ns);
+    } else if (!connection->handler->owed(connection->context)) {
+        connection->unanswered = 0;
+    } else if (connection->unanswered++ < PINGS) {
+        send_ping(connection, now_ns);
+    } else {
+        if (log_is_due(connection->entry.log_source, "answers no ping"))
+            log_write(LOG_INFO, "net", "disconnected a client that waits and answers no ping");
+        snprintf(text, sizeof(text), "no message for %u seconds, and no answer to pings",
+                 connection->limits->lost_ms / 1000);
+        connection_finish(connection, PROTOCOL_ERROR_TIMEOUT, "", text);
+    }
 }
 
 static void check_open(struct connection *connection, uint64_t now_ns)
@@ -68,7 +119,9 @@ static void check_open(struct connection *connection, uint64_t now_ns)
     if (is_idle(connection, now_ns)) {
         snprintf(text, sizeof(text), "no message for %u seconds", limits->idle_ms / 1000);
         connection_finish(connection, PROTOCOL_ERROR_TIMEOUT, "", text);
+        return;
     }
+    check_answers(connection, now_ns);
 }
 
 void timeouts_check(struct connection *connection, uint64_t now_ns)
@@ -121,13 +174,14 @@ uint64_t timeouts_next_check_ns(const struct connection *connection, uint64_t no
         else if (connection->message_began_ns)
             no_later(&wait_ns, connection->message_began_ns, limits->progress_grace_ms * NS_PER_MS, now_ns);
         uint64_t idle_ns = limits->idle_ms * NS_PER_MS;
-        uint64_t last_ns = connection->last_received_ns > connection->last_sent_ns ? connection->last_received_ns
-                                                                                   : connection->last_sent_ns;
+        uint64_t last_ns = later(connection->last_received_ns, connection->last_sent_ns);
         /* An idle client that waits for an answer is checked once a second. */
         if (idle_ns && since(last_ns, now_ns) < idle_ns)
             no_later(&wait_ns, last_ns, idle_ns, now_ns);
         else if (idle_ns)
             no_later(&wait_ns, now_ns, NS_PER_S, now_ns);
+        no_later(&wait_ns, later(connection->last_received_ns, connection->looked_ns),
+                 ping_interval_ns(connection), now_ns);
     }
     return wait_ns < CHECK_MIN_NS ? CHECK_MIN_NS : wait_ns;
 }

@@ -289,7 +289,7 @@ static void set_connection_limits(struct hub *hub, const struct connection_limit
     hub->options.connection_limits = *limits;
     hub->owner_limits = *limits;
     if (hub->options.owner_may_be_idle)
-        hub->owner_limits.idle_ms = 0;
+        hub->owner_limits.idle_ms = hub->owner_limits.lost_ms = 0;
 }
 
 /* A key is replaced because somebody has it that should not: its holders go at once. */

@@ -24,7 +24,7 @@ struct session;
 struct hub_options {
     struct session_limits limits;
     struct connection_limits connection_limits;
-    bool owner_may_be_idle; /* the client of daemon_serve_fd() is not sent away for its silence */
+    bool owner_may_be_idle; /* the client of daemon_serve_fd() is not disconnected for its silence */
     struct readers readers; /* of the Unix socket */
     struct engine_port engine;
     struct timeline *timeline;          /* hears of every frame that was sent; may be NULL */

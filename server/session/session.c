@@ -256,6 +256,7 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
         .transaction_edits = limits->transaction_edits,
         .scene_linger_seconds = seconds_of(options->engine_limits.scene_linger_ms),
         .scenes_lingering = (uint32_t)options->engine_limits.lingering_scenes,
+        .lost_after_ms = connection_limits->lost_ms,
 #define MEMORY_LIMIT(tracer, doc) .tracer##_memory_bytes = (uint64_t)limits->tracers.tracer##_mebibytes << 20,
 #define TRACER_LIMIT(tracer, field, min, max, doc) .tracer##_##field##_max = limits->tracers.tracer##_##field,
 #include "protocol/tracers.def"

@@ -262,6 +262,53 @@ class Lost(Animations):
                 self.assertEqual(self.digests(folder), self.whole())
                 self.assertIn("trying again", errors)
 
+    def test_a_daemon_that_falls_silent_is_given_up_after_both_times(self):
+        with Daemon() as daemon:
+            child = self.start("silent", "--server", daemon.address, "--lost-after", "3", "--retry-for", "1")
+            self.wait_for_files("silent", 2, child)
+            daemon.process.send_signal(signal.SIGSTOP)
+            try:
+                errors = self.finish(child, 75)
+            finally:
+                daemon.process.send_signal(signal.SIGCONT)
+            self.assertIn("counts as lost: it answered nothing, no ping either, for 3 s", errors)
+            self.assertIn("given up after", errors)
+            made = self.digests("silent")
+            self.assertEqual(made, {frame: self.whole()[frame] for frame in made})
+
+    def test_a_time_that_is_too_short_for_pings_is_refused(self):
+        for command in (["ping"], ["animate", self.model, "--frames", "1-2", "-o", "%d.png"]):
+            result = self.expect(farlight(*command, "--lost-after", "2.9"), 2)
+            self.assertRegex(result.stderr, "--lost-after: .*at least 3 seconds")
+
+    def test_a_daemon_that_was_silent_goes_on_in_time_or_is_found_again(self):
+        """Within one connection, after a ping that waited; and within a second one."""
+        for name, lost_after, is_lost in (("time", "12", False), ("again", "3", True)):
+            with self.subTest(lost_after=lost_after), Daemon() as daemon:
+                child = self.start(name, "--server", daemon.address, "--lost-after", lost_after, "--retry-for", "10m")
+                self.wait_for_files(name, 2, child)
+                daemon.process.send_signal(signal.SIGSTOP)
+                try:
+                    if is_lost:
+                        while "trying again" not in child.stderr.readline():
+                            self.assertIsNone(child.poll())
+                    else:
+                        time.sleep(5)
+                finally:
+                    daemon.process.send_signal(signal.SIGCONT)
+                errors = self.finish(child, 0)
+                self.assertEqual(self.digests(name), self.whole())
+                if not is_lost:
+                    self.assertNotIn("trying again", errors)
+
+    def test_a_private_daemon_that_falls_silent_is_started_again(self):
+        child = self.start("hangs", "--lost-after", "3")
+        self.wait_for_files("hangs", 2, child)
+        os.kill(children(child.pid, "farlightd")[0], signal.SIGSTOP)
+        errors = self.finish(child, 0)
+        self.assertIn("counts as lost", errors)
+        self.assertEqual(self.digests("hangs"), self.whole())
+
     def test_attempts_end_after_the_number_or_the_time_that_was_given(self):
         """With complete files only."""
         for name, options, tries in (("none", ["--retry-for", "0"], 0), ("two", ["--retries", "2"], 2), ("time", ["--retry-for", "1.5s"], None)):

@@ -95,6 +95,69 @@ TEST(a_silent_daemon_is_given_up_and_an_interruption_ends_the_wait)
     stop(daemon);
 }
 
+/* ---- a daemon that falls silent ---- */
+
+static unsigned pings;
+
+static void connect_with(void (*play)(struct daemon *daemon), unsigned lost_after_ms)
+{
+    pings = 0;
+    error = (struct fl_error){0};
+    played = start(play);
+    connection = fl_connect(
+        &(struct fl_connect_options){.server = played->address, .lost_after_ms = lost_after_ms}, &error);
+    assert_non_null(connection);
+}
+
+static void play_deaf(struct daemon *daemon)
+{
+    greet(daemon);
+    while (take(daemon))
+        pings += asked.type == MESSAGE_PING;
+}
+
+TEST(a_daemon_that_answers_no_ping_counts_as_lost)
+{
+    connect_with(play_deaf, 300);
+    assert_false(fl_connection_wait(connection, 600000, &error));
+    check_error(FL_ERROR_CONNECTION, "for 0.3 s");
+    assert_true(error.retryable);
+    leave_played(); /* from here on its thread counts no more */
+    assert_int_equal(pings, 2);
+}
+
+TEST(a_program_that_waits_in_short_turns_finds_a_lost_daemon_too)
+{
+    connect_with(play_deaf, 300);
+    while (fl_connection_wait(connection, 1, &error))
+        continue;
+    check_error(FL_ERROR_CONNECTION, "for 0.3 s");
+}
+
+static void play_only_pongs(struct daemon *daemon)
+{
+    greet(daemon);
+    while (take(daemon)) {
+        pings += asked.type == MESSAGE_PING;
+        tell_type(daemon, header.request, MESSAGE_PONG);
+    }
+}
+
+TEST(a_daemon_that_answers_pings_is_waited_for)
+{
+    connect_with(play_only_pongs, 3000); /* longer than a busy machine takes to answer */
+    assert_true(fl_connection_wait(connection, 3500, &error));
+    leave_played();
+    assert_in_range(pings, 1, 3);
+}
+
+TEST(time_in_which_nobody_listens_is_no_silence_of_the_daemons)
+{
+    connect_with(play_deaf, 900);
+    usleep(1000000);
+    assert_true(fl_connection_wait(connection, 0, &error));
+}
+
 TEST(wrong_addresses_are_reported)
 {
     static const char *const wrong[] = {

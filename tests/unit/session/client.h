@@ -26,6 +26,7 @@ struct client {
     struct message message;
     uint64_t capabilities, upload_credit;
     struct handshake_limits limits;
+    unsigned pings;   /* of the daemon's: how many came */
     unsigned blocked; /* how often it was told so, and why the last time */
     char blocked_text[129];
 };
@@ -155,7 +156,9 @@ static inline const struct message *receive_now(struct client *client)
         if (!message_decode(&client->message, frame.header.type, frame.payload, frame.header.payload_bytes,
                             &client->scratch, &error))
             fail_msg("%s: %s", error.field, error.text);
-        if (client->message.type == MESSAGE_CREDIT)
+        if (client->message.type == MESSAGE_PING)
+            client->pings++;
+        else if (client->message.type == MESSAGE_CREDIT)
             client->upload_credit = client->message.credit.total;
         else if (client->message.type == MESSAGE_BLOCKED && ++client->blocked)
             snprintf(client->blocked_text, sizeof(client->blocked_text), "%s", client->message.blocked.text);

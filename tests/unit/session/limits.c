@@ -92,6 +92,7 @@ TEST(every_limit_is_stated_in_the_handshake)
                               .progress_grace_ms = 12600,
                               .progress_bytes_per_s = 127,
                               .idle_ms = 128999,
+                              .lost_ms = 136,
                               .queued_soft_ms = 12900,
                               .queued_soft_bytes = 130000,
                               .queued_hard_bytes = 131000},
@@ -136,6 +137,7 @@ TEST(every_limit_is_stated_in_the_handshake)
         .scene_linger_seconds = 133,
         .scenes_lingering = 134,
         .ldc_layers_max = 116,
+        .lost_after_ms = 136,
     };
     start_daemon();
     struct client *client = come(false);

@@ -236,6 +236,73 @@ TEST(a_silent_client_is_disconnected_unless_it_waits)
     expect_closed();
 }
 
+static void answer_ping(void)
+{
+    const unsigned before = client.pings;
+    while (client.pings == before) {
+        struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+        assert_int_equal(poll(&fd, 1, 60000), 1);
+        if (receive_now())
+            fail_msg("%s came in place of a ping", message_type_text(client.message.type));
+    }
+    struct message message = made(MESSAGE_PONG);
+    send_message(0, 0, &message);
+}
+
+/* Two pings without an answer, each a third of the time after the one before. */
+TEST(a_client_that_waits_and_answers_no_ping_is_disconnected)
+{
+    struct connection_limits limits = patient;
+    limits.lost_ms = 3000; /* longer than a busy machine takes to answer */
+    start(&limits);
+    greet();
+    atomic_store(&engine.keep_jobs, true);
+    open_scene(1, 1);
+    struct message message = render_message(5, 10);
+    send_message(2, 0, &message);
+    answer_ping();
+    answer_ping();
+    expect_error(0, PROTOCOL_ERROR_TIMEOUT);
+    assert_non_null(strstr(client.message.error.text, "3 seconds"));
+    assert_int_equal(client.pings, 4);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_closed();
+}
+
+TEST(a_client_that_waits_for_nothing_is_not_pinged)
+{
+    struct connection_limits limits = patient;
+    limits.lost_ms = 90;
+    start(&limits);
+    greet();
+    usleep(400000);
+    expect_alive(1);
+    assert_int_equal(client.pings, 0);
+}
+
+/* Its own pings wait with its commands. */
+TEST(a_client_that_is_not_read_from_hears_that_the_daemon_is_there)
+{
+    enum { COMMANDS = 64 };
+    start(&patient);
+    greet();
+    atomic_store(&engine.full, true);
+    struct message message = made(MESSAGE_SCENE_OPEN);
+    message.scene_open.scene = 1;
+    send_message(1, 0, &message);
+    message = made(MESSAGE_EDIT_COMMIT);
+    for (uint32_t request = 2; request <= COMMANDS; request++) {
+        begin_edit(request, 1);
+        send_message(request, 0, &message);
+    }
+    answer_ping();
+    answer_ping();
+    atomic_store(&engine.full, false);
+    for (uint32_t request = 1; request <= COMMANDS; request++)
+        expect(MESSAGE_OK, request);
+    expect_alive(COMMANDS + 1);
+}
+
 TEST(a_client_that_does_not_read_is_disconnected)
 {
     struct connection_limits limits = patient;
