@@ -108,8 +108,9 @@ static const struct option options[] = {
      "or network that has most, chosen at random"},
     {"limits", "unauthenticated_per_address", ANYTIME, OPTION_U32, AT(limits.unauthenticated_per_address), "8", 1, 65536, "",
      "The same, from one TCP address; a newcomer takes the place of another one, chosen at random"},
-    {"limits", "wrong_keys", ANYTIME, OPTION_U32, AT(limits.wrong_keys_a_minute), "5", 1, ATTEMPTS_LIMIT_MAX, "",
-     "Wrong keys from one TCP address within a minute; further keys from it are refused until the minute is over"},
+    {"limits", "handshakes", ANYTIME, OPTION_U32, AT(limits.handshakes_a_second), "500", 1, 1000000, "",
+     "Sealed handshakes from one TCP address, or IPv6 network of 64 bits, within a second. Further ones wait for their "
+     "turn, whatever their key"},
     {"limits", "requests", ANYTIME, OPTION_U32, AT(limits.requests_in_flight), "64", 1, 65536, "",
      "Requests of one client in flight"},
     {"limits", "scenes", ANYTIME, OPTION_U32, AT(limits.scenes_per_client), "8", 1, 65536, "", "Open scenes of one client"},

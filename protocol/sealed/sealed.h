@@ -49,8 +49,9 @@ struct sealed_key {
 /* In messages 2 and 4. */
 enum sealed_status {
     SEALED_WELCOME = 0,
-    SEALED_WRONG_KEY = 1,     /* message 4: the proof fits no key of the server's */
-    SEALED_TOO_MANY = 2,      /* message 2: this address has failed too often; in a minute it may try again */
+    SEALED_WRONG_KEY = 1, /* message 4: the proof fits no key of the server's */
+    SEALED_TOO_MANY =
+        2, /* message 2, of older servers: this address has failed too often; it may again in a minute */
     SEALED_NO_KEY = 3,        /* message 2: the server has no key at all */
     SEALED_OTHER_VERSION = 4, /* message 2: it does not speak this version */
 };

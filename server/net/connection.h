@@ -40,8 +40,8 @@ struct connection_entry {
 
 /* Calls to the layer above; `context` is that of connection_create(). */
 struct connection_handler {
-    /* A client begins a sealed connection. False: it may not try a key now. */
-    bool (*key_allowed)(void *context);
+    /* A client begins a sealed connection: 0, or after what time it may, which is asked again then. */
+    uint64_t (*seal_wait_ns)(void *context);
     void (*key_failed)(void *context);
     /* The client holds the key of that index; its hello is next. */
     void (*key_proved)(void *context, size_t index);
@@ -84,6 +84,7 @@ struct connection {
     struct loop_deferred turn_end;
 
     struct sealed_link *link; /* NULL: the connection is not sealed */
+    uint64_t seal_due_ns;     /* when its sealed handshake may begin; 0: it need not wait */
     uint8_t *in;              /* in_capacity is what the largest message allowed in this state needs */
     size_t in_capacity, in_used;
     struct scratch scratch;

@@ -86,10 +86,10 @@ static void begin_seal(struct connection *connection)
         refuse_seal(connection, SEALED_NO_KEY);
         return;
     }
-    if (!connection->handler->key_allowed(connection->context)) {
-        refuse_seal(connection, SEALED_TOO_MANY);
-        return;
-    }
+    uint64_t wait_ns = connection->handler->seal_wait_ns(connection->context);
+    connection->seal_due_ns = wait_ns ? clock_now_ns() + wait_ns : 0;
+    if (wait_ns)
+        return; /* timeouts_check() comes back to it */
     struct sealed_link *link = sealed_link_server(entry->keys, entry->key_count);
     if (!link) {
         log_write(LOG_ERROR, "net", "cannot accept a client: out of memory, or no random numbers");
@@ -186,10 +186,12 @@ static void answer_hello(struct connection *connection)
 
 void greeting_process(struct connection *connection)
 {
-    if (!connection->link && connection->in_used && connection->in[0] == SEALED_MAGIC[0])
+    bool is_sealed = connection->link || (connection->in_used && connection->in[0] == SEALED_MAGIC[0]);
+    if (is_sealed && !connection->link && connection->seal_due_ns <= clock_now_ns())
         begin_seal(connection);
     if (connection->state == CONNECTION_HELLO && connection->link && !sealed_is_open(connection->link->sealed))
         go_on_with_seal(connection);
-    if (connection->state == CONNECTION_HELLO && (!connection->link || sealed_is_open(connection->link->sealed)))
+    if (connection->state == CONNECTION_HELLO &&
+        (!is_sealed || (connection->link && sealed_is_open(connection->link->sealed))))
         answer_hello(connection);
 }

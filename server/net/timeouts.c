@@ -130,6 +130,8 @@ void timeouts_check(struct connection *connection, uint64_t now_ns)
     case CONNECTION_HELLO:
         if (since(connection->connected_ns, now_ns) >= connection->limits->handshake_ms * NS_PER_MS)
             connection_close(connection);
+        else if (connection->seal_due_ns)
+            greeting_process(connection);
         return;
     case CONNECTION_WRONG_KEY:
         if (since(connection->closing_since_ns, now_ns) >= connection->limits->wrong_key_ms * NS_PER_MS)
@@ -160,9 +162,11 @@ uint64_t timeouts_next_check_ns(const struct connection *connection, uint64_t no
 {
     const struct connection_limits *limits = connection->limits;
     uint64_t wait_ns = CHECK_MAX_NS;
-    if (connection->state == CONNECTION_HELLO)
+    if (connection->state == CONNECTION_HELLO) {
         no_later(&wait_ns, connection->connected_ns, limits->handshake_ms * NS_PER_MS, now_ns);
-    else if (connection->state == CONNECTION_WRONG_KEY)
+        if (connection->seal_due_ns)
+            no_later(&wait_ns, now_ns, since(now_ns, connection->seal_due_ns), now_ns);
+    } else if (connection->state == CONNECTION_WRONG_KEY)
         no_later(&wait_ns, connection->closing_since_ns, limits->wrong_key_ms * NS_PER_MS, now_ns);
     else if (connection->state != CONNECTION_OPEN)
         no_later(&wait_ns, connection->closing_since_ns, GOODBYE_NS, now_ns);

@@ -217,16 +217,33 @@ static void on_engine(void *context, uint32_t epoll_events)
 
 /* ---- clients ----------------------------------------------------------------------------------------- */
 
-/* One that says nothing and has most of its kind gives way, by chance: an owner that takes all places loses its
- * own, and cannot tell which. */
+static bool may_be_turned_away(const struct session *session, const struct owner *owner, bool has_wrong_key)
+{
+    return session->owner == owner && session->is_unauthenticated &&
+           (session->connection->state == CONNECTION_WRONG_KEY || !has_wrong_key);
+}
+
+static uint32_t count_to_turn_away(const struct hub *hub, const struct owner *owner, bool has_wrong_key)
+{
+    uint32_t count = 0;
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&hub->sessions, &cursor, NULL, &value))
+        count += may_be_turned_away(value, owner, has_wrong_key);
+    return count;
+}
+
+/* Of the owner's connections that have not introduced themselves one is closed, by chance: an owner that takes all
+ * places loses its own, and cannot tell which. Those go first that are known to have a wrong key. */
 static void turn_one_away(struct hub *hub, const struct owner *owner)
 {
-    uint32_t chosen = arc4random_uniform(owner->unauthenticated);
+    uint32_t wrong = count_to_turn_away(hub, owner, true);
+    uint32_t chosen = arc4random_uniform(wrong ? wrong : owner->unauthenticated);
     size_t cursor = 0;
     void *value;
     while (hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
         struct session *session = value;
-        if (session->owner == owner && session->is_unauthenticated && chosen-- == 0) {
+        if (may_be_turned_away(session, owner, wrong) && chosen-- == 0) {
             session_turn_away(session, "too many connections have not introduced themselves; try again later");
             return;
         }

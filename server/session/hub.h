@@ -46,7 +46,7 @@ struct hub {
     struct hashmap
         departed; /* struct departed *, by number: clients that are gone and that the engine still knows */
     size_t unauthenticated;
-    struct attempts attempts;   /* wrong keys */
+    struct attempts attempts;   /* sealed handshakes */
     uint64_t frame_bytes;       /* maximum of the frames of all jobs */
     uint64_t transaction_bytes; /* of edits that are not answered */
     uint64_t last_number, started_ns;

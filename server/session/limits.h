@@ -12,7 +12,7 @@ struct session_limits {
     uint32_t share_percent;   /* of what all clients may have together: what one user or key may have; 0: all */
     uint32_t unauthenticated; /* connections whose handshake is not done, all together */
     uint32_t unauthenticated_per_address; /* from one TCP peer */
-    uint32_t wrong_keys_a_minute;         /* from one network; then nobody from there may try one for a while */
+    uint32_t handshakes_a_second;         /* sealed ones, from one network; further ones wait */
     uint32_t requests_in_flight;
     uint32_t scenes_per_client;
     uint32_t jobs_per_client;

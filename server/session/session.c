@@ -250,13 +250,13 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
         .unauthenticated_max = limits->unauthenticated,
         .unauthenticated_per_address = limits->unauthenticated_per_address,
         .wrong_key_ms = connection_limits->wrong_key_ms,
-        .wrong_keys_per_minute = limits->wrong_keys_a_minute,
         .depth_max = limits->depth,
         .blobs_per_client = limits->blobs_per_client,
         .transaction_edits = limits->transaction_edits,
         .scene_linger_seconds = seconds_of(options->engine_limits.scene_linger_ms),
         .scenes_lingering = (uint32_t)options->engine_limits.lingering_scenes,
         .lost_after_ms = connection_limits->lost_ms,
+        .handshakes_per_second = limits->handshakes_a_second,
 #define MEMORY_LIMIT(tracer, doc) .tracer##_memory_bytes = (uint64_t)limits->tracers.tracer##_mebibytes << 20,
 #define TRACER_LIMIT(tracer, field, min, max, doc) .tracer##_##field##_max = limits->tracers.tracer##_##field,
 #include "protocol/tracers.def"
@@ -268,23 +268,22 @@ static size_t introduced_count(const struct hub *hub)
     return hub->sessions.count - hub->unauthenticated;
 }
 
-static bool on_key_allowed(void *context)
+static uint64_t on_seal_wait_ns(void *context)
 {
     const struct session *session = context;
-    const struct hub *hub = session->hub;
+    struct hub *hub = session->hub;
     /* Unix peers have no address that others could be kept apart from. */
-    return address_is_unix(&session->peer) ||
-           attempts_are_allowed(&hub->attempts, address_network(&session->peer),
-                                hub->options.limits.wrong_keys_a_minute, clock_now_ns());
+    return address_is_unix(&session->peer)
+               ? 0
+               : attempts_wait_ns(&hub->attempts, address_network(&session->peer),
+                                  hub->options.limits.handshakes_a_second, clock_now_ns());
 }
 
 static void on_key_failed(void *context)
 {
-    struct session *session = context;
+    const struct session *session = context;
     if (log_is_due(session->owner->number, "wrong key"))
         log_write(LOG_WARNING, "session", "a wrong key came from %s", session->identity.name);
-    if (!address_is_unix(&session->peer))
-        attempts_add_failed(&session->hub->attempts, address_network(&session->peer), clock_now_ns());
 }
 
 static void count_unauthenticated(struct session *session, bool counts)
@@ -456,7 +455,7 @@ static void on_closed(void *context)
 }
 
 static const struct connection_handler connection_handler = {
-    .key_allowed = on_key_allowed,
+    .seal_wait_ns = on_seal_wait_ns,
     .key_failed = on_key_failed,
     .key_proved = on_key_proved,
     .hello = on_hello,

@@ -291,26 +291,26 @@ TEST(networks_are_what_one_holder_has)
     }
 }
 
-/* ---- wrong keys ---------------------------------------------------------------------------------------- */
+/* ---- handshakes ---------------------------------------------------------------------------------------- */
 
 #define SECOND_NS UINT64_C(1000000000)
 
-TEST(wrong_keys_are_limited_per_minute)
+TEST(handshakes_beyond_the_rate_wait_for_their_turn)
 {
     static struct attempts attempts;
+    const uint64_t now_ns = 10 * SECOND_NS;
     memset(&attempts, 0, sizeof(attempts));
-    for (uint64_t second = 1; second <= 5; second++) {
-        assert_true(attempts_are_allowed(&attempts, 77, 5, second * SECOND_NS));
-        attempts_add_failed(&attempts, 77, second * SECOND_NS);
-    }
-    assert_false(attempts_are_allowed(&attempts, 77, 5, 6 * SECOND_NS));
-    assert_true(attempts_are_allowed(&attempts, 78, 5, 6 * SECOND_NS));
-    assert_false(attempts_are_allowed(&attempts, 77, 5, 61 * SECOND_NS - 1));
-    /* The first is a minute ago, and makes room for one. */
-    assert_true(attempts_are_allowed(&attempts, 77, 5, 61 * SECOND_NS));
-    attempts_add_failed(&attempts, 77, 61 * SECOND_NS);
-    assert_false(attempts_are_allowed(&attempts, 77, 5, 61 * SECOND_NS));
-    assert_true(attempts_are_allowed(&attempts, 77, 5, 1000 * SECOND_NS));
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(attempts_wait_ns(&attempts, 77, 4, now_ns), 0);
+    assert_int_equal(attempts_wait_ns(&attempts, 77, 4, now_ns), SECOND_NS / 4);
+    assert_int_equal(attempts_wait_ns(&attempts, 78, 4, now_ns), 0);
+    assert_int_equal(attempts_wait_ns(&attempts, 77, 4, now_ns + SECOND_NS / 4 - 1), 1);
+    assert_int_equal(attempts_wait_ns(&attempts, 77, 4, now_ns + SECOND_NS / 4), 0);
+    assert_int_equal(attempts_wait_ns(&attempts, 77, 4, now_ns + SECOND_NS / 4), SECOND_NS / 4);
+    /* Those that did not begin have not been counted. */
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(attempts_wait_ns(&attempts, 77, 4, 2 * now_ns), 0);
+    assert_int_equal(attempts_wait_ns(&attempts, 77, 4, 2 * now_ns), SECOND_NS / 4);
 }
 
 TEST(of_too_many_networks_the_quietest_is_forgotten)
@@ -318,11 +318,11 @@ TEST(of_too_many_networks_the_quietest_is_forgotten)
     static struct attempts attempts;
     memset(&attempts, 0, sizeof(attempts));
     for (uint64_t network = 1; network <= ATTEMPTS_NETWORKS; network++)
-        attempts_add_failed(&attempts, network, network);
-    attempts_add_failed(&attempts, 1, 1000); /* 2 is now the one that failed the longest ago */
-    attempts_add_failed(&attempts, 9999, 1001);
-    assert_true(attempts_are_allowed(&attempts, 2, 1, 1002));
-    assert_false(attempts_are_allowed(&attempts, 9999, 1, 1002));
-    assert_false(attempts_are_allowed(&attempts, 1, 1, 1002));
-    assert_false(attempts_are_allowed(&attempts, 3, 1, 1002));
+        assert_int_equal(attempts_wait_ns(&attempts, network, 1, network), 0);
+    assert_int_equal(attempts_wait_ns(&attempts, 1, 1, 2 * SECOND_NS), 0);
+    assert_int_equal(attempts_wait_ns(&attempts, 9999, 1, 2 * SECOND_NS), 0); /* in the place of 2 */
+    assert_true(attempts_wait_ns(&attempts, 1, 1, 2 * SECOND_NS) > 0);
+    assert_true(attempts_wait_ns(&attempts, 9999, 1, 2 * SECOND_NS) > 0);
+    assert_true(attempts_wait_ns(&attempts, 3, 1, 4) > 0);
+    assert_int_equal(attempts_wait_ns(&attempts, 2, 1, 4), 0);
 }

@@ -41,7 +41,7 @@ static inline int set_options(void **state)
         .limits = {.clients = 16,
                    .unauthenticated = 16,
                    .unauthenticated_per_address = 16,
-                   .wrong_keys_a_minute = 5,
+                   .handshakes_a_second = 1000,
                    .requests_in_flight = 64,
                    .scenes_per_client = 3,
                    .jobs_per_client = 4,

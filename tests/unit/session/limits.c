@@ -68,7 +68,7 @@ TEST(every_limit_is_stated_in_the_handshake)
         .limits = {.clients = 101,
                    .unauthenticated = 102,
                    .unauthenticated_per_address = 103,
-                   .wrong_keys_a_minute = 4,
+                   .handshakes_a_second = 4,
                    .requests_in_flight = 105,
                    .scenes_per_client = 106,
                    .jobs_per_client = 107,
@@ -130,7 +130,6 @@ TEST(every_limit_is_stated_in_the_handshake)
         .unauthenticated_max = 102,
         .unauthenticated_per_address = 103,
         .wrong_key_ms = 125,
-        .wrong_keys_per_minute = 4,
         .depth_max = 111,
         .blobs_per_client = 108,
         .transaction_edits = 109,
@@ -138,6 +137,7 @@ TEST(every_limit_is_stated_in_the_handshake)
         .scenes_lingering = 134,
         .ldc_layers_max = 116,
         .lost_after_ms = 136,
+        .handshakes_per_second = 4,
     };
     start_daemon();
     struct client *client = come(false);
