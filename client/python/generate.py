@@ -196,24 +196,38 @@ def heads():
                 if found.setdefault(match[1], ast.dump(node.args)) != ast.dump(node.args):
                     sys.exit(f"{path.name}: {node.name} has other arguments than another method with {match[0]}")
                 found[match[1] + " arguments"] = node.args
-    return {name: found[f"{name} arguments"] for name in SIGNATURES}
+    return {name: found[f"{name} arguments"] for name in (*SIGNATURES, "change")}
+
+
+def signature(name, head, keywords, doc):
+    """`keywords`: (name, type, default)."""
+    said = ast.unparse(head) + ("" if head.kwonlyargs else ", *")
+    lines = ["", "", f"def {name}_keywords("]
+    lines += textwrap.wrap(f"{said},", WIDTH, initial_indent="    ", subsequent_indent="    ")
+    lines += [f"    {field}: {kind} = {default}," for field, kind, default in keywords]
+    return lines + [") -> None:", f'    """Keywords that {doc}."""']
 
 
 def signatures(groups):
     fields = {(row[1] if row[0] == "RECORD" else row[2]): fields for row, fields in groups}
     lines = ["", "", "# What methods take: their own arguments, and fields of a message as keywords. Never called."]
-    for name, head in heads().items():
-        message, left_out = SIGNATURES[name]
-        own = {argument.arg for argument in head.args + head.kwonlyargs}
-        said = ast.unparse(head) + ("" if head.kwonlyargs else ", *")
-        lines += ["", "", f"def {name}_keywords("]
-        lines += textwrap.wrap(f"{said},", WIDTH, initial_indent="    ", subsequent_indent="    ")
-        for field in fields[message]:
-            default = "_f.NEXT" if message == f"set_{field.name}" else field.default  # the object's own number
-            if field.name not in own.union(left_out):
-                lines.append(f"    {field.name}: {field.keyword()} = {default},")
-        lines += [") -> None:", f'    """Keywords that {camel(message)} explains."""']
-    return lines
+    taken = heads()
+    for name, (message, left_out) in SIGNATURES.items():
+        own = {argument.arg for argument in taken[name].args + taken[name].kwonlyargs}
+        keywords = [(field.name, field.keyword(), "_f.NEXT" if message == f"set_{field.name}" else field.default)  # NEXT: the object's own number
+                    for field in fields[message] if field.name not in own.union(left_out)]
+        lines += signature(name, taken[name], keywords, f"{camel(message)} explains")
+    return lines + signature("change", taken["change"], changes(fields), "the messages of objects explain")
+
+
+def changes(fields):
+    """What objects of any kind have: a name that several kinds have takes the types of all. An object keeps its number."""
+    kinds = {"intensity": ["float"]}
+    for message, listed in fields.items():
+        for field in listed if message.startswith("set_") else ():
+            if message != f"set_{field.name}" and field.keyword() not in kinds.setdefault(field.name, []):
+                kinds[field.name].append(field.keyword())
+    return [(name, " | ".join(types), "_f.KEPT") for name, types in kinds.items()]
 
 
 def structs(groups):

@@ -138,6 +138,18 @@ class Arguments(Case):
         self.refused(lambda: scene.change(light, intensity="bright"), "set_light.intensity")
         self.refused(lambda: scene.change(light, intensity=-1), "set_light.colour[0]")
 
+    def test_a_keyword_that_an_object_has_not_is_refused_with_those_that_it_has(self):
+        scene, material = triangle()
+        light = scene.shown(scene.objects("node")[-1])
+        version = scene.version
+        for attempt, field, text in ((lambda: scene.change(material, roughnes=0.5), "set_material.roughnes", "did you mean roughness"),
+                                     (lambda: scene.change(material, fov_y=1), "set_material.fov_y", "there are alpha_mode, double_sided"),
+                                     (lambda: scene.change(material, intensity=1), "set_material.intensity", "there is no such keyword"),
+                                     (lambda: scene.change(material, material=7), "set_material.material", "there is no such keyword"),
+                                     (lambda: scene.change(light, zoom=1), "set_light.zoom", "outer_cone, size, name, intensity")):
+            self.refused(attempt, field, text)
+        self.assertEqual((scene.version, scene.objects("material")), (version, [material]))
+
 
 class Keywords(Case):
     SCRIPT = """import farlight
@@ -146,6 +158,9 @@ with farlight.connect() as client:
     red = scene.add_material((0.8, 0.1, 0.1), roughness=0.3, alpha_mode="blend")
     scene.add_mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], material=red)
     frame = client.render(scene, samples=64, layers=("depth", "normal"), integrator="path")
+    scene.change(red, metallic=0.5)
+    scene.change(red, alpha_mode="mask", base_colour=(0, 0, 1, 1))
+    scene.change(farlight.ENVIRONMENT, intensity=2)
 async def main() -> None:
     async with await farlight.aio.connect() as client:
         (await client.render(scene, width=32)).depth
@@ -157,6 +172,7 @@ async def main() -> None:
         if shutil.which("mypy") is None:
             self.skipTest("mypy is not installed")
         wrong = (("roughness=", "roughnes="), ('"blend"', '"blended"'), ("samples=64", 'samples="64"'), ("integrator=", "intergrator="),
+                 ("metallic=0.5", 'metallic="half"'), ('"mask"', '"masked"'), ("base_colour=", "base_color="), ("intensity=", "intensify="),
                  ("width=32", "widht=32"), ("last_frame=3", 'last_frame="3"'))
         script = self.SCRIPT
         for right, mistake in wrong:
@@ -167,7 +183,7 @@ async def main() -> None:
         said = subprocess.run(["mypy", "--strict", "--cache-dir", self.folder / "cache", *files], env={**os.environ, "MYPYPATH": str(PACKAGE)},
                               capture_output=True, text=True).stdout
         lines = [line for line in said.splitlines() if ": error: " in line]
-        self.assertEqual([line.split("wrong.py:")[-1][:2] for line in lines], ["4:", "4:", "6:", "6:", "9:", "10"], said)
+        self.assertEqual([line.split("wrong.py:")[-1][:2] for line in lines], ["4:", "4:", "6:", "6:", "7:", "8:", "8:", "9:", "12", "13"], said)
 
     def test_signatures_have_every_keyword_with_the_default_of_the_message(self):
         for method in (farlight.Client.render, farlight.Client.frames, farlight.Client.view, farlight.aio.AsyncClient.render):

@@ -25,12 +25,18 @@ CONTROL_MAX_BYTES = 65536  # payload of a message without bulk data
 BULK_MAX_BYTES = 262144 + 4096
 
 
-class _Next:
+class _Default:
+    """A default that signatures show, and that stands for no value."""
+
+    def __init__(self, meaning: str) -> None:
+        self.meaning = meaning
+
     def __repr__(self) -> str:
-        return "the next free number"
+        return self.meaning
 
 
-NEXT: Any = _Next()  # the default that signatures show of an object's number
+NEXT: Any = _Default("the next free number")
+KEPT: Any = _Default("as it is")
 
 
 def takes(signature: Callable[P, None]) -> Callable[[Callable[..., T]], Callable[P, T]]:

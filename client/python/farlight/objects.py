@@ -6,14 +6,14 @@ from __future__ import annotations
 import collections
 import copy
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from . import fields, messages
 from .blobs import blob_hash
 from .errors import InvalidValue
-from .fields import Bytes, Message
+from .fields import Bytes, Message, takes
 from .messages import NodeKind, ObjectKind, Sharing
 
 
@@ -76,22 +76,32 @@ def kind_of(kind: ObjectKind | str) -> ObjectKind:
         raise InvalidValue(str(why), field="kind") from None
 
 
-def make(kind: type[Message], values: dict[str, Any]) -> Any:
-    """A message of those values; one that has no such field is InvalidValue, with names that are like it."""
-    known = {field.name for field in kind.FIELDS}
-    for name in values:
+def _check_names(kind: type[Message], given: Iterable[str], known: Sequence[str]) -> None:
+    """InvalidValue for a name that is not known, with those that are like it, else with all."""
+    for name in given:
         if name not in known:
             like = difflib.get_close_matches(name, known)
-            raise InvalidValue("there is no such field", field=f"{kind.NAME}.{name}",
-                               remedy=f"did you mean {' or '.join(like)}?" if like else
-                               f"help(farlight.messages.{kind.__name__}) lists them")
+            raise InvalidValue("there is no such keyword", field=f"{kind.NAME}.{name}",
+                               remedy=f"did you mean {' or '.join(like)}?" if like else f"there are {', '.join(known)}")
+
+
+def make(kind: type[Message], values: dict[str, Any]) -> Any:
+    """A message of those values; one that has no such field is InvalidValue."""
+    _check_names(kind, values, [field.name for field in kind.FIELDS])
     return kind(**values)
+
+
+def _changeable(edit: Message) -> list[str]:
+    """What change() takes: every field but the object's own number, which would make another object."""
+    lit = isinstance(edit, (messages.SetLight, messages.SetEnvironment))
+    return [field.name for field in edit.FIELDS if edit.NAME != f"set_{field.name}"] + ["intensity"] * lit
 
 
 def _with_intensity(edit: Message, values: dict[str, Any]) -> dict[str, Any]:
     """`intensity` of lights and of the environment is the largest of their colour's numbers, as `farlight view` has it."""
-    if "intensity" not in values or not isinstance(edit, (messages.SetLight, messages.SetEnvironment)):
+    if "intensity" not in values:
         return values
+    assert isinstance(edit, (messages.SetLight, messages.SetEnvironment))
     colour = [float(one) for one in values.get("colour", edit.colour)]
     largest, intensity = max(colour, default=0), float(values["intensity"])
     made = [one / largest * intensity for one in colour] if largest > 0 else [intensity] * 3
@@ -162,15 +172,17 @@ class Objects:
                                remedy="read() it with the client, and set() what comes")
         return messages.SetEnvironment()
 
+    @takes(messages.change_keywords)
     def change(self, thing: Object, **values: Any) -> None:
         """Other values for some of its fields: change(steel, roughness=0.2), change(farlight.ENVIRONMENT, rotation=1).
-        Lights and the environment have `intensity` as well: the largest of the colour's numbers."""
+        Lights and the environment have `intensity` as well: the largest of the colour's numbers. Type checkers know the
+        fields of all kinds of objects, and not which kind this one is."""
         edit = self.get(thing)
+        _check_names(type(edit), values, _changeable(edit))
         try:
             values = _with_intensity(edit, values)
         except (TypeError, ValueError):
             raise InvalidValue("intensity and colour must be numbers", field=f"{edit.NAME}.intensity") from None
-        make(type(edit), values)
         self.set(replace(edit, **values))
 
     def shown(self, node: Object) -> Object | None:
