@@ -21,6 +21,7 @@ def empty(world=(0, 0, 0)):
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = WIDTH, HEIGHT, 100
     scene.render.film_transparent = scene.render.use_border = scene.use_nodes = False
+    scene.render.use_motion_blur = bpy.context.view_layer.use_pass_vector = False
     scene.view_settings.view_transform = "Raw"
     scene.frame_set(1)
     scene.world = bpy.data.worlds.new("World")
@@ -154,8 +155,8 @@ def load(path):
     return values.reshape(height, width, 4)[::-1]
 
 
-def render(engine="FARLIGHT", samples=128):
-    """F12, linear."""
+def rendered(engine, samples=128, file_format="OPEN_EXR"):
+    """F12: the file, of linear floats."""
     scene = bpy.context.scene
     scene.render.engine = engine
     if engine == "CYCLES":
@@ -166,13 +167,18 @@ def render(engine="FARLIGHT", samples=128):
             setattr(scene.cycles, f"{bounces}_bounces", scene.farlight.depth)
         scene.cycles.sample_clamp_indirect, scene.cycles.blur_glossy = scene.farlight.clamp, 0
         scene.cycles.caustics_refractive = scene.cycles.caustics_reflective = True
-    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = file_format, "32"
     scene.render.image_settings.color_mode = "RGBA"
     path = pathlib.Path(FOLDER.name) / f"{engine}.exr"
     path.unlink(missing_ok=True)
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    return load(path)
+    return path
+
+
+def render(engine="FARLIGHT", samples=128):
+    """F12, linear."""
+    return load(rendered(engine, samples))
 
 
 def blocks(picture, across=8, down=6):

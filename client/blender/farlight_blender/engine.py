@@ -75,6 +75,13 @@ def _passes(frame: Frame, view: cameras.Lens, names: dict[str, str], is_transpar
     return {name: view.cut(image) for name, image in made.items()}
 
 
+def _vectors(frame: Frame) -> Any:
+    """As Cycles has them: from here to where a surface was a frame earlier, and from where it will be a frame later to here. Nothing
+    moves where there is no surface."""
+    vectors = np.concatenate((frame.motion[..., 2:], -frame.motion[..., :2]), axis=-1)
+    return np.where(np.isinf(frame.depth)[..., None], 0, vectors)
+
+
 _told: set[str] = set()  # to those who look at a viewport
 
 
@@ -113,6 +120,8 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self.register_pass(scene, layer, "Depth", 1, "Z", "VALUE")
         if layer.use_pass_normal:
             self.register_pass(scene, layer, "Normal", 3, "XYZ", "VECTOR")
+        if motion.has_vectors(scene, layer):
+            self.register_pass(scene, layer, "Vector", 4, "XYZW", "VECTOR")
         if scene.farlight.use_pass_albedo:
             self.register_pass(scene, layer, ALBEDO, 3, "RGB", "COLOR")
         for group in layer.lightgroups:
@@ -194,14 +203,15 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self.add_pass(GROUP + group.name, 3, "RGB", layer=layer)
         result = self.begin_result(0, 0, view.part_width, view.part_height, layer=layer)
         try:
-            self._show(result, daemon, image, node, view, _job(scene, view, moves))
+            job = _job(scene, view, moves if motion.is_wanted(scene) else None)
+            self._show(result, daemon, image, node, view, job, self._vector_pass(scene, daemon, image, node, view, moves))
         finally:
             self.end_result(result)  # with what has come
 
     def _moves(self, depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> Optional[motion.Motion]:
-        """Evaluates Blender's scene at the keys of the shutter, then at the frame's time again."""
+        """Evaluates Blender's scene at the keys of what moves, then at the frame's time again."""
         scene = depsgraph.scene_eval
-        if not motion.is_wanted(scene):
+        if not motion.is_wanted(scene) and not motion.has_vectors(scene, depsgraph.view_layer_eval):
             return None
         now, moments = (scene.frame_current, scene.frame_subframe), []
         for time in motion.times(scene):
@@ -210,8 +220,16 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         self.frame_set(*now)
         return motion.Motion(moments)
 
+    def _vector_pass(self, scene: bpy.types.Scene, daemon: session.Session, image: Mirror, node: Any, view: cameras.Lens,
+                     moves: Optional[motion.Motion]) -> dict[str, Any]:
+        """The array of the pass Vector by its name; none where that is not wanted, or nothing moves."""
+        if moves is None or motion.is_wanted(scene) or not moves.has_any():
+            return {}
+        job = {**view.fields(may_crop=True), "aperture": 0, "tracer": scene.farlight.tracer, **moves.vector_job()}
+        return {"Vector": view.cut(_vectors(daemon.wait(daemon.render(image.scene, node, **job), self.test_break)))}
+
     def _show(self, result: bpy.types.RenderResult, daemon: session.Session, image: Mirror, node: Any, view: cameras.Lens,
-              job: dict[str, Any]) -> None:
+              job: dict[str, Any], vectors: dict[str, Any]) -> None:
         layer = result.layers[0]
         count = job["last_frame"] + 1
         self.say(f"{job['samples'] * count} samples")
@@ -222,7 +240,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         names = _names(groups)
         for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer, names), **job):
             images = _passes(frame, view, names, job["background"] == Background.TRANSPARENT)
-            _write(layer, mean.add(images) if mean else images)
+            _write(layer, mean.add(images) if mean else {**images, **vectors})
             self.update_result(result)
             self.update_progress((frame.number + 1) / count)
         for warning in frame.warnings:

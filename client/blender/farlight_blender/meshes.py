@@ -14,12 +14,12 @@ from farlight.messages import BlobRef, ObjectKind
 
 from .bake import Surface
 from .materials import Material, Reader
-from .motion import Motion
+from .motion import MIDDLE, Motion
 
 if TYPE_CHECKING:
     from .mirror import Mirror
 
-DIFFER = "its points differ in number while the shutter is open: it does not deform meanwhile"
+DIFFER = "its points differ in number from time to time: its motion leaves out how it deforms"
 Steady = Callable[[str, Any], Any]  # Mirror.steady() of one mesh
 
 
@@ -95,13 +95,15 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Op
 
 
 def with_moves(bent: Any) -> dict[str, Any]:
-    """What Scene.add_mesh() takes of the first key, and "moves" to others. bent: keys x vertices x 6, positions and normals."""
-    made = {"positions": bent[0, :, :3], "normals": bent[0, :, 3:]}
-    return {**made, "moves": np.column_stack(list(bent[1:] - bent[0]))} if len(bent) > 1 else made
+    """What Scene.add_mesh() takes of the middle key, or the only one, and "moves" to others. bent: keys x vertices x 6, positions
+    and normals."""
+    middle = bent[MIDDLE if len(bent) > 1 else 0]
+    made = {"positions": middle[:, :3], "normals": middle[:, 3:]}
+    return {**made, "moves": np.column_stack(list(np.delete(bent, MIDDLE, axis=0) - middle))} if len(bent) > 1 else made
 
 
 def with_targets(scene: Scene, arrays: dict[str, Any]) -> dict[str, Any]:
-    """Fields of set_mesh for a mesh that deforms: morph targets, the offsets to each key of the shutter but the first."""
+    """Fields of set_mesh for a mesh that deforms: morph targets, the offsets to each key but the middle one."""
     moves = arrays.pop("moves", None)
     if moves is None:
         return {}

@@ -59,12 +59,12 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
     for instance in depsgraph.object_instances:
         thing = instance.object
         key = _key(instance)
-        if motion.is_blurred(thing) and thing.type in WITH_SURFACE | WITHOUT_FACES | {"LIGHT"}:
+        if motion.may_move(thing, scene) and thing.type in WITH_SURFACE | WITHOUT_FACES | {"LIGHT"}:
             made.places[key] = instance.matrix_world.copy()
             for hairs in strands.hairy(thing, True) if _has_hairs(instance) else ():
                 made.places[_hairs_key(key, hairs.particle_system.name)] = made.places[key]
                 mesh = strands.hairs_key(thing, hairs.particle_system)
-                if mesh not in made.shapes and motion.may_deform(thing):
+                if mesh not in made.shapes and motion.may_deform(thing, scene):
                     made.shapes[mesh] = strands.places(thing, hairs.particle_system, True)
         if instance.show_self and thing.type in WITH_SURFACE:
             mesh, is_new = names.of(thing)
@@ -72,9 +72,9 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
                 made.shapes[mesh] = meshes.shape(thing.data)
         if instance.show_self and thing.type in WITHOUT_FACES:
             name, is_new = others.of(thing)
-            if is_new and motion.may_deform(thing):
+            if is_new and motion.may_deform(thing, scene):
                 made.shapes[thing.type, *name] = strands.rows(thing.data)
-    if motion.is_blurred(camera):
+    if motion.may_move(camera, scene):
         made.places[CAMERA] = camera.matrix_world.copy()
     return made
 
@@ -152,7 +152,7 @@ class Mirror:
         bends: its mesh has targets."""
         node = self.number(ObjectKind.NODE, key)
         if self._motion is not None and not self._motion.follow(key, node, rigid):
-            self.note(f"{thing.name}: it is sheared, and while it moves it is not")
+            self.note(f"{thing.name}: it is sheared, which its motion leaves out")
         if self._motion is not None and bends:
             self._motion.bend(key, node)
         return self.scene.add_node(shows, np.array(rigid(matrix) if rigid else matrix), parent=self._root(), node=node,
@@ -166,7 +166,7 @@ class Mirror:
     def update(self, depsgraph: bpy.types.Depsgraph,
                seen_by: Optional[tuple[bpy.types.Object, cameras.Lens]] = None,
                moves: Optional[motion.Motion] = None) -> Optional[Object]:
-        """Makes the scene what Blender's is. seen_by: a camera; its node is returned. moves: what does while the shutter is open."""
+        """Makes the scene what Blender's is. seen_by: a camera; its node is returned. moves: what does."""
         self._motion = moves
         self._seen.clear()
         self._asked.clear()

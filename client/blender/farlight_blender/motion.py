@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""What moves while the shutter is open.
+"""What moves while the shutter is open, or from the frame before to the one behind.
 
 Blender evaluates the scene as the shutter opens, halfway and as it closes. The daemon plays the differences as clips: nodes that
 move and meshes that deform are blurred by the shutter of the job. A camera and lights stand still in a frame of the daemon's, so
-that a job is several frames, each of a part of the shutter's time, of which the picture is the mean."""
+that a job is several frames, each of a part of the shutter's time, of which the picture is the mean.
+
+The pass Vector is like a shutter that is open from the frame before to the one behind: its clips are played by a job that has the
+daemon's layer motion and no picture."""
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from .mirror import Mirror
 
 KEYS = (0.0, 0.5, 1.0)  # of the open time: those of Cycles' default
+MIDDLE = 1  # the key that meshes have without a clip
 CLIP_S = 1.0  # length of a clip, that of the job
 SAME = 1e-6  # numbers of a place that differ by less are rounding
 FIRST = {"START": 0.0, "CENTER": -0.5, "END": -1.0}  # when the shutter opens, in open times from the frame's time on
@@ -38,8 +42,10 @@ def position_owner(scene: bpy.types.Scene) -> Any:
 
 def times(scene: bpy.types.Scene) -> list[float]:
     """Of the keys, in Blender's frames."""
-    shutter = scene.render.motion_blur_shutter
-    first = FIRST.get(getattr(position_owner(scene), "motion_blur_position", "CENTER"), -0.5)
+    shutter, first = 2.0, -0.5  # of the pass Vector
+    if is_wanted(scene):
+        shutter = scene.render.motion_blur_shutter
+        first = FIRST.get(getattr(position_owner(scene), "motion_blur_position", "CENTER"), -0.5)
     return [scene.frame_current_final + shutter * (first + key) for key in KEYS]
 
 
@@ -48,19 +54,24 @@ def is_wanted(scene: bpy.types.Scene) -> bool:
     return bool(scene.render.use_motion_blur and scene.render.motion_blur_shutter > 0)
 
 
-def is_blurred(thing: bpy.types.Object) -> bool:
-    """Cycles has a switch for each object."""
-    return bool(getattr(getattr(thing, "cycles", None), "use_motion_blur", True))
+def has_vectors(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> bool:
+    """Whether there is the pass Vector: as in Cycles, not of a blurred picture."""
+    return bool(layer.use_pass_vector and not is_wanted(scene))
 
 
-def may_deform(thing: bpy.types.Object) -> bool:
+def may_move(thing: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Cycles has a switch for each object, which the pass Vector does not heed."""
+    return not is_wanted(scene) or bool(getattr(getattr(thing, "cycles", None), "use_motion_blur", True))
+
+
+def may_deform(thing: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     """Cycles has a switch for this, too."""
-    return is_blurred(thing) and bool(getattr(getattr(thing, "cycles", None), "use_deform_motion", True))
+    return may_move(thing, scene) and (not is_wanted(scene) or bool(getattr(getattr(thing, "cycles", None), "use_deform_motion", True)))
 
 
 def deforms(thing: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     """Whether its mesh may change its shape while its points stay the same."""
-    return bool(thing.type == "MESH" and may_deform(thing) and thing.original.is_deform_modified(scene, "RENDER"))
+    return bool(thing.type == "MESH" and may_deform(thing, scene) and thing.original.is_deform_modified(scene, "RENDER"))
 
 
 class Motion:
@@ -106,8 +117,8 @@ class Motion:
         return rigid is not None or bool(np.allclose(rebuilt, first[:3, :3], atol=1e-4 * np.abs(first[:3, :3]).max()))
 
     def bend(self, key: Hashable, node: int) -> None:
-        """Lets a node's mesh, whose targets are all keys but the first, deform."""
-        weights = np.eye(len(KEYS))[:, 1:]
+        """Lets a node's mesh, whose targets are all keys but the middle one, deform."""
+        weights = np.delete(np.eye(len(KEYS)), MIDDLE, axis=1)
         self._channels["things"].append((key, node, ChannelPath.NODE_WEIGHTS, len(KEYS) - 1, weights))
 
     def has_any(self) -> bool:
@@ -139,3 +150,8 @@ class Motion:
         starts = {"things": 0.0, "watchers": -0.5 * CLIP_S / frames}
         clips = [ClipUse(clip, starts[whose], 1.0, 0) for whose, clip in self._clips.items()]
         return {"clips": clips, "frames_per_second": frames / CLIP_S, "shutter": 1.0, "last_frame": frames - 1, "accumulate": Accumulation.OFF}
+
+    def vector_job(self) -> dict[str, Any]:
+        """Fields of a job of the layer motion, whose one frame is the middle key: its neighbours are the others."""
+        clips = [ClipUse(clip, -0.5 * CLIP_S, 1.0, 0) for clip in self._clips.values()]
+        return {"clips": clips, "frames_per_second": 2 / CLIP_S, "layers": ("motion", "depth"), "samples": 1}

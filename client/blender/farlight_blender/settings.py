@@ -128,6 +128,7 @@ class FARLIGHT_PT_passes(_Panel):  # pylint: disable=invalid-name
     def draw(self, context: bpy.types.Context) -> None:
         """The form."""
         self._rows(context.view_layer, "use_pass_z", "use_pass_normal")
+        self._rows(context.view_layer, "use_pass_vector", is_active=not motion.is_wanted(context.scene))
         self._rows(context.scene.farlight, "use_pass_albedo")
 
 
