@@ -200,6 +200,6 @@ void format_explain_unknown(const char *name, const char *format, const unsigned
     snprintf(out, FORMAT_REASON_BYTES, "unknown format %s%.40s; known are %s", format ? "." : "",
              format ? format
              : dot  ? dot
-                    : "(no ending, and its first bytes are of none)",
+                    : "(no ending, unknown first bytes)",
              endings_of_all(endings));
 }

@@ -424,6 +424,7 @@ class Formats(importer.Written):
     def test_faults_say_what_is_wrong(self):
         for name, model, expected in (
                 ("model.xyz", "1 2 3\n", "unknown format .xyz; known are .gltf, .glb, .obj, .nff, .3mf, .3ds, .ac, .dae, .fbx"),
+                ("passwd", "root:x:0\n", "unknown format (no ending, unknown first bytes); known are .gltf"),
                 ("model.ply", "no head\n", "begins with the line 'ply'"), ("model.stl", "", "the file is empty"),
                 ("endless.ply", ply().replace("end_header", "comment"), "line 10: '0 0 0' is no statement"),
                 ("cut.ply", ply()[:150], "does not end within 150 bytes"),
