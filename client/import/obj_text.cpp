@@ -69,6 +69,12 @@ bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
+// Finds 1.#IND, 1.#QNAN and 1.#INF of older Windows programs by their '#': tinyobjloader reads 1.
+bool is_windows_nan(const char *begin, const char *at, const char *end)
+{
+    return *at == '#' && at - begin >= 2 && memcmp(at - 2, "1.", 2) == 0 && at + 1 < end && strchr("IQS", at[1]);
+}
+
 // Corners such as 1/2/ lose what is for nothing: tinyobjloader takes the next corner's number for their normal's.
 // Numbers with a decimal comma, as some countries write them, get a point.
 void mend_line(char *at, char *end)
@@ -82,6 +88,8 @@ void mend_line(char *at, char *end)
     for (char *one = at + 1; is_vertex && one + 1 < end; one++)
         if (*one == ',' && is_digit(one[-1]) && is_digit(one[1]))
             *one = '.';
+        else if (is_windows_nan(at, one, end))
+            memcpy(one - 2, "nan", 3);
 }
 
 void mend_lines(std::string &text)
@@ -93,12 +101,12 @@ void mend_lines(std::string &text)
     }
 }
 
-// A slash before the end of a corner, or a comma between digits.
+// A slash before the end of a corner, a comma between digits, or a NaN of Windows.
 bool has_odd_numbers(const char *begin, const char *end)
 {
     for (const char *at = begin; at + 1 < end; at++)
         if ((*at == '/' && (is_blank(at[1]) || at[1] == '\r' || at[1] == '\n')) ||
-            (*at == ',' && at > begin && is_digit(at[-1]) && is_digit(at[1])))
+            (*at == ',' && at > begin && is_digit(at[-1]) && is_digit(at[1])) || is_windows_nan(begin, at, end))
             return true;
     return begin < end && end[-1] == '/';
 }

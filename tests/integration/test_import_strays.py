@@ -46,6 +46,13 @@ class Obj(importer.Written):
             mesh, = self.import_text("model.obj", text + face + "\n").of(SET_MESH)
             self.assertEqual(result_corners(mesh, self.last), corners, face)
 
+    def test_a_nan_of_windows_is_no_number(self):
+        result = self.import_text("model.obj", QUAD + "vn -1.#IND00 -1.#IND00 1.#QNAN\nf 1//1 2//1 3//1\n")
+        mesh, = result.of(SET_MESH)
+        self.assertEqual(result.floats(mesh["arrays"][2]), [0, 0, 1] * 3)
+        self.assertRegex(result.text(), "^[^;]*3 normals are missing or unusable and were made from the faces[^;]*$")
+        self.assertIn("line 2: 'nanINF' is not a finite number", self.import_text("model.obj", "v 0 0 0\nv 0 1.#INF 0\n", 1).text())
+
     def import_text(self, *arguments, **options):
         self.last = super().import_text(*arguments, **options)
         return self.last
