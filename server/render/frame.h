@@ -141,8 +141,9 @@ struct frame_request {
  * bounce. What `ao` shows is how open a first hit is, 1 where nothing is hit; all else show radiance. A scene with
  * no light and a black environment is lit by the default of shaders/shared/sky.h, unless it has emissive surfaces
  * that are brighter than 1 and the integrator (distributed, path) has them for lights. The same request on the
- * same revision and device gives the same bytes. Cut into other slices a frame may differ in rays within rounding
- * of an edge: the packet size of `bvh` follows the coherence of the slice's wave. */
+ * same revision and device gives the same bytes. Crops of one picture agree to the byte wherever they overlap.
+ * With software GL and the tracer `bvh` they differ from the frame without a crop, and that cut into other slices,
+ * by rounding: rays are traversed in packets there, whose size follows the coherence of the slice's wave. */
 struct frame_result {
     /* Owned; free(). Layer after layer, each of width x height pixels, or planes; behind size_bytes lie the
      * attachments. */

@@ -15,10 +15,12 @@ static unsigned family_of(const struct render_context *context, enum ray_kind ki
     return (unsigned)kind * WAVE_BOUNCES + bounce;
 }
 
-static uint64_t samples_of(const struct render_context *context)
+/* A crop cuts the picture into other waves than the whole has, and its pixels are the same. */
+static void set_frame(const struct render_context *context, struct wave *wave)
 {
     const struct frame_request *request = &context->request;
-    return (uint64_t)request->width * request->height * request->samples;
+    wave->frame_samples = (uint64_t)request->width * request->height * request->samples;
+    wave->apart = request->crop.width > 0;
 }
 
 static enum tracer_progress trace_step(struct render_context *context, enum ray_kind kind, const struct wave *wave,
@@ -56,7 +58,7 @@ bool wave_trace(struct render_context *context, enum ray_kind kind, const struct
 {
     struct wave own = *wave;
     own.family = family_of(context, kind);
-    own.frame_samples = samples_of(context);
+    set_frame(context, &own);
     *done = true;
     if (context->comparison)
         return trace_and_compare(context, kind, &own, error);
@@ -69,7 +71,7 @@ void wave_announce(struct render_context *context, const struct wave *wave)
 {
     struct wave own = *wave;
     own.ray_count = context->wave_capacity;
-    own.frame_samples = samples_of(context);
+    set_frame(context, &own);
     if (!context->counts_on_host)
         own.counts = own.stopped = &context->wave_state;
     if (!context->comparison)

@@ -51,6 +51,7 @@ struct wave {
     bool bare;                     /* closest: intersections are enough, no surfaces are made of them */
     float origin_spread;           /* or all on a disc of this diameter, a lens: metres; 0: nothing is known */
     uint64_t frame_samples;        /* of all pixels of the frame that it is of, at most; 0: nothing is known */
+    bool apart;                    /* an answer may not depend, to the bit, on which rays are beside its own */
 };
 
 /* The rays of pinhole eyes, as a frame has them (shared/frame.h); its uniforms are bound. */

@@ -130,6 +130,15 @@ class Pictures(OneDaemon):
             result = farlight(*command([*STORED["room"], *options]), "-o", self.folder / "x.png")
             self.assertIn("--crop", self.expect(result, 2).stderr)
 
+    def test_crops_agree_to_the_byte_where_they_overlap(self):
+        """Their waves are others, and so are the packets that software GL would make of them."""
+        width, x, y, side = 320, 0, 112, 56
+        options = ["teapot.glb", "--size", "320x180", "--integrator", "path", "--primary", "trace", "--float"]
+        whole, part = (read_exr(self.render(*options, "--crop", crop, name="x.exr")[0])
+                       for crop in ("0,0,320,180", f"{x},{y},{side},{side}"))
+        for name, values in part[2].items():
+            self.assertEqual(values, [value for row in range(y, y + side) for value in whole[2][name][row * width + x:row * width + x + side]], name)
+
     def test_options_arrive(self):
         """Each row: what is common, and options that mean the same (`=`) or must not (`!`)."""
         path, rays = ["--integrator", "path"], ["--integrator", "raycast"]

@@ -142,6 +142,8 @@ static bool is_paper(const struct bvh *bvh)
 
 uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave)
 {
+    if (wave->apart && !wave->shared_origin)
+        return 1;
     if (is_paper(bvh))
         return PACKET_RAYS_PAPER;
     const bool measured = bvh->base.device->facts.packet_rays > 1 && wave->ray_count >= COHERENCE_RAYS_MIN;
@@ -152,6 +154,9 @@ uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const s
                          struct error *error)
 {
     uint32_t counts[2];
+    /* The intersections of a packet of several origins are rounded by its leading ray. */
+    if (wave->apart && (!wave->shared_origin || scene->has_motion))
+        return 1;
     if (is_paper(bvh))
         return PACKET_RAYS_PAPER;
     if (scene->device->facts.packet_rays == 1 || wave->ray_count < COHERENCE_RAYS_MIN)
