@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* From a model to pictures: loads the scene, fetches frames and writes them. A lost daemon is waited for: the
  * scene is loaded again, and the first unwritten frame is the next one. */
-#include "cli/sink.h"
-#include "cli/trace_file.h"
-#include "cli/watch.h"
+#include "cli/session.h"
 #include "protocol/common/clock.h"
-#include "protocol/plain_text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -14,42 +11,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#define ERROR_PASS_SAMPLES 16u /* fewer have no error yet */
-#define LONG_PASS_NS 1000000000u
 #define DEFAULT_RETRY_S 300
-#define PASS_SAMPLES_MAX 65536u /* of one request, in the protocol */
-
-struct session {
-    struct cli_job *job;
-    bool is_series;
-    struct cli_sinks sinks;
-    bool sinks_started, sink_failed;
-    struct cli_loading loading;
-    struct cli_watch watch;
-    struct message_render typed; /* the job's options before a scene has settled them */
-    struct fl_job *rendering;
-    bool was_reached, was_loaded; /* the daemon, once at least; likewise, and it has accepted the scene */
-    bool has_set;                 /* which frames are wanted is known */
-    struct fl_frame_set set;
-    size_t run;        /* the current one of the set */
-    bool begun;        /* of this run a frame has been written */
-    uint64_t next;     /* once begun: its first frame that has not */
-    float noise;       /* of the last frame that has come */
-    uint32_t done;     /* frames written */
-    unsigned failures; /* lost connections since the last frame */
-    uint64_t lost_ns;  /* when the first of them was lost */
-    struct cli_warned warned;
-    struct cli_timings *timings;
-    struct cli_trace_file *trace; /* NULL: none is wanted */
-    struct cli_progress progress;
-    bool is_being_written; /* a picture of a series: */
-    uint32_t written_frame;
-    uint64_t frame_ns;      /* when the picture before it had come */
-    double written_seconds; /* from then until it had */
-    char written_path[4352];
-    uint32_t written_samples; /* of a pixel */
-    uint64_t begin_ns, export_ns;
-};
 
 /* ---- beginning ---- */
 
@@ -158,206 +120,6 @@ static bool choose_frames(struct session *session, struct fl_error *error)
     return true;
 }
 
-/* ---- frames ---- */
-
-static void add_export(struct session *session, int64_t frame, uint64_t begin_ns)
-{
-    const uint64_t duration_ns = monotonic_now_ns() - begin_ns;
-    session->export_ns += duration_ns;
-    cli_trace_span(session->trace, CLI_TRACE_CLIENT, "export", frame, begin_ns, duration_ns);
-}
-
-static bool is_enough(const struct session *session, float noise, uint32_t samples)
-{
-    const struct message_render *options = &session->job->options;
-    return noise <= options->noise || samples >= options->samples;
-}
-
-/* Whether it is more than a step on the way to a picture. */
-static bool is_wanted(const struct session *session, const struct fl_frame *frame)
-{
-    const struct cli_job *job = session->job;
-    return job->progressive || !job->by_error || is_enough(session, frame->noise, frame->samples);
-}
-
-static bool write_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
-{
-    const uint64_t begin_ns = monotonic_now_ns();
-    cli_trace_frame(session->trace, frame, begin_ns);
-    cli_timings_frame(session->timings, frame);
-    cli_structure_warn(frame, &session->warned, &session->progress);
-    const bool written = !is_wanted(session, frame) || cli_sinks_write(&session->sinks, frame, error);
-    add_export(session, frame->frame, begin_ns);
-    session->sink_failed = !written;
-    return written;
-}
-
-/* The picture that was being written is complete: another one is, or the sinks are finished. */
-static void log_frame(struct session *session)
-{
-    if (session->is_being_written)
-        cli_progress_frame(&session->progress, session->written_frame, session->written_seconds,
-                           session->written_path);
-    session->is_being_written = false;
-}
-
-static void note_frame(struct session *session, const struct fl_frame *frame)
-{
-    const uint64_t now_ns = monotonic_now_ns();
-    log_frame(session);
-    session->is_being_written = session->is_series;
-    session->written_frame = frame->frame;
-    session->written_seconds =
-        (double)(now_ns - (session->frame_ns > 0 ? session->frame_ns : session->begin_ns)) * 1e-9;
-    session->frame_ns = now_ns;
-    cli_sinks_path(&session->sinks, session->written_path, sizeof(session->written_path));
-}
-
-static bool finish_sinks(struct session *session, struct fl_error *error)
-{
-    const uint64_t begin_ns = monotonic_now_ns();
-    session->sink_failed = !cli_sinks_finish(&session->sinks, error);
-    add_export(session, -1, begin_ns);
-    if (!session->sink_failed)
-        log_frame(session);
-    return !session->sink_failed;
-}
-
-static void show_progress(struct session *session)
-{
-    if (session->is_series)
-        cli_progress_frames(&session->progress, session->done, session->set.frame_count);
-}
-
-static bool take_frames(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
-{
-    struct fl_frame *frame = NULL;
-    while ((frame = fl_render_next(session->rendering, error))) {
-        const uint64_t next = (uint64_t)frame->frame + run->step;
-        const bool written = write_frame(session, frame, error), wanted = is_wanted(session, frame);
-        session->noise = frame->noise;
-        session->failures = 0;
-        if (written && wanted) {
-            session->written_samples = frame->samples;
-            note_frame(session, frame);
-        }
-        fl_frame_destroy(frame);
-        if (!written)
-            return false;
-        if (!wanted)
-            continue;
-        /* The previous file is complete; this one is being written. */
-        if (session->done > 0)
-            show_progress(session);
-        session->next = next;
-        session->begun = true;
-        session->done++;
-    }
-    return error->code == FL_ERROR_NONE;
-}
-
-/* The samples of the next pass: if it is not given, the number so far, so that little time is spent on writing
- * files; without an end, no more than before once a pass takes long, so that the picture keeps changing. */
-static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t total, uint32_t last,
-                             uint64_t last_ns)
-{
-    const uint32_t first = job->by_error && !job->progressive ? ERROR_PASS_SAMPLES : 1;
-    uint32_t samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : first;
-    if ((job->endless || job->by_error) && job->pass_samples == 0 && last_ns > LONG_PASS_NS)
-        samples = last;
-    samples = samples < PASS_SAMPLES_MAX ? samples : PASS_SAMPLES_MAX;
-    return samples < total - held ? samples : total - held;
-}
-
-static void print_held(const char *path, uint32_t held)
-{
-    fputs("farlight: ", stderr);
-    plain_text_print(stderr, path);
-    fprintf(stderr, " has %u sample%s a pixel\n", held, held == 1 ? "" : "s");
-}
-
-/* After an interruption: completes the file that is being written. False: the interruption is an error. */
-static bool end_passes(struct session *session, struct fl_error *error)
-{
-    const struct cli_job *job = session->job;
-    struct fl_error failure = {0};
-    if (error->code != FL_ERROR_INTERRUPTED || session->written_samples == 0 || !job->progressive)
-        return false;
-    if (!finish_sinks(session, &failure)) {
-        *error = failure;
-        return false;
-    }
-    cli_progress_clear(&session->progress);
-    if (!job->quiet)
-        print_held(job->outputs[0].path, session->written_samples);
-    if (job->endless)
-        *error = (struct fl_error){0};
-    return job->endless;
-}
-
-/* A progressive picture, or one that is sampled by its error: one job per pass, whose samples the daemon adds to
- * the previous ones. */
-static bool render_passes(struct session *session, struct fl_error *error)
-{
-    const struct cli_job *job = session->job;
-    struct message_render options = job->options;
-    const uint32_t total = job->endless ? UINT32_MAX : options.samples;
-    const struct fl_frame_run still = {.step = 1};
-    uint64_t pass_ns = 0;
-    options.accumulate = PROTOCOL_ACCUMULATION_ON;
-    for (uint32_t held = 0; held < total; held += options.samples) {
-        const uint64_t begin_ns = monotonic_now_ns();
-        options.samples = pass_samples(job, held, total, options.samples, pass_ns);
-        session->rendering = fl_render_start(session->loading.scene, &options, error);
-        if (!session->rendering || !take_frames(session, &still, error))
-            return end_passes(session, error);
-        fl_render_destroy(session->rendering);
-        session->rendering = NULL;
-        pass_ns = monotonic_now_ns() - begin_ns;
-        if (!job->by_error) {
-            cli_progress_samples(&session->progress, held + options.samples, job->endless ? 0 : total);
-            continue;
-        }
-        cli_progress_noise(&session->progress, &(struct cli_noise){.error = session->noise,
-                                                                   .wanted = options.noise,
-                                                                   .held = held + options.samples,
-                                                                   .total = total});
-        if (is_enough(session, session->noise, 0))
-            break;
-    }
-    return true;
-}
-
-/* What is left of one run, as one job. */
-static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
-{
-    struct message_render options = session->job->options;
-    if (session->job->progressive || session->job->by_error)
-        return render_passes(session, error);
-    options.first_frame = session->begun ? (uint32_t)session->next : run->first;
-    options.last_frame = run->last;
-    options.frame_step = run->step;
-    session->rendering = fl_render_start(session->loading.scene, &options, error);
-    const bool done = session->rendering && take_frames(session, run, error);
-    if (done) {
-        fl_render_destroy(session->rendering);
-        session->rendering = NULL;
-    }
-    return done;
-}
-
-static bool render(struct session *session, struct fl_error *error)
-{
-    const struct fl_frame_set *set = &session->set;
-    show_progress(session);
-    for (; session->run < set->run_count; session->run++, session->begun = false) {
-        const struct fl_frame_run *run = &set->runs[session->run];
-        if ((!session->begun || session->next <= run->last) && !render_run(session, run, error))
-            return false;
-    }
-    return true;
-}
-
 /* ---- lost daemons ---- */
 
 static void close_connection(struct session *session)
@@ -423,13 +185,13 @@ static bool recover(struct session *session, struct fl_error *error)
 
 static bool load_and_render(struct session *session, struct fl_error *error)
 {
-    while (!load_scene(session, error) || !choose_frames(session, error) || !render(session, error))
+    while (!load_scene(session, error) || !choose_frames(session, error) || !session_render(session, error))
         if (!recover(session, error))
             return false;
     /* What a private daemon takes to end it takes while the last file is written. */
     if (!session->job->server && !session->job->watch)
         fl_connection_end(session->loading.connection);
-    return finish_sinks(session, error);
+    return session_finish_sinks(session, error);
 }
 
 /* ---- changed files ---- */
@@ -446,8 +208,8 @@ static bool render_again(struct session *session, struct fl_error *error)
     session->begun = false;
     session->run = 0;
     session->done = 0;
-    return cli_loading_again(&session->loading, error) && settle(session, error) && render(session, error) &&
-           finish_sinks(session, error);
+    return cli_loading_again(&session->loading, error) && settle(session, error) &&
+           session_render(session, error) && session_finish_sinks(session, error);
 }
 
 /* Until it is interrupted, which is its end. A model that cannot be read is reported, and its last picture stays.
@@ -488,7 +250,7 @@ static bool run(struct session *session, struct fl_error *error)
         return true;
     if (!begin_watch(session, error) || !load_and_render(session, error))
         return false;
-    show_progress(session);
+    session_show_progress(session);
     return !session->job->watch || follow(session, error);
 }
 
