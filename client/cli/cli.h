@@ -33,6 +33,7 @@ int cli_scenes(int argc, char **argv);
 int cli_edit(int argc, char **argv);
 int cli_stats(int argc, char **argv);
 int cli_verify(int argc, char **argv);
+int cli_merge(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
 int cli_view(int argc, char **argv);
@@ -288,6 +289,8 @@ struct cli_job {
     bool endless;          /* likewise, until it is interrupted */
     bool by_error;         /* of one picture: sampled in passes until its error is small */
     uint32_t pass_samples; /* more each time; 0: as many as there are */
+    uint32_t part, parts;  /* of `render`: which one, of how many of the picture; 0 parts: all of it */
+    const char *part_name; /* for its file, once it is known */
     bool lens_changes;     /* opened by clips: the integrator must support lenses */
     bool lossless;         /* of a video */
     bool full_metadata;    /* with times and paths */

@@ -42,6 +42,13 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
     return loading->connection != NULL;
 }
 
+/* Whether what the import says of the scene is remembered: it is compared, or the digest of a part depends on it.
+ */
+static bool remembers_import(const struct cli_job *job)
+{
+    return job->parts > 0 || (job->watch && cli_watch_can_edit_again(job->edits, job->edit_count));
+}
+
 static void fill_options(struct cli_loading *loading)
 {
     const struct cli_job *job = loading->job;
@@ -60,8 +67,7 @@ static void fill_options(struct cli_loading *loading)
                                              .user = loading,
                                              .sharing = loading->sharing,
                                              .scene_name = loading->scene_name,
-                                             .will_reload = job->watch &&
-                                                            cli_watch_can_edit_again(job->edits, job->edit_count)};
+                                             .will_reload = remembers_import(job)};
 }
 
 static bool start_import(struct cli_loading *loading, struct fl_error *error)

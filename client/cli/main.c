@@ -23,6 +23,7 @@ static const struct subcommand {
     {"tracers", "farlight tracers", cli_tracers, "list the tracers and their settings"},
     {"serve", "farlight serve", cli_serve, "share a model for other clients"},
     {"verify", "farlight verify", cli_verify, "check the pictures of an animation against their digests"},
+    {"merge", "farlight merge", cli_merge, "join the parts of a picture that several hosts rendered"},
     {"scenes", "farlight scenes", cli_scenes, "list the scenes of a daemon to which clients may attach"},
     {"edit", "farlight edit", cli_edit, "change materials, nodes and lights of a shared scene"},
     {"stats", "farlight stats", cli_stats, "show a daemon's clients, scenes, memory and times"},

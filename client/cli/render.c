@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/cli.h"
+#include "cli/picture_part.h"
+#include "lib/frame_set.h"
 #include "lib/text.h"
 
 #include <errno.h>
@@ -9,7 +10,7 @@
 /* Edges are smooth and shadows soft with these; software GL has 1280x720 pixels in some seconds. */
 #define STILL_SAMPLES 16u
 
-enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE, KEY_WATCH };
+enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE, KEY_WATCH, KEY_PART };
 
 static const struct argp_option options[] = {
     {"scene", KEY_SCENE, "NAME", 0,
@@ -19,6 +20,9 @@ static const struct argp_option options[] = {
      "Write the picture again after every N samples (default: after 1, 2, 4, 8 ..) until --samples are reached, "
      "or "
      "without --samples until Ctrl-C",
+     -1},
+    {"part", KEY_PART, "K/N", 0,
+     "Render only the K-th of N parts of the picture, for 'farlight merge'; EXR files, with a number of samples",
      -1},
     {"watch", KEY_WATCH, NULL, 0,
      "Render again when the model, or a file that it names, has changed, until Ctrl-C; only what is new is sent",
@@ -42,6 +46,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         good = !value || fl_text_integer(value, 1, 65536, &number, &job->error);
         job->pass_samples = (uint32_t)number;
         break;
+    case KEY_PART:
+        good = fl_text_shard(value, &job->part, &job->parts, &job->error);
+        break;
     case KEY_SCENE:
         job->scene = value;
         return 0;
@@ -55,7 +62,10 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
     if (good)
         return 0;
-    snprintf(job->error.field, sizeof(job->error.field), "%s", key == KEY_TIME ? "--time" : "--progressive");
+    snprintf(job->error.field, sizeof(job->error.field), "%s",
+             key == KEY_TIME   ? "--time"
+             : key == KEY_PART ? "--part"
+                               : "--progressive");
     return EINVAL;
 }
 
@@ -78,7 +88,7 @@ static bool complete(struct cli_job *job)
 {
     job->usual_samples = STILL_SAMPLES;
     job->filters = true;
-    if (!cli_job_complete(job, false) || !complete_watch(job))
+    if (!cli_job_complete(job, false) || !cli_picture_part_complete(job) || !complete_watch(job))
         return false;
     if (job->progressive && cli_writes_to_stdout(job)) {
         cli_usage(job, "--progressive", "standard output can be written only once");

@@ -271,6 +271,7 @@ static void close_session(struct session *session)
     cli_watch_end(&session->watch);
     cli_sinks_close(&session->sinks);
     fl_frame_set_finish(&session->set);
+    cli_picture_part_finish(&session->part);
     cli_timings_destroy(session->timings);
 }
 

@@ -4,6 +4,7 @@
 #ifndef FARLIGHT_CLI_SESSION_H
 #define FARLIGHT_CLI_SESSION_H
 
+#include "cli/picture_part.h"
 #include "cli/sink.h"
 #include "cli/trace_file.h"
 #include "cli/watch.h"
@@ -17,6 +18,7 @@ struct session {
     struct cli_watch watch;
     struct message_render typed; /* the job's options before a scene has settled them */
     struct fl_job *rendering;
+    struct cli_picture_part part;
     bool was_reached, was_loaded; /* the daemon, once at least; likewise, and it has accepted the scene */
     bool has_set;                 /* which frames are wanted is known */
     struct fl_frame_set set;

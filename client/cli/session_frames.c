@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of a session: jobs, passes of a picture that is refined, and their files. */
+/* Frames of a session: jobs, passes of a picture that is refined, squares of a part of one, and their files. */
 #include "cli/session.h"
 #include "protocol/common/clock.h"
 #include "protocol/plain_text.h"
@@ -31,12 +31,16 @@ static bool is_wanted(const struct session *session, const struct fl_frame *fram
     return job->progressive || !job->by_error || is_enough(session, frame->noise, frame->samples);
 }
 
+static void report_frame(struct session *session, const struct fl_frame *frame)
+{
+    cli_trace_frame(session->trace, frame, monotonic_now_ns());
+    cli_timings_frame(session->timings, frame);
+    cli_structure_warn(frame, &session->warned, &session->progress);
+}
+
 static bool write_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
 {
     const uint64_t begin_ns = monotonic_now_ns();
-    cli_trace_frame(session->trace, frame, begin_ns);
-    cli_timings_frame(session->timings, frame);
-    cli_structure_warn(frame, &session->warned, &session->progress);
     const bool written = !is_wanted(session, frame) || cli_sinks_write(&session->sinks, frame, error);
     add_export(session, frame->frame, begin_ns);
     session->sink_failed = !written;
@@ -85,6 +89,7 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
     struct fl_frame *frame = NULL;
     while ((frame = fl_render_next(session->rendering, error))) {
         const uint64_t next = (uint64_t)frame->frame + run->step;
+        report_frame(session, frame);
         const bool written = write_frame(session, frame, error), wanted = is_wanted(session, frame);
         session->noise = frame->noise;
         session->failures = 0;
@@ -179,10 +184,41 @@ static bool render_passes(struct session *session, struct fl_error *error)
     return true;
 }
 
+/* The squares of a part of a picture that have not come yet, one job each; its file is written once, with all. */
+static bool render_part(struct session *session, struct fl_error *error)
+{
+    struct cli_job *job = session->job;
+    struct cli_picture_part *part = &session->part;
+    struct message_render options = job->options;
+    struct fl_frame *frame = NULL;
+    if (!cli_picture_part_begin(part, job, session->loading.connection, session->loading.scene, error))
+        return false;
+    while (cli_picture_part_next(part, &options)) {
+        session->rendering = fl_render_start(session->loading.scene, &options, error);
+        while (session->rendering && (frame = fl_render_next(session->rendering, error))) {
+            report_frame(session, frame);
+            const bool taken = cli_picture_part_take(part, frame, error);
+            fl_frame_destroy(frame);
+            if (!taken)
+                return false;
+        }
+        if (error->code != FL_ERROR_NONE)
+            return false;
+        fl_render_destroy(session->rendering);
+        session->rendering = NULL;
+        session->failures = 0;
+        cli_progress_step(&session->progress, part->next - part->first, part->end - part->first,
+                          "squares of the part");
+    }
+    return write_frame(session, part->frame, error);
+}
+
 /* What is left of one run, as one job. */
 static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct message_render options = session->job->options;
+    if (session->job->parts > 0)
+        return render_part(session, error);
     if (session->job->progressive || session->job->by_error)
         return render_passes(session, error);
     options.first_frame = session->begun ? (uint32_t)session->next : run->first;

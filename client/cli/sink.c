@@ -268,6 +268,7 @@ static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, str
         .path = sink->path,
         .format = cli_image_name(sink->output.image),
         .half = !job->float_pixels && sink->output.image == CLI_IMAGE_EXR,
+        .part = job->part_name,
         .origin = {job->origin[0], job->origin[1], job->origin[2]},
         .quality =
             sink->output.image == CLI_IMAGE_JPEG || sink->output.image == CLI_IMAGE_WEBP ? job->file_quality : 0};

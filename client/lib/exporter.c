@@ -161,6 +161,7 @@ bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *fram
     message.export_image.path = options->path;
     message.export_image.format = options->format ? options->format : "";
     message.export_image.model = exporter->model;
+    message.export_image.part = options->part ? options->part : "";
     for (unsigned i = 0; i < 3; i++)
         message.export_image.origin[i] = (float)options->origin[i];
     fl_shorten_path(options->path, exporter->path, sizeof(exporter->path));

@@ -658,6 +658,8 @@ struct fl_export_options {
     const struct fl_export_text *texts; /* to be drawn into it, if it has the format rgba8 */
     size_t text_count;
     double origin[3]; /* for the metadata: that of the scene's import statistics */
+    const char *part; /* EXR: the frame is a part of a picture, "K/N DIGEST DEVICE" for `farlight merge`; NULL: it
+                         is whole */
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);

@@ -35,9 +35,10 @@ static bool explain(struct fl_helper *helper, struct fl_error *error)
 static bool serve(struct fl_helper *helper, struct fl_error *error)
 {
     struct pollfd polled = {.fd = helper->stream.fd, .events = fl_stream_events(&helper->stream)};
+    const uint64_t answer_ns = helper->answer_ns > 0 ? helper->answer_ns : ANSWER_NS;
     if (helper->stream.ended)
         return explain(helper, error);
-    if (!fl_wait(&polled, 1, helper->interrupt_fd, monotonic_now_ns() + ANSWER_NS, error))
+    if (!fl_wait(&polled, 1, helper->interrupt_fd, monotonic_now_ns() + answer_ns, error))
         return false;
     return fl_stream_transfer(&helper->stream, error) || explain(helper, error);
 }

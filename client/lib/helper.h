@@ -12,6 +12,7 @@ struct fl_helper {
     const char *program; /* "farlight-export" */
     const char *what;    /* "the image writer" */
     int interrupt_fd;    /* 0: nothing interrupts */
+    uint64_t answer_ns;  /* so long it may be silent; 0: 5 minutes */
     uint32_t request;    /* of what is sent */
     bool lost;           /* the program has ended */
 };

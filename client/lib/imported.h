@@ -27,6 +27,9 @@ bool fl_imported_has(const struct fl_imported *imported, const struct frame *fra
  */
 const struct fl_imported_object *fl_imported_gone(const struct fl_imported *now, const struct fl_imported *before,
                                                   size_t *cursor);
+/* A digest of all objects that the scene's import has made, of what they are and hold, if it was remembered
+ * (fl_load_options.will_reload): the same on any host, whatever came first. */
+uint64_t fl_scene_import_digest(const struct fl_scene *scene);
 void fl_imported_finish(struct fl_imported *imported);
 
 #endif

@@ -20,7 +20,7 @@ extern char **environ;
 
 #define TRY_AGAIN_STATUS 75     /* of our programs */
 #define FIRST_SIGNAL_STATUS 128 /* 128 + signal; ssh: 255 */
-#define ARGUMENTS_MAX 280       /* of an import of many models */
+#define ARGUMENTS_MAX 560       /* of a picture of many parts */
 #define CHILD_SOCKET 3
 
 static bool is_program(const char *folder, size_t folder_bytes, const char *name, char *path, size_t path_bytes)

@@ -8,6 +8,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 #define ANSWER_NS 30000000000ull
 
@@ -354,6 +355,17 @@ struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl
         scene = load_started(connection, &started->importer, error);
     fl_import_destroy(started);
     return scene;
+}
+
+uint64_t fl_scene_import_digest(const struct fl_scene *scene)
+{
+    uint64_t sum = scene->imported.count;
+    for (size_t i = 0; i < scene->imported.capacity; i++) {
+        const struct fl_imported_object *object = &scene->imported.places[i];
+        const uint64_t words[] = {object->kind, object->id, object->digest};
+        sum += object->is_there ? XXH3_64bits(words, sizeof(words)) : 0;
+    }
+    return sum;
 }
 
 /* *abandoned: something is gone that cannot be removed; nothing has changed. */

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "exr_encode.hpp"
+#include "exr_stream.hpp"
 #include "layers.hpp"
 #include "mattes.hpp"
 #include "metadata.hpp"
 #include "protocol/version.h"
 
 #include <OpenEXR/ImfFloatAttribute.h>
-#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
@@ -21,34 +21,6 @@
 
 namespace
 {
-
-// The library seeks back at the end, to fill in where the lines are.
-class memory_stream : public Imf::OStream
-{
-  public:
-    memory_stream() : Imf::OStream("image.exr")
-    {
-    }
-    void write(const char bytes[], int count) override
-    {
-        const size_t end = at + static_cast<size_t>(count);
-        file.resize(std::max(file.size(), end));
-        std::copy_n(bytes, count, file.begin() + static_cast<std::ptrdiff_t>(at));
-        at = end;
-    }
-    uint64_t tellp() override
-    {
-        return at;
-    }
-    void seekp(uint64_t position) override
-    {
-        at = position;
-    }
-    std::vector<uint8_t> file;
-
-  private:
-    size_t at = 0;
-};
 
 // Matrices of EXR stand to the right of row vectors: element [row of the input][column of the output].
 struct matrix {

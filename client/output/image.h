@@ -43,6 +43,7 @@ struct image {
     struct image_window window;              /* EXR; no width: pixels are the whole picture */
     const char *light_groups;                /* EXR: "key,fill": names of their layers; NULL: none */
     const char *model;                       /* for the metadata; may be empty */
+    const char *part;                        /* EXR: of which picture it is a part; NULL or empty: it is whole */
     const struct mattes *mattes;             /* EXR: names for the layers of Cryptomatte; NULL: none */
     const float *origin;                     /* for the metadata: subtracted from all places; NULL or 0: nothing */
     const char *colour_space, *display_view; /* what the pixels have been converted to; NULL: nothing */

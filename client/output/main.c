@@ -7,6 +7,7 @@
 #include "library.h"
 #include "helper/sandbox.h"
 #include "serve.h"
+#include "protocol/common/squares.h"
 #include "protocol/version.h"
 
 #include <argp.h>
@@ -30,6 +31,7 @@ enum {
     KEY_FPS,
     KEY_FORMAT,
     KEY_READ,
+    KEY_MERGE,
     KEY_FULL_METADATA,
     KEY_TEXT,
     KEY_WINDOW,
@@ -40,12 +42,12 @@ enum {
     KEY_DISPLAY_VIEW
 };
 
-#define READ_MAX 2u
+#define READ_MAX SQUARES_PARTS_MAX
 
 struct options {
     const char *folder;
     enum image_format format; /* of all files; unknown: any */
-    bool draws_text;
+    bool draws_text, merges;
     struct compare_file files[READ_MAX];
     struct serve_options serve;
 };
@@ -78,9 +80,13 @@ static error_t parse(int key, char *value, struct argp_state *state)
         if (options->format == IMAGE_UNKNOWN)
             argp_error(state, "--format: '%s' is no format", value);
         return 0;
+    case KEY_MERGE:
+        options->merges = true;
+        return 0;
     case KEY_READ:
-        if (options->serve.file_count == READ_MAX)
-            argp_error(state, "--read: two files are the most");
+    case ARGP_KEY_ARG:
+        if (options->serve.file_count == (options->merges ? READ_MAX : 2))
+            argp_error(state, "more files than are compared, 2, or merged, %u", READ_MAX);
         options->files[options->serve.file_count++].path = value;
         return 0;
     case KEY_FULL_METADATA:
@@ -133,7 +139,7 @@ static void open_files(struct options *options)
 
 static bool draws_text(const struct options *options)
 {
-    return options->draws_text || options->serve.file_count > 0;
+    return options->draws_text || (options->serve.file_count > 0 && !options->merges);
 }
 
 static bool needs_library(const struct options *options)
@@ -196,6 +202,7 @@ int main(int argc, char **argv)
          "start)",
          0},
         {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
+        {"merge", KEY_MERGE, NULL, 0, "The files FILE.. are parts of a picture that becomes one file", 0},
         {"text", KEY_TEXT, NULL, 0, "Text may be drawn into pictures", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
         {"window", KEY_WINDOW, "X,Y,W,H", 0, "Pictures are the part from X, Y on of W x H pixels", 0},
@@ -209,6 +216,7 @@ int main(int argc, char **argv)
         {0}};
     static const struct argp argp = {.options = rows,
                                      .parser = parse,
+                                     .args_doc = "[-- FILE...]",
                                      .doc =
                                          "Write and compare image files for farlight, which starts this program."};
     struct options options = {.serve = {.fd = -1, .files = options.files}};

@@ -103,7 +103,10 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     add_text(entries, "tracer", protocol_tracer_text(begin.tracer));
     add_text(entries, "integrator", protocol_integrator_text(begin.integrator));
     add_count(entries, "samples", begin.samples);
-    add_text(entries, "digest", digest);
+    if (image.part && image.part[0] != '\0') // most of its pixels are elsewhere
+        add_text(entries, "part", image.part);
+    else
+        add_text(entries, "digest", digest);
     if (has_layers(begin))
         add_text(entries, "layers", layer_names(begin.layers));
     add_number(entries, "exposure_stops", static_cast<double>(begin.exposure_stops));

@@ -7,6 +7,7 @@
 #include "helper/incoming.h"
 #include "library.h"
 #include "mattes.h"
+#include "merge.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +25,7 @@ struct text {
 /* The state of the picture that is being received. */
 struct request {
     uint32_t number;
-    char path[4097], format[17], model[4097];
+    char path[4097], format[17], model[4097], part[401];
     bool half, named;
     float origin[3];
     unsigned quality;
@@ -52,6 +53,7 @@ static void start_request(struct request *request, uint32_t number, const struct
     snprintf(request->path, sizeof(request->path), "%s", wanted->path);
     snprintf(request->format, sizeof(request->format), "%s", wanted->format);
     snprintf(request->model, sizeof(request->model), "%s", wanted->model);
+    snprintf(request->part, sizeof(request->part), "%s", wanted->part);
     if (image_format_of(request->path, request->format) == IMAGE_UNKNOWN)
         snprintf(request->reason, sizeof(request->reason), "the ending names no format that can be written");
 }
@@ -118,6 +120,7 @@ static void write_image(struct exporter *exporter, const struct message_frame_en
                                 .full_metadata = exporter->options->full_metadata,
                                 .window = exporter->options->window,
                                 .model = request->model,
+                                .part = request->part,
                                 .mattes = exporter->mattes,
                                 .colour_space = exporter->options->colour.space,
                                 .display_view = exporter->options->colour.view,
@@ -189,6 +192,20 @@ static bool compare(struct exporter *exporter, uint32_t number, const struct mes
     return channel_send(&exporter->channel, number, &message);
 }
 
+/* ---- one picture of many parts ---- */
+
+static bool merge(struct exporter *exporter, uint32_t number, const struct message_merge_images *wanted)
+{
+    struct merge_result result = {0};
+    if (merge_images(wanted, exporter->options->files, exporter->options->file_count, &result))
+        return channel_send(&exporter->channel, number, &(struct message){.type = MESSAGE_OK});
+    return channel_send_failure(&exporter->channel, number,
+                                &(struct channel_failure){.field = result.field,
+                                                          .reason = result.reason,
+                                                          .remedy = result.remedy,
+                                                          .retryable = file_lacked_space()});
+}
+
 /* ---- any message ---- */
 
 static bool handle(void *user, uint32_t number, const struct message *message)
@@ -197,6 +214,8 @@ static bool handle(void *user, uint32_t number, const struct message *message)
     struct request *request = &exporter->request;
     if (message->type == MESSAGE_COMPARE_IMAGES)
         return !request->named && compare(exporter, number, &message->compare_images);
+    if (message->type == MESSAGE_MERGE_IMAGES)
+        return !request->named && merge(exporter, number, &message->merge_images);
     if (message->type == MESSAGE_EXPORT_NAME)
         return !request->named && mattes_name(&exporter->mattes, &message->export_name);
     if (message->type != MESSAGE_EXPORT_IMAGE && number != request->number)

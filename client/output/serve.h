@@ -17,7 +17,7 @@ struct serve_options {
     bool full_metadata, dwaa;
     struct colour_wanted colour; /* with it, the first answer says whether there is that, before any request */
     struct image_window window;  /* of EXR files */
-    const struct compare_file *files; /* that may be compared: a message opens nothing */
+    const struct compare_file *files; /* that may be compared or merged: a message opens nothing */
     size_t file_count;
 };
 

@@ -54,7 +54,7 @@ MAY_INCLUDE = {
     "client/edit": ("protocol", "protocol/common", "client/lib"),  # a part of the library
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper", SHARED),  # the default sky
-    "client/output": ("protocol", "client/helper"),
+    "client/output": ("protocol", "protocol/common", "client/helper"),
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
