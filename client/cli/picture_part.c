@@ -2,12 +2,15 @@
 #include "cli/picture_part.h"
 #include "lib/imported.h"
 #include "protocol/codec.h"
+#include "protocol/version.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
+
+#define HEADER_BYTES 65536 /* of a file; more than there are of all layers */
 
 /* ---- options ---- */
 
@@ -45,6 +48,10 @@ bool cli_picture_part_complete(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
     const char *why = NULL, *other = job->parts > 0 ? find_conflict(job, &why) : NULL;
+    if (job->parts == 0 && job->series.resume) {
+        cli_usage(job, "--resume", "only a part of a picture is left out where it exists");
+        return fl_error_remedy(&job->error, "add --part K/N");
+    }
     if (job->parts == 0)
         return true;
     if (job->outputs[0].image != CLI_IMAGE_EXR) {
@@ -73,7 +80,12 @@ bool cli_picture_part_complete(struct cli_job *job)
 
 /* ---- what the picture depends on ---- */
 
-/* Of the job as it is asked for, without what only says how its frames travel. */
+static void add_text(XXH3_state_t *state, const char *text)
+{
+    XXH3_64bits_update(state, text, strlen(text) + 1);
+}
+
+/* The job as it is asked for, without what only says how its frames travel. */
 static bool add_job(XXH3_state_t *state, const struct cli_job *job, struct fl_error *error)
 {
     static uint8_t bytes[CODEC_CONTROL_PAYLOAD_MAX_BYTES];
@@ -91,10 +103,19 @@ static bool add_job(XXH3_state_t *state, const struct cli_job *job, struct fl_er
     XXH3_64bits_update(state, bytes, writer.used_bytes);
     for (size_t i = 0; i < job->edit_count; i++) {
         char text[512];
-        fl_assignment_print(&job->edits[i], text, sizeof(text));
-        XXH3_64bits_update(state, text, strlen(text) + 1);
+        add_text(state, fl_assignment_print(&job->edits[i], text, sizeof(text)));
     }
     return true;
+}
+
+/* What the file is made of beside the pixels. */
+static void add_file(XXH3_state_t *state, const struct cli_job *job)
+{
+    add_text(state, FARLIGHT_VERSION);
+    add_text(state, job->float_pixels ? "float" : "half");
+    add_text(state, job->colour_space ? job->colour_space : "");
+    for (size_t i = 0; i < job->light_group_count; i++)
+        add_text(state, job->light_groups[i]);
 }
 
 static bool digest_of(const struct cli_job *job, const struct fl_scene *scene, uint64_t *digest,
@@ -107,6 +128,7 @@ static bool digest_of(const struct cli_job *job, const struct fl_scene *scene, u
     XXH3_64bits_reset(state);
     XXH3_64bits_update(state, &scene_digest, sizeof(scene_digest));
     const bool added = add_job(state, job, error);
+    add_file(state, job);
     *digest = XXH3_64bits_digest(state);
     XXH3_freeState(state);
     return added;
@@ -133,6 +155,22 @@ bool cli_picture_part_begin(struct cli_picture_part *part, struct cli_job *job, 
     memcpy(part->name, name, sizeof(part->name));
     job->part_name = part->name;
     return true;
+}
+
+/* The file appeared when it was complete, so what its header says is there. */
+bool cli_picture_part_is_there(const struct cli_picture_part *part, const char *path)
+{
+    static const char begin[] = "farlight/part\0string";
+    const uint32_t length = (uint32_t)strlen(part->name); /* files are little-endian, as hosts are */
+    char wanted[sizeof(begin) + sizeof(length) + sizeof(part->name)], header[HEADER_BYTES];
+    FILE *file = fopen(path, "re");
+    const size_t got = file ? fread(header, 1, sizeof(header), file) : 0;
+    memcpy(wanted, begin, sizeof(begin));
+    memcpy(wanted + sizeof(begin), &length, sizeof(length));
+    memcpy(wanted + sizeof(begin) + sizeof(length), part->name, length);
+    if (file)
+        fclose(file);
+    return memmem(header, got, wanted, sizeof(begin) + sizeof(length) + length) != NULL;
 }
 
 bool cli_picture_part_next(const struct cli_picture_part *part, struct message_render *render)

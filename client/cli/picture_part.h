@@ -21,6 +21,8 @@ bool cli_picture_part_complete(struct cli_job *job);
 /* Of a scene that is settled. Squares that have come before stay, if device and scene are still the same. */
 bool cli_picture_part_begin(struct cli_picture_part *part, struct cli_job *job, struct fl_connection *connection,
                             const struct fl_scene *scene, struct fl_error *error);
+/* Whether the file is this part of this picture, by this device. */
+bool cli_picture_part_is_there(const struct cli_picture_part *part, const char *path);
 /* Sets what is to be rendered next; false: all squares have come. */
 bool cli_picture_part_next(const struct cli_picture_part *part, struct message_render *render);
 /* Puts the square into the picture. */

@@ -10,7 +10,7 @@
 /* Edges are smooth and shadows soft with these; software GL has 1280x720 pixels in some seconds. */
 #define STILL_SAMPLES 16u
 
-enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE, KEY_WATCH, KEY_PART };
+enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE, KEY_WATCH, KEY_PART, KEY_RESUME };
 
 static const struct argp_option options[] = {
     {"scene", KEY_SCENE, "NAME", 0,
@@ -24,6 +24,7 @@ static const struct argp_option options[] = {
     {"part", KEY_PART, "K/N", 0,
      "Render only the K-th of N parts of the picture, for 'farlight merge'; EXR files, with a number of samples",
      -1},
+    {"resume", KEY_RESUME, NULL, 0, "Render no part whose file exists, and is of the same picture", -1},
     {"watch", KEY_WATCH, NULL, 0,
      "Render again when the model, or a file that it names, has changed, until Ctrl-C; only what is new is sent",
      -1},
@@ -51,6 +52,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         break;
     case KEY_SCENE:
         job->scene = value;
+        return 0;
+    case KEY_RESUME:
+        job->series.resume = true;
         return 0;
     case KEY_WATCH:
         job->watch = true;

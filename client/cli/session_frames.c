@@ -193,6 +193,11 @@ static bool render_part(struct session *session, struct fl_error *error)
     struct fl_frame *frame = NULL;
     if (!cli_picture_part_begin(part, job, session->loading.connection, session->loading.scene, error))
         return false;
+    if (job->series.resume && cli_picture_part_is_there(part, session->sinks.items[0].path)) {
+        if (!job->quiet)
+            fprintf(stderr, "farlight: part %u of %u exists already\n", job->part, job->parts);
+        return true;
+    }
     while (cli_picture_part_next(part, &options)) {
         session->rendering = fl_render_start(session->loading.scene, &options, error);
         while (session->rendering && (frame = fl_render_next(session->rendering, error))) {

@@ -79,6 +79,16 @@ class Parts(PartsCase, OneDaemon):
         for name, values in read_exr(self.folder / "merged.exr")[2].items():
             self.assertEqual([sum(each) for each in zip(*(part[name] for part in parts))], values)
 
+    def test_a_part_that_exists_is_left_out_if_it_is_of_the_same_picture(self):
+        path = self.parts(ROOM, 2)[0]
+        before = path.stat().st_mtime_ns
+        again = ["--part", "1/2", "--resume", "-o", path]
+        self.assertIn("part 1 of 2 exists already", self.expect(render(ROOM, *again), 0).stderr)
+        self.assertEqual(path.stat().st_mtime_ns, before)
+        for more in (["--seed", "3"], ["--layers", "beauty,depth"], ["--layers", "beauty,depth", "--float"]):
+            self.assertNotIn("exists", self.expect(render(ROOM, *again, *more), 0).stderr)
+        self.assertIn("add --part", self.expect(render(ROOM, "--resume", "-o", path), 2).stderr)
+
     def test_what_is_missing_or_doubled_is_named(self):
         one, two, three, four = self.parts(ROOM, 4)
         self.assertIn("parts 1 and 3 of 4 are missing", self.merge([two, four], status=1))
