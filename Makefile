@@ -561,7 +561,7 @@ install: all
 	install -m 644 README.md CHANGELOG.md SECURITY.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/examples/* $(DESTDIR)$(PREFIX)/share/doc/farlight/examples
 	install -d $(DESTDIR)$(PREFIX)/share/farlight/farm
-	install -m 644 $(addprefix conf/farm/,README.md openjd.yaml flamenco.js) $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 644 $(addprefix conf/farm/,README.md openjd.yaml openjd-still.yaml flamenco.js flamenco-still.js) $(DESTDIR)$(PREFIX)/share/farlight/farm
 	install -m 755 conf/farm/xargs.sh conf/farm/slurm.sbatch $(DESTDIR)$(PREFIX)/share/farlight/farm
 	install -m 755 conf/farm/farlight-node $(DESTDIR)$(PREFIX)/bin
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight

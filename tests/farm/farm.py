@@ -4,7 +4,7 @@
 
 Slurm, one node: an animation as an array of tasks while workers and daemons are killed at random. Then a picture is
 damaged, and the same job is submitted again. Every picture must be there once, with the bytes of a single run, and the
-second job must render the damaged one alone. Open Job Description: the template's own scripts, run as its specification
+second job must render the damaged one alone. One still by as many parts, with the same killing, must have the bytes of one part. Open Job Description: the template's own scripts, run as its specification
 says. Flamenco: the job type is compiled by Node.js with Flamenco's names, and the commands are run. xargs: as it is. All of
 them once more with names that a shell, xargs or a parser of options could take for its own.
 
@@ -30,6 +30,7 @@ sys.path.insert(0, str(HERE))
 from slurm import Slurm  # pylint: disable=wrong-import-position
 
 PICTURE = ["--size", "96x72", "--samples", "4", "--integrator", "path", "--orbit"]
+STILL = ["--size", "640x360", "--samples", "4", "--integrator", "path"]
 KILL_EVERY_S = 2.0
 FOR_GOOD_S = 900
 HOSTILE = """-a "b' $(touch x) `touch y`; touch z {} \\ *"""
@@ -55,6 +56,9 @@ class Farm:
         reference = folder / "reference"
         self.run("farlight", "animate", self.model, *self.range(tasks), "-o", reference / "%04d.png", *PICTURE, "-q")
         self.reference = digests(reference)
+        self.run("farlight", "render", self.model, "--part", "1/1", "-o", folder / "whole.exr", *STILL, "-q")
+        self.run("farlight", "merge", folder / "whole.exr", "-o", folder / "still.exr")
+        self.still = (folder / "still.exr").read_bytes()
 
     @staticmethod
     def range(count):
@@ -77,6 +81,11 @@ class Farm:
         self.run("farlight", "verify", folder / "%04d.png", *self.range(len(wanted)))
         left = {path.name for path in folder.iterdir()} - set(wanted) - {f"{name}.sha256" for name in wanted}
         self.expect(not left, f"left over: {left}")
+
+    def is_as_one_part(self, path, count):
+        self.expect(path.read_bytes() == self.still, f"{path}: another picture than one part gives")
+        parts = {part.name for part in pathlib.Path(f"{path}.parts").iterdir()}
+        self.expect(parts == {f"{number}-of-{count}.exr" for number in range(1, count + 1)}, f"parts: {parts}")
 
     # ---- what runs here ----
 
@@ -106,24 +115,17 @@ class Farm:
     # ---- one each ----
 
     def slurm(self):
-        out, rng, killed, comments = self.folder / "slurm", random.Random(1), 0, set()
+        out, comments = self.folder / "slurm", set()
         variables = {"MODEL": str(self.model), "FRAMES": f"1-{self.tasks}", "OUTPUT": str(out / "%04d.png"), "RETRIES": "20"}
         (self.folder / "cluster").mkdir()
         with Slurm(self.folder / "cluster") as cluster:
-            begin = killed_s = time.monotonic()
+            begin = time.monotonic()
             job = cluster.submit(FARM / "slurm.sbatch", f"1-{self.tasks}", *PICTURE, **variables)
-            while queue := cluster.queue():
-                comments.update(queue)
-                self.expect(time.monotonic() - begin < FOR_GOOD_S, f"the job does not end: {cluster.ask('squeue')}")
-                if time.monotonic() - killed_s > KILL_EVERY_S:
-                    killed_s = time.monotonic()
-                    killed += self.kill_one(rng)
-                time.sleep(0.1)
+            killed = self.kill_while_it_runs(cluster, comments)
             took_s = time.monotonic() - begin
             self.is_as_one_run(out)
             logs = list((self.folder / "cluster").glob("farlight-*.log"))
             requeued = sum(log.read_text().count("queued again") for log in logs)
-            self.expect(killed > 0, "nothing was killed")
             self.expect(any("of 1 frames" in comment for comment in comments), f"squeue shows {comments}")
             attempts = self.accounted(cluster, job)
             ended = [state for _, state, _ in attempts]
@@ -135,6 +137,28 @@ class Farm:
             while cluster.queue():
                 time.sleep(0.2)
             for_all()
+            self.slurm_still(cluster)
+
+    def kill_while_it_runs(self, cluster, comments):
+        begin = killed_s = time.monotonic()
+        rng, killed = random.Random(1), 0
+        while queue := cluster.queue():
+            comments.update(queue)
+            self.expect(time.monotonic() - begin < FOR_GOOD_S, f"the job does not end: {cluster.ask('squeue')}")
+            if time.monotonic() - killed_s > KILL_EVERY_S:
+                killed_s = time.monotonic()
+                killed += self.kill_one(rng)
+            time.sleep(0.1)
+        self.expect(killed > 0, "nothing was killed")
+        return killed
+
+    def slurm_still(self, cluster):
+        still = self.folder / "slurm-still.exr"
+        cluster.submit(FARM / "slurm.sbatch", f"1-{self.tasks}", *STILL, MODEL=str(self.model), OUTPUT=str(still), FRAMES="", RETRIES="20")
+        killed = self.kill_while_it_runs(cluster, set())
+        self.run("farlight", "merge", "-o", still, "--", *pathlib.Path(f"{still}.parts").iterdir())
+        self.is_as_one_part(still, self.tasks)
+        print(f"slurm: one still by {self.tasks} parts, {killed} processes killed, has the bytes of one part")
 
     def hostile(self, folder):
         """A model with such a name in a folder, whose pictures shall be in a folder with that name. What is to be called then."""
@@ -184,20 +208,23 @@ class Farm:
         self.openjd_job(self.folder / "session", {"Model": self.model, "Frames": f"1-{self.tasks}", "OutputFolder": self.folder / "openjd",
                                                   "OutputName": "%04d.png", "Parts": 4, "Options": " ".join(PICTURE)})
         self.is_as_one_run(self.folder / "openjd")
+        self.openjd_job(self.folder / "still-session", {"Model": self.model, "OutputFolder": self.folder, "OutputName": "openjd-still.exr",
+                                                         "Parts": 3, "Options": " ".join(STILL)}, name="openjd-still.yaml")
+        self.is_as_one_part(self.folder / "openjd-still.exr", 3)
         folder = self.folder / "hostile-openjd"  # a daemon's address has no spaces
         check = self.hostile(folder)
         self.openjd_job(folder / "$(id>x)", {"Model": f"{HOSTILE}.glb", "Frames": "1-2", "OutputFolder": HOSTILE, "OutputName": "%04d.png",
                                                 "Parts": 2, "Options": " ".join([*PICTURE, ""])}, cwd=folder)
         check()
-        print("openjd: 4 tasks; 2 with a name that no shell may read")
+        print("openjd: 4 tasks, 3 parts of a still; 2 with a name that no shell may read")
 
-    def openjd_job(self, session, given, **options):
+    def openjd_job(self, session, given, name="openjd.yaml", **options):
         import yaml  # pylint: disable=import-outside-toplevel
-        template = yaml.safe_load((FARM / "openjd.yaml").read_text())
+        template = yaml.safe_load((FARM / name).read_text())
         self.expect({parameter["name"] for parameter in template["parameterDefinitions"]} == set(given), "other parameters")
         session.mkdir()
         values = {**{f"Param.{name}": value for name, value in given.items()}, "Session.WorkingDirectory": session}
-        render, verify = template["steps"]
+        render, last = template["steps"]
         environment = render["stepEnvironments"][0]["script"]
         answered = openjd_run(self, environment, "onEnter", "Env", values, **options)
         os.environ.update(dict(re.findall(r"^openjd_env: (\w+)=(.*)$", answered, re.M)))
@@ -210,27 +237,30 @@ class Farm:
         finally:
             openjd_run(self, environment, "onExit", "Env", values, **options)
             del os.environ["FARLIGHT_SERVER"]
-        openjd_run(self, verify["script"], "onRun", "Task", values, **options)
+        openjd_run(self, last["script"], "onRun", "Task", values, **options)
 
     def flamenco(self):
         out = self.folder / "flamenco"
         count = self.flamenco_job({"model": str(self.model), "frames": f"1-{self.tasks}", "chunk_size": 16, "output": str(out / "%04d.png"),
                                    "options": " ".join(PICTURE)})
         self.is_as_one_run(out)
+        still = self.folder / "flamenco-still.exr"
+        self.flamenco_job({"model": str(self.model), "output": str(still), "parts": 5, "options": " ".join(STILL)}, name="flamenco-still.js")
+        self.is_as_one_part(still, 5)
         folder = self.folder / "hostile flamenco"
         check = self.hostile(folder)
         self.flamenco_job({"model": f"{HOSTILE}.glb", "frames": "1-2", "chunk_size": 1, "output": f"{HOSTILE}/%04d.png",
                            "options": " ".join(PICTURE)}, cwd=folder)
         check()
-        print(f"flamenco: {count} tasks; 3 with a name that no shell may read")
+        print(f"flamenco: {count} tasks, 6 for a still; 3 with a name that no shell may read")
 
-    def flamenco_job(self, settings, **options):
-        tasks = json.loads(self.run("node", HERE / "flamenco_compile.js", FARM / "flamenco.js", json.dumps(settings)))
+    def flamenco_job(self, settings, name="flamenco.js", **options):
+        tasks = json.loads(self.run("node", HERE / "flamenco_compile.js", FARM / name, json.dumps(settings)))
         for task in tasks:
             for command in task["commands"]:
                 self.expect(command["name"] == "exec", f"command {command['name']}")
                 self.run(command["parameters"]["exe"], *command["parameters"]["args"], **options)
-        self.expect(tasks[-1]["dependencies"] == [task["name"] for task in tasks[:-1]], "verify does not wait for all")
+        self.expect(tasks[-1]["dependencies"] == [task["name"] for task in tasks[:-1]], "the last task does not wait for all")
         return len(tasks)
 
     def xargs(self):

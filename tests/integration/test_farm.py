@@ -102,22 +102,26 @@ class OpenJobDescription(Case):
             self.skipTest(f"python3-{why.name} is not installed")
         schema = json.loads((pathlib.Path(__file__).parents[1] / "farm/openjd.schema.json").read_text())
         self.validator = jsonschema.Draft7Validator(schema)
-        self.template = yaml.safe_load((NODE.parent / "openjd.yaml").read_text())
+        self.template, self.still = (yaml.safe_load((NODE.parent / name).read_text()) for name in ("openjd.yaml", "openjd-still.yaml"))
 
-    def faults(self):
-        return [f"{'.'.join(map(str, one.absolute_path))}: {one.message}" for one in self.validator.iter_errors(self.template)]
+    def faults(self, template=None):
+        return [f"{'.'.join(map(str, one.absolute_path))}: {one.message}" for one in self.validator.iter_errors(template or self.template)]
 
-    def test_the_template_has_fields_that_there_are(self):
-        self.assertEqual(self.faults(), [])
+    def test_the_templates_have_fields_that_there_are(self):
+        self.assertEqual(self.faults() + self.faults(self.still), [])
         self.template["parameterDefinitions"][1]["allowedPattern"] = "[0-9]+-[0-9]+"  # of no version
         self.assertEqual(len(self.faults()), 1)
 
     def test_each_parameter_has_a_control_and_rendering_asks_for_a_gpu(self):
-        for parameter in self.template["parameterDefinitions"]:
-            self.assertIn("control", parameter["userInterface"], parameter["name"])
-        render, verify = self.template["steps"]
-        self.assertEqual(render["hostRequirements"]["amounts"], [{"name": "amount.worker.gpu", "min": 1}])
-        self.assertNotIn("amounts", verify["hostRequirements"])
+        for template in (self.template, self.still):
+            for parameter in template["parameterDefinitions"]:
+                self.assertIn("control", parameter["userInterface"], parameter["name"])
+            render, last = template["steps"]
+            self.assertEqual(render["hostRequirements"]["amounts"], [{"name": "amount.worker.gpu", "min": 1}])
+            self.assertNotIn("amounts", last["hostRequirements"])
+
+    def test_both_templates_keep_a_daemon_alike(self):
+        self.assertEqual(*(template["steps"][0]["stepEnvironments"] for template in (self.template, self.still)))
 
     def test_the_daemon_of_a_session_has_the_gpu_that_was_given(self):
         script = self.folder / "enter"
@@ -134,9 +138,13 @@ class OpenJobDescription(Case):
                 self.assertIn(f"openjd_fail: farlightd --listen unix:{self.folder}/farlight.sock --device {gpu} ended with status 3", result.stdout)
 
     def test_format_strings_name_what_there_is(self):
-        parameters = {one["name"] for one in self.template["parameterDefinitions"]}
+        for template in (self.template, self.still):
+            self.names_what_there_is(template)
+
+    def names_what_there_is(self, template):
+        parameters = {one["name"] for one in template["parameterDefinitions"]}
         names = {f"{kind}.{name}" for name in parameters for kind in ("Param", "RawParam")} | {"Session.WorkingDirectory"}
-        for step in self.template["steps"]:
+        for step in template["steps"]:
             known = names | {f"Task.Param.{one['name']}" for one in step.get("parameterSpace", {}).get("taskParameterDefinitions", ())}
             known |= {f"Task.File.{one['name']}" for one in step["script"].get("embeddedFiles", ())}
             for environment in step.get("stepEnvironments", ()):
@@ -216,6 +224,18 @@ class OneDaemonForManyTasks(Case):
             result = subprocess.run(["bash", script], env=environment, capture_output=True, text=True, check=False)
             self.assertEqual(result.returncode, 0 if wanted else 2, result.stderr)
             self.assertIn(f"--shard {wanted} " if wanted else "give PARTS", result.stdout + result.stderr)
+
+    def test_an_array_without_frames_renders_parts_of_a_still(self):
+        fake = self.folder / "farlight-node"
+        fake.write_text("#!/bin/sh\necho \"$@\"\n")
+        fake.chmod(0o755)
+        for output, wanted in (("a b.exr", "render -o a b.exr.parts/3-of-4.exr --parents --part 3/4 --resume"), ("%d.exr", None), ("x.png", None)):
+            environment = {**os.environ, "PATH": f"{self.folder}:{os.environ['PATH']}", "MODEL": "m.glb", "FRAMES": "", "OUTPUT": output,
+                           "PARTS": "", "SLURM_ARRAY_JOB_ID": "1", "SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_MIN": "1",
+                           "SLURM_ARRAY_TASK_MAX": "4", "SLURM_ARRAY_TASK_COUNT": "4"}
+            result = subprocess.run(["bash", NODE.parent / "slurm.sbatch"], env=environment, capture_output=True, text=True, check=False)
+            self.assertEqual(result.returncode, 0 if wanted else 2, result.stderr)
+            self.assertIn(wanted or f"OUTPUT, '{output}', is none: give FRAMES", result.stdout + result.stderr)
 
     def test_what_cannot_be_a_value_is_named(self):
         for command, environment, status, words in (
