@@ -70,18 +70,18 @@ static const struct option options[] = {
      "Threads that encode frames, of which one user or key has all but one at most; 0: one per core, 2 to 4"},
 
     {"memory", "scene", ANYTIME, OPTION_BYTES, AT(scene_bytes), "10%", MIB, 16 * TIB, "bytes",
-     "Host memory of one scene, and of all together without their blobs. A percentage is of what the daemon may have: of "
+     "Host memory of one scene, and of all of a user together without their blobs. A percentage is of what the daemon may have: of "
      "the host's memory, or of the limit of its control group (cgroup) if that is lower"},
     {"memory", "blobs", ANYTIME, OPTION_BYTES, AT(limits.blob_bytes), "20%", MIB, 16 * TIB, "bytes",
-     "Host memory of all blobs together: vertices, texels and the like"},
+     "Host memory of all blobs of a user together: vertices, texels and the like"},
     {"memory", "blob_cache", ANYTIME, OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
      "The part of it for blobs that are no longer used, kept for a user's next connection"},
     {"memory", "transactions", ANYTIME, OPTION_BYTES, AT(limits.transaction_bytes), "5%", MIB, 16 * TIB, "bytes",
-     "Host memory of the edits of all clients that wait to be committed"},
+     "Host memory of the edits of all clients of a user that wait to be committed"},
     {"memory", "frames", ANYTIME, OPTION_BYTES, AT(limits.frame_bytes), "15%", MIB, 16 * TIB, "bytes",
-     "Host memory of the frames of all jobs; a job that may need more waits for others to end"},
+     "Host memory of the frames of all jobs of a user; a job that may need more waits for others to end"},
     {"memory", "device", START, OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
-     "Device memory; 0: 70 % of the device's own, 85 % of what is free where the driver tells no more, 2 GiB (at most 25 % "
+     "Device memory of a user; 0: 70 % of the device's own, 85 % of what is free where the driver tells no more, 2 GiB (at most 25 % "
      "of what the daemon may have of the host's) where it tells nothing. Software GL has 25 % of the latter"},
     {"memory", "programs", START, OPTION_BYTES, AT(program_bytes), "256M", 0, 16 * TIB, "bytes",
      "Size of the compiled programs that are kept on the disk, in the folder farlight of $XDG_CACHE_HOME or ~/.cache; "
@@ -96,7 +96,7 @@ static const struct option options[] = {
      "with it. A scene is written about a second after it has changed, and removed when it ends. The folder belongs to "
      "one daemon, and nobody but its user may enter: what users have uploaded is in it, not encrypted"},
     {"scenes", "store_bytes", START, OPTION_BYTES, AT(store_bytes), "16G", MIB, 1024 * TIB, "bytes",
-     "Maximum size of the folder; beyond it, the user with most in it loses the scene that was written first"},
+     "Maximum size of what a user has in the folder; beyond it, the scene goes that was written first"},
 
     {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "share", ANYTIME, OPTION_U32, AT(limits.share_percent), "75", 1, 100, "%",
@@ -422,17 +422,30 @@ bool config_engine(const struct config *config, struct engine_options *engine, s
     return true;
 }
 
-bool config_hub(const struct config *config, struct hub_options *hub, struct error *error)
+void config_hub(const struct config *config, struct hub_options *hub)
 {
     *hub = (struct hub_options){
         .limits = config->limits,
         .connection_limits = config->connection,
         .engine_limits = engine_limits(config),
-        .insecure = config->insecure,
     };
     hub->limits.frames_in_flight = ENGINE_FRAMES_IN_FLIGHT;
-    return readers_parse(&hub->readers, config->readers, "server.readers", error) &&
-           auth_read_keys(&hub->keys, config->key_file, config->reader_key_file, error);
+}
+
+bool config_front(const struct config *config, struct front_options *front, struct error *error)
+{
+    *front = (struct front_options){
+        .limits = {.clients = config->limits.clients,
+                   .unauthenticated = config->limits.unauthenticated,
+                   .unauthenticated_per_address = config->limits.unauthenticated_per_address,
+                   .handshakes_a_second = config->limits.handshakes_a_second},
+        .connection_limits = config->connection,
+        .insecure = config->insecure,
+        .unused_ns = config->unused_s * UINT64_C(1000000000),
+        .owner_fd = -1,
+    };
+    return readers_parse(&front->readers, config->readers, "server.readers", error) &&
+           auth_read_keys(&front->keys, config->key_file, config->reader_key_file, error);
 }
 
 /* ---- dump -------------------------------------------------------------------------------------------- */

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "engine/engine.h"
+#include "front/front.h"
 #include "session/hub.h"
 
 #include <stdbool.h>
@@ -45,9 +46,11 @@ bool config_read_file(struct config *config, const char *path, bool optional, st
 bool config_read_environment(struct config *config, struct error *error);
 /* The engine's share; false: the device is not said in a way that can be understood. */
 bool config_engine(const struct config *config, struct engine_options *options, struct error *error);
-/* The network's share, with what is in the key files; the engine is not in it. False: something cannot be
+/* The sessions' share; the engine and the keys are not in it. */
+void config_hub(const struct config *config, struct hub_options *options);
+/* The front's, with what is in the key files; the workers' setup is not in it. False: something cannot be
  * understood, or read. */
-bool config_hub(const struct config *config, struct hub_options *options, struct error *error);
+bool config_front(const struct config *config, struct front_options *options, struct error *error);
 /* What may not change while the daemon runs is in `next` as it is in `config`, afterwards; the log names each that
  * was not. */
 void config_keep_start(struct config *next, const struct config *config);

@@ -1,15 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-/* farlightd: options, and the wiring of the engine to the network.
- * Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one client is
- * gone; 1 when it cannot start or go on; 2 for wrong usage; 75 when its GPU is lost for good, which may be
- * different in a new process. With --check-device: 0 when all holds, 1 when something does not, 75 when the GPU
- * was lost on the way. */
+/* farlightd: options, and what the process is to be: the front that people start, a worker of it, or a daemon of
+ * one client. Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one
+ * client is gone; 1 when it cannot start or go on; 2 for wrong usage; 75 when the GPU of a daemon of one client is
+ * lost for good, which may be different in a new process. With --check-device: 0 when all holds, 1 when something
+ * does not, 75 when the GPU was lost on the way. */
+#include "base/clock.h"
 #include "base/log.h"
 #include "base/timeline.h"
 #include "check/check.h"
 #include "config.h"
 #include "gpu/device.h"
 #include "engine/engine.h"
+#include "front/front.h"
+#include "net/channel.h"
+#include "net/notify.h"
 #include "session/daemon.h"
 #include "session/keeper.h"
 #include "protocol/common/standard.h"
@@ -18,9 +22,20 @@
 #include "store/store.h"
 
 #include <argp.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sysexits.h>
+
+/* A worker without a client ends so long after the last scene that may have lingered. */
+#define WORKER_UNUSED_S 60u
+/* Beyond it, scenes of others come back when they do. */
+#define OWNERS_MAX 64
+/* Clients have numbers of their own in each worker. */
+#define WORKER_CLIENTS UINT64_C(1000000)
 
 /* glibc looks for it by name, which -fvisibility=hidden would hide. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlightd " FARLIGHT_VERSION;
@@ -37,7 +52,8 @@ enum {
     KEY_INSECURE,
     KEY_TRACE,
     KEY_KEY,
-    KEY_READER_KEY
+    KEY_READER_KEY,
+    KEY_WORKER
 };
 
 static const struct argp_option option_table[] = {
@@ -58,6 +74,7 @@ static const struct argp_option option_table[] = {
      0},
     {"reader-key-file", KEY_READER_KEY, "FILE", 0, "The same for clients who may look, but change nothing", 0},
     {"insecure", KEY_INSECURE, NULL, 0, "Let TCP be open to everybody and unencrypted, also beyond loopback", 0},
+    {"worker", KEY_WORKER, "N", OPTION_HIDDEN, "Be worker N of the front that has started this process", 0},
     {"dump-config", KEY_DUMP, NULL, 0, "Print all options with their values as a configuration file, and exit", 0},
     {0},
 };
@@ -65,7 +82,7 @@ static const struct argp_option option_table[] = {
 struct arguments {
     char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
     const char *config_file, *device, *log_level, *insecure, *trace_file, *key_file, *reader_key_file;
-    int fd;
+    int fd, worker; /* its number; 0: it is none */
     bool dump_config, check_device, json;
 };
 
@@ -99,6 +116,9 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         arguments->fd = atoi(value);
         if (arguments->fd <= 0)
             argp_error(state, "--fd: \"%s\" is no descriptor", value);
+        break;
+    case KEY_WORKER:
+        arguments->worker = atoi(value);
         break;
     case KEY_CONFIG:
         arguments->config_file = value;
@@ -187,107 +207,278 @@ static int check(const struct config *config, bool json)
     return EXIT_FAILURE;
 }
 
+/* ---- a process that serves --------------------------------------------------------------------------- */
+
+/* What the front tells a worker, first of all and when the configuration was read again. */
+struct worker_setup {
+    struct config config;         /* without files of keys, which are the front's alone */
+    struct auth_key_numbers keys; /* that clients may have come with */
+    uint64_t started_ns;          /* when the front was */
+    uint64_t watchdog_ns;         /* without progress, after which a device hangs; 0: never */
+};
+
+struct serving {
+    struct worker_setup setup;
+    uint32_t number; /* of the worker; 0: it is none */
+    struct daemon daemon;
+    struct store *store; /* NULL: scenes end with the process */
+    struct timeline *timeline;
+    bool device_gone;
+};
+
+static void fill_hub(const struct worker_setup *setup, struct hub_options *options)
+{
+    config_hub(&setup->config, options);
+    options->keys = setup->keys;
+}
+
+static void configured(void *context, const void *bytes, size_t count)
+{
+    struct serving *serving = context;
+    struct hub_options options;
+    struct error error = {0};
+    if (count != sizeof(serving->setup))
+        return;
+    memcpy(&serving->setup, bytes, count);
+    fill_hub(&serving->setup, &options);
+    if (!hub_reload(&serving->daemon.hub, &options, &error))
+        log_write(LOG_ERROR, "config", "the configuration stays as it was: %s", error.text);
+    log_set_level((enum log_level)serving->setup.config.log_level);
+}
+
+/* What was kept for the owner is there before its first client. */
+static void owned(void *context, uint64_t owner)
+{
+    struct serving *serving = context;
+    const struct config *config = &serving->setup.config;
+    struct error error = {0};
+    if (!config->store[0])
+        return;
+    serving->store = store_open_owner(config->store, owner, config->store_bytes, &error);
+    if (serving->store)
+        keeper_restore(serving->store, &serving->daemon.hub);
+    else
+        log_write(LOG_ERROR, "store", "no scene is kept: %s: %s", error.field, error.text);
+}
+
+/* `fd`: of the one client, or of the front. */
+static bool serve_with_engine(struct serving *serving, struct engine *engine, int fd, bool is_worker,
+                              struct error *error)
+{
+    struct daemon *daemon = &serving->daemon;
+    struct hub_options options;
+    fill_hub(&serving->setup, &options);
+    options.engine = engine_port(engine);
+    options.device_bytes = engine_device_limit_bytes(engine);
+    options.timeline = serving->timeline;
+    options.owner_may_be_idle = true;
+    options.started_ns = serving->setup.started_ns;
+    options.first_client = serving->number > 1 ? (serving->number - 1) * WORKER_CLIENTS : 0;
+    daemon->configured = configured;
+    daemon->owned = owned;
+    daemon->front_context = serving;
+    daemon->watchdog_ns = serving->setup.watchdog_ns;
+    /* Nothing lingers any more by then. */
+    daemon->unused_s = serving->setup.config.scene_linger_s + WORKER_UNUSED_S;
+    bool ok = daemon_start(daemon, &options, error) &&
+              (is_worker ? daemon_serve_front(daemon, fd, error) : daemon_serve_fd(daemon, fd, error));
+    ok = ok && daemon_run(daemon, &serving->device_gone, error);
+    daemon_finish(daemon);
+    return ok;
+}
+
+/* Each worker writes a file of its own; the first, and a daemon of one client, that of the configuration. */
+static struct timeline *open_timeline(const struct serving *serving, struct error *error)
+{
+    const struct config *config = &serving->setup.config;
+    char path[CONFIG_TEXT_BYTES + 16];
+    const int bytes = snprintf(path, sizeof(path), "%s", config->trace_file);
+    if (serving->number > 1)
+        snprintf(path + bytes, sizeof(path) - (size_t)bytes, ".%" PRIu32, serving->number);
+    return timeline_create(path, config->trace_file_bytes, error);
+}
+
+static bool serve(struct serving *serving, int fd, bool is_worker, struct error *error)
+{
+    const struct config *config = &serving->setup.config;
+    struct engine_options engine_options;
+    daemon_init(&serving->daemon);
+    if (!config_engine(config, &engine_options, error))
+        return false;
+    if (config->trace_file[0] && !(serving->timeline = open_timeline(serving, error)))
+        return false;
+    /* Scenes of a process that serves one client alone end with that client. */
+    const struct engine_keeper keeper = keeper_port(&serving->store);
+    if (is_worker && config->store[0])
+        engine_options.keeper = &keeper;
+    struct engine *engine = engine_create(&engine_options, error);
+    bool ok = engine && serve_with_engine(serving, engine, fd, is_worker, error);
+    engine_destroy(engine);
+    return ok;
+}
+
+static int serve_to_the_end(struct serving *serving, int fd, bool is_worker)
+{
+    struct error error = {0};
+    daemon_block_signals();
+    log_set_level((enum log_level)serving->setup.config.log_level);
+    bool ok = serve(serving, fd, is_worker, &error);
+    store_close(serving->store);
+    timeline_destroy(serving->timeline);
+    if (ok)
+        return serving->device_gone ? EX_TEMPFAIL : EXIT_SUCCESS;
+    if (is_worker)
+        channel_say(fd, CHANNEL_FAILED, &error, sizeof(error), NULL);
+    return is_worker ? EXIT_FAILURE : fail(&error);
+}
+
+/* Where memory is short, it is a worker that ends: its clients come again. */
+static void offer_to_end_first(void)
+{
+    FILE *file = fopen("/proc/self/oom_score_adj", "we");
+    if (!file)
+        return;
+    fprintf(file, "500\n");
+    fclose(file);
+}
+
+static int serve_as_worker(uint32_t number)
+{
+    const int fd = CHANNEL_WORKER_FD;
+    struct serving *serving = calloc(1, sizeof(*serving));
+    prctl(PR_SET_PDEATHSIG, SIGKILL); /* the front's end is its own */
+    offer_to_end_first();
+    bool ok = serving && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
+              channel_wait(fd, CHANNEL_CONFIG, &serving->setup, sizeof(serving->setup));
+    if (ok)
+        serving->number = number;
+    int status = ok ? serve_to_the_end(serving, fd, true) : EXIT_FAILURE;
+    free(serving);
+    return status;
+}
+
+static int serve_one_client(const struct config *config, int fd)
+{
+    struct serving *serving = calloc(1, sizeof(*serving));
+    int status = EXIT_FAILURE;
+    if (serving) {
+        serving->setup.config = *config;
+        serving->setup.started_ns = clock_now_ns();
+        status = serve_to_the_end(serving, fd, false);
+    }
+    free(serving);
+    return status;
+}
+
+/* ---- the front --------------------------------------------------------------------------------------- */
+
 /* How the configuration came about, to be read again. */
 struct source {
     const struct arguments *arguments;
     struct config *config;
-    struct daemon *daemon;
+    struct worker_setup *setup;
+    struct front *front;
+    struct store_folder *folder; /* NULL: scenes end with the daemon */
 };
+
+/* False: something in the configuration cannot be understood. The caller has a reference to options->keys. */
+static bool fill_front(struct source *source, const struct config *config, struct front_options *options,
+                       struct error *error)
+{
+    struct engine_options engine;
+    if (!config_front(config, options, error))
+        return false;
+    if (!config_engine(config, &engine, error)) {
+        auth_keys_unref(options->keys);
+        return false;
+    }
+    source->setup->config = *config;
+    source->setup->config.key_file[0] = source->setup->config.reader_key_file[0] = '\0';
+    source->setup->keys = auth_keys_numbers(options->keys);
+    options->setup = source->setup;
+    options->setup_bytes = sizeof(*source->setup);
+    return true;
+}
 
 /* All of it or, where something is wrong, nothing. */
 static void reload(void *context)
 {
     struct source *source = context;
     struct config next;
-    struct hub_options options = {0};
+    struct front_options options = {0};
     struct error error = {0};
     bool read = read_config(&next, source->arguments, &error);
     if (read)
         config_keep_start(&next, source->config);
-    if (!read || !config_hub(&next, &options, &error) || !hub_reload(&source->daemon->hub, &options, &error)) {
+    if (!read || !fill_front(source, &next, &options, &error) || !front_reload(source->front, &options, &error)) {
         log_write(LOG_ERROR, "config", "the configuration stays as it was: %s%s%s", error.field,
                   error.field[0] ? ": " : "", error.text);
         auth_keys_unref(options.keys);
         return;
     }
-    auth_keys_unref(options.keys); /* the hub has its own reference */
+    auth_keys_unref(options.keys); /* the front has its own reference */
     *source->config = next;
     log_set_level((enum log_level)source->config->log_level);
-    log_write(LOG_INFO, "config", "the configuration was read again");
 }
 
 /* Whoever starts us with sockets knows where they are to be. */
-static bool begin_to_listen(struct daemon *daemon, const struct config *config, bool beyond_loopback,
+static bool begin_to_listen(struct front *front, const struct config *config, bool beyond_loopback,
                             struct error *error)
 {
     size_t activated;
-    return daemon_listen_activated(daemon, beyond_loopback, &activated, error) &&
-           (activated || daemon_listen(daemon, config->listen, beyond_loopback, error));
+    return front_listen_activated(front, beyond_loopback, &activated, error) &&
+           (activated || front_listen(front, config->listen, beyond_loopback, error));
 }
 
-struct serving {
-    struct daemon *daemon;
-    const struct config *config;
-    int fd; /* of the client; < 0: there is none yet */
-    bool listens;
-    struct timeline *timeline;
-    struct store *store; /* NULL: scenes end with the daemon */
-    bool device_gone;
-};
-
-static bool serve_with_engine(struct serving *serving, struct hub_options *options, struct engine *engine,
-                              struct error *error)
+static bool run_front(struct source *source, struct front *front, struct error *error)
 {
-    struct daemon *daemon = serving->daemon;
-    options->engine = engine_port(engine);
-    options->device_bytes = engine_device_limit_bytes(engine);
-    options->timeline = serving->timeline;
-    options->owner_may_be_idle = true;
-    daemon->unused_ns = serving->config->unused_s * UINT64_C(1000000000);
-    bool ok = daemon_start(daemon, options, error);
-    auth_keys_unref(options->keys); /* the hub has its own reference */
-    if (ok && serving->store)
-        keeper_restore(serving->store, &daemon->hub);
-    ok = ok && (serving->fd < 0 || daemon_serve_fd(daemon, serving->fd, error));
-    if (ok) {
-        daemon_print_ready(daemon, stdout);
-        ok = daemon_run(daemon, &serving->device_gone, error);
-    }
-    daemon_finish(daemon);
+    struct front_options options = {0};
+    uint64_t owners[OWNERS_MAX];
+    source->setup->started_ns = clock_now_ns();
+    source->setup->watchdog_ns = notify_watchdog_ns();
+    if (!fill_front(source, source->config, &options, error))
+        return false;
+    options.owner_fd = source->arguments->fd;
+    options.owners = owners;
+    options.owner_count = source->folder ? store_owners(source->folder, owners, OWNERS_MAX) : 0;
+    front->reload = reload;
+    front->reload_context = source;
+    bool ok = begin_to_listen(front, source->config, source->config->insecure || options.keys, error) &&
+              front_run(front, &options, stdout, error);
+    front_finish(front);
+    auth_keys_unref(options.keys);
     return ok;
 }
 
-static bool serve(struct serving *serving, struct error *error)
+static int be_front(const struct arguments *arguments, struct config *config)
 {
-    const struct config *config = serving->config;
-    struct engine_options engine_options;
-    struct hub_options options;
-    if (!config_engine(config, &engine_options, error) || !config_hub(config, &options, error) ||
-        (serving->listens && !begin_to_listen(serving->daemon, config, config->insecure || options.keys, error)))
-        return false;
-    /* Scenes of a daemon that serves one client alone end with that client. */
-    if (serving->listens && config->store[0] &&
-        !(serving->store = store_open(config->store, config->store_bytes, error)))
-        return false;
-    const struct engine_keeper keeper = keeper_port(serving->store);
-    if (serving->store)
-        engine_options.keeper = &keeper;
-    struct engine *engine = engine_create(&engine_options, error);
-    bool ok = engine && serve_with_engine(serving, &options, engine, error);
-    engine_destroy(engine);
-    store_close(serving->store);
-    return ok;
+    struct worker_setup *setup = calloc(1, sizeof(*setup));
+    struct front front;
+    struct error error = {0};
+    front_init(&front);
+    struct source source = {.arguments = arguments, .config = config, .setup = setup, .front = &front};
+    bool ok = setup || error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    if (ok && config->store[0])
+        ok = (source.folder = store_claim(config->store, &error)) != NULL;
+    ok = ok && run_front(&source, &front, &error);
+    store_release(source.folder);
+    free(setup);
+    return ok ? EXIT_SUCCESS : fail(&error);
 }
 
 int main(int argc, char **argv)
 {
     static const struct argp argp = {option_table, parse_option, NULL, "The farlight rendering daemon.", 0, 0, 0};
-    struct arguments arguments = {.fd = -1};
+    struct arguments arguments = {
+        .fd = -1,
+    };
     struct config config;
     struct error error = {0};
     argp_err_exit_status = 2;
     open_standard_descriptors();
     argp_parse(&argp, argc, argv, 0, NULL, &arguments);
+    if (arguments.worker)
+        return serve_as_worker((uint32_t)arguments.worker);
     if (!read_config(&config, &arguments, &error))
         return fail(&error);
     if (arguments.dump_config)
@@ -295,20 +486,6 @@ int main(int argc, char **argv)
     log_set_level((enum log_level)config.log_level);
     if (arguments.check_device)
         return check(&config, arguments.json);
-    daemon_block_signals();
-    bool listens = arguments.fd < 0 || arguments.listen[0];
-    struct daemon daemon;
-    daemon_init(&daemon);
-    struct source source = {.arguments = &arguments, .config = &config, .daemon = &daemon};
-    daemon.reload = reload;
-    daemon.reload_context = &source;
-    struct timeline *timeline = NULL;
-    if (config.trace_file[0])
-        timeline = timeline_create(config.trace_file, config.trace_file_bytes, &error);
-    struct serving serving = {
-        .daemon = &daemon, .config = &config, .fd = arguments.fd, .listens = listens, .timeline = timeline};
-    bool ok = (timeline || !config.trace_file[0]) && serve(&serving, &error);
-    daemon_finish(&daemon); /* what was begun before it failed */
-    timeline_destroy(timeline);
-    return !ok ? fail(&error) : serving.device_gone ? EX_TEMPFAIL : EXIT_SUCCESS;
+    const bool listens = arguments.fd < 0 || arguments.listen[0];
+    return listens ? be_front(&arguments, &config) : serve_one_client(&config, arguments.fd);
 }

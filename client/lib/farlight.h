@@ -221,7 +221,8 @@ FL_API struct fl_scene *fl_scene_reload(struct fl_scene *scene, const struct fl_
 FL_API void fl_scene_destroy(struct fl_scene *scene); /* lets go of it on the daemon, too */
 
 /* Attaches to an existing scene; its cameras and clips are requested at once and known as those of a loaded one.
- * Materials and lights, whose names only an import tells, are not. */
+ * Materials and lights, whose names only an import tells, are not. A scene of another user's needs a connection
+ * that has no other scene and no request in flight. */
 FL_API struct fl_scene *fl_scene_attach(struct fl_connection *connection, const char *name,
                                         struct fl_error *error);
 /* The scenes that may be attached to. *list is malloc'ed, for free(). */

@@ -191,13 +191,8 @@ static bool tell_refusal(enum sealed_status status, struct fl_error *error)
         fl_error_remedy(error, "name the file with a copy of the daemon's key by --key or FARLIGHT_KEY");
     else if (status == SEALED_NO_KEY)
         fl_error_remedy(error, "leave --key and FARLIGHT_KEY out, or start the daemon with --key-file");
-    else if (status == SEALED_TOO_MANY)
-        fl_error_remedy(error, "try again in a minute");
-    if (error) {
+    if (error)
         error->server_code = PROTOCOL_ERROR_DENIED;
-        error->retryable = status == SEALED_TOO_MANY;
-        error->retry_after_ms = status == SEALED_TOO_MANY ? 60000 : 0;
-    }
     return false;
 }
 

@@ -67,6 +67,52 @@ static bool widen(struct sealed_link *link)
     return true;
 }
 
+/* ---- on the way to another process ---- */
+
+struct saved_head {
+    size_t in_bytes, out_bytes;
+};
+
+size_t sealed_link_save(const struct sealed_link *link, uint8_t *out)
+{
+    const struct saved_head head = {sealed_link_unopened(link), link->out_end - link->out_start};
+    if (out) {
+        memcpy(out, &head, sizeof(head));
+        out += sizeof(head);
+        sealed_save(link->sealed, out);
+        out += sealed_saved_bytes();
+        memcpy(out, link->in + link->in_start, head.in_bytes);
+        memcpy(out + head.in_bytes, link->out + link->out_start, head.out_bytes);
+    }
+    return sizeof(head) + sealed_saved_bytes() + head.in_bytes + head.out_bytes;
+}
+
+struct sealed_link *sealed_link_restore(const uint8_t *saved, size_t bytes)
+{
+    struct saved_head head;
+    const size_t before_bytes = sizeof(head) + sealed_saved_bytes();
+    if (bytes < before_bytes) {
+        return NULL;
+    }
+    memcpy(&head, saved, sizeof(head));
+    if (head.in_bytes > OPEN_BYTES || head.out_bytes > OPEN_BYTES ||
+        head.in_bytes + head.out_bytes != bytes - before_bytes) {
+        return NULL;
+    }
+    struct sealed_link *link = create(sealed_restore(saved + sizeof(head)));
+    if (link && !widen(link)) {
+        sealed_link_destroy(link);
+        return NULL;
+    }
+    if (link) {
+        memcpy(link->in, saved + before_bytes, head.in_bytes);
+        memcpy(link->out, saved + before_bytes + head.in_bytes, head.out_bytes);
+        link->in_end = head.in_bytes;
+        link->out_end = head.out_bytes;
+    }
+    return link;
+}
+
 /* ---- from the socket ---- */
 
 uint8_t *sealed_link_space(struct sealed_link *link, size_t *bytes)

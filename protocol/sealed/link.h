@@ -34,6 +34,12 @@ struct sealed_link *sealed_link_client(const struct sealed_key *key);
 struct sealed_link *sealed_link_server(const struct sealed_key *keys, size_t key_count);
 void sealed_link_destroy(struct sealed_link *link); /* accepts NULL */
 
+/* An open link to which nothing was given to seal, for another process (sealed_save()): its streams, and the bytes
+ * that came or wait. Returns their number, and writes them to `out` unless that is NULL. */
+size_t sealed_link_save(const struct sealed_link *link, uint8_t *out);
+/* NULL: no memory, or the bytes are not those of a link. */
+struct sealed_link *sealed_link_restore(const uint8_t *saved, size_t bytes);
+
 /* ---- from the socket ---- */
 
 /* Where to read to. *bytes is above 0 unless a whole record waits to be opened. */

@@ -14,8 +14,6 @@ const char *sealed_status_text(enum sealed_status status)
         return "welcome";
     case SEALED_WRONG_KEY:
         return "the daemon has another key";
-    case SEALED_TOO_MANY:
-        return "too many wrong keys came from this address";
     case SEALED_NO_KEY:
         return "the daemon has no key";
     case SEALED_OTHER_VERSION:
@@ -84,6 +82,46 @@ bool sealed_has_sealed_last(const struct sealed *sealed)
 bool sealed_has_opened_last(const struct sealed *sealed)
 {
     return sealed->opened_last;
+}
+
+/* ---- on the way to another process ---- */
+
+struct saved {
+    crypto_secretstream_xchacha20poly1305_state sending, receiving;
+    bool is_client;
+};
+
+size_t sealed_saved_bytes(void)
+{
+    return sizeof(struct saved);
+}
+
+void sealed_save(const struct sealed *sealed, uint8_t *out)
+{
+    struct saved saved;
+    memset(&saved, 0, sizeof(saved));
+    saved.sending = sealed->sending;
+    saved.receiving = sealed->receiving;
+    saved.is_client = sealed->is_client;
+    memcpy(out, &saved, sizeof(saved));
+    sodium_memzero(&saved, sizeof(saved));
+}
+
+struct sealed *sealed_restore(const uint8_t *bytes)
+{
+    struct saved saved;
+    struct sealed *sealed = sodium_init() < 0 ? NULL : secret_create(sizeof(*sealed));
+    if (!sealed) {
+        return NULL;
+    }
+    memcpy(&saved, bytes, sizeof(saved));
+    sealed->sending = saved.sending;
+    sealed->receiving = saved.receiving;
+    sealed->is_client = saved.is_client;
+    sealed->stage = STAGE_OPEN;
+    sealed->may_seal = true;
+    sodium_memzero(&saved, sizeof(saved));
+    return sealed;
 }
 
 /* ---- messages ---- */

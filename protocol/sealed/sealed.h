@@ -49,9 +49,7 @@ struct sealed_key {
 /* In messages 2 and 4. */
 enum sealed_status {
     SEALED_WELCOME = 0,
-    SEALED_WRONG_KEY = 1, /* message 4: the proof fits no key of the server's */
-    SEALED_TOO_MANY =
-        2, /* message 2, of older servers: this address has failed too often; it may again in a minute */
+    SEALED_WRONG_KEY = 1,     /* message 4: the proof fits no key of the server's */
     SEALED_NO_KEY = 3,        /* message 2: the server has no key at all */
     SEALED_OTHER_VERSION = 4, /* message 2: it does not speak this version */
 };
@@ -95,6 +93,13 @@ enum sealed_status sealed_status(const struct sealed *sealed);
  * SEALED_RECORD_EXTRA_BYTES, apart from `plain`; the number of its bytes. */
 size_t sealed_seal(struct sealed *sealed, uint8_t *out, const uint8_t *plain, size_t plain_bytes);
 bool sealed_has_sealed_last(const struct sealed *sealed);
+
+/* Another process of the same build may go on with an open end that has not sealed or opened its last record: its
+ * streams as sealed_saved_bytes() bytes, secret as they are. The keys of the connection's ends are not in them. */
+size_t sealed_saved_bytes(void);
+void sealed_save(const struct sealed *sealed, uint8_t *out);
+/* NULL: no memory, or no random numbers. */
+struct sealed *sealed_restore(const uint8_t *saved);
 
 /* Whether sealed_open() would ask for no more bytes. */
 bool sealed_has_record(const uint8_t *bytes, size_t count);

@@ -303,6 +303,7 @@ struct engine_event {
     struct job_output *output; /* private to job/ */
 };
 void engine_event_destroy(struct engine_event *event); /* accepts NULL */
+void engine_stats_destroy(struct engine_stats *stats); /* accepts NULL */
 
 /* Starts the threads; the device is opened before it returns, so that a missing GPU is an error here. */
 struct engine *engine_create(const struct engine_options *options, struct error *error);

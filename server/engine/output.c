@@ -217,14 +217,19 @@ void engine_frame_destroy(struct engine_frame *frame)
     free(frame);
 }
 
+void engine_stats_destroy(struct engine_stats *stats)
+{
+    if (stats)
+        free(stats->scenes);
+    free(stats);
+}
+
 void engine_event_destroy(struct engine_event *event)
 {
     if (!event)
         return;
     engine_frame_destroy(event->frame);
-    if (event->stats)
-        free(event->stats->scenes);
-    free(event->stats);
+    engine_stats_destroy(event->stats);
     free(event->list);
     free(event->description);
     free(event->objects);

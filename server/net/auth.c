@@ -69,13 +69,36 @@ void auth_keys_unref(struct auth_keys *keys)
         secret_destroy(keys);
 }
 
-bool auth_keys_have(const struct auth_keys *keys, const struct auth_identity *identity)
+struct auth_key_numbers auth_keys_numbers(const struct auth_keys *keys)
 {
-    for (size_t i = 0; keys && i < keys->count; i++) {
-        if (sealed_key_number(&keys->keys[i]) == identity->key && keys->read_only[i] == identity->read_only)
+    struct auth_key_numbers known = {.count = keys ? keys->count : 0};
+    for (size_t i = 0; i < known.count; i++) {
+        known.numbers[i] = sealed_key_number(&keys->keys[i]);
+        known.read_only[i] = keys->read_only[i];
+    }
+    return known;
+}
+
+bool auth_numbers_have(const struct auth_key_numbers *keys, const struct auth_identity *identity)
+{
+    for (size_t i = 0; i < keys->count; i++) {
+        if (keys->numbers[i] == identity->key && keys->read_only[i] == identity->read_only)
             return true;
     }
     return false;
+}
+
+/* Users are 32-bit numbers, keys have the top bit set, networks the next. */
+#define KEY_BIT (UINT64_C(1) << 63)
+#define NETWORK_BIT (UINT64_C(1) << 62)
+
+uint64_t auth_owner_number(const struct auth_identity *identity, const struct address *peer)
+{
+    if (identity->has_key)
+        return KEY_BIT | identity->key;
+    if (identity->has_user)
+        return identity->user;
+    return (address_network(peer) & ~KEY_BIT) | NETWORK_BIT;
 }
 
 bool auth_needs_key(const struct address *own, const struct address *peer, const struct auth_keys *keys)

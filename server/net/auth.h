@@ -20,6 +20,13 @@ struct auth_keys {
     size_t count;
 };
 
+/* The same without the keys themselves, for those who need not know them. */
+struct auth_key_numbers {
+    uint64_t numbers[SEALED_KEYS_MAX];
+    bool read_only[SEALED_KEYS_MAX];
+    size_t count;
+};
+
 struct auth_identity {
     bool known;     /* by user or key: it shares blobs with its other connections */
     bool has_user;  /* the kernel told the peer's user */
@@ -35,14 +42,17 @@ bool auth_read_keys(struct auth_keys **keys, const char *key_file, const char *r
                     struct error *error);
 struct auth_keys *auth_keys_ref(struct auth_keys *keys);
 void auth_keys_unref(struct auth_keys *keys); /* the last one wipes the keys */
+struct auth_key_numbers auth_keys_numbers(const struct auth_keys *keys);
 /* Whether a holder of that identity's key may still do what it may. */
-bool auth_keys_have(const struct auth_keys *keys, const struct auth_identity *identity);
+bool auth_numbers_have(const struct auth_key_numbers *keys, const struct auth_identity *identity);
 /* What is known before the client's first byte. False with ERROR_DENIED: the peer is refused.
  * `beyond_loopback` as for listener_open(). */
 bool auth_identify(struct auth_identity *identity, int fd, const struct address *peer, bool beyond_loopback,
                    struct error *error);
 /* The client has proved that it holds the key of that index, which is its identity from now on. */
 void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index);
+/* Whose client this is: a number of the user, the key, or the network of a client that nobody knows. */
+uint64_t auth_owner_number(const struct auth_identity *identity, const struct address *peer);
 /* Whether a connection between the daemon's own address and the peer's needs a key: TCP that leaves this host, or
  * could; and all TCP where the daemon has keys, as every user of this host reaches loopback. */
 bool auth_needs_key(const struct address *own, const struct address *peer, const struct auth_keys *keys);

@@ -34,20 +34,36 @@ static unsigned messages_a_turn(const struct connection *connection)
     return share ? share : 1;
 }
 
+/* Whether there is no link, or it could be restored. */
+static bool restore_link(struct sealed_link **link, const struct connection_saved *saved)
+{
+    *link =
+        saved && saved->link_bytes ? sealed_link_restore(saved->bytes + saved->in_bytes, saved->link_bytes) : NULL;
+    return *link || !saved || !saved->link_bytes;
+}
+
 struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
                                      const struct connection_entry *entry,
-                                     const struct connection_handler *handler, void *context, struct error *error)
+                                     const struct connection_handler *handler, void *context,
+                                     const struct connection_saved *saved, struct error *error)
 {
+    const size_t in_bytes = saved ? saved->in_bytes : 0;
+    const size_t in_capacity = in_bytes > HANDSHAKE_HELLO_MAX_BYTES ? in_bytes : HANDSHAKE_HELLO_MAX_BYTES;
     struct connection *connection = calloc(1, sizeof(*connection));
-    uint8_t *in = malloc(HANDSHAKE_HELLO_MAX_BYTES);
-    struct loop_watch *watch =
-        connection && in ? loop_watch_add(loop, fd, EPOLLIN, on_ready, connection, error) : NULL;
+    struct sealed_link *link = NULL;
+    uint8_t *in = malloc(in_capacity);
+    struct loop_watch *watch = connection && in && restore_link(&link, saved)
+                                   ? loop_watch_add(loop, fd, EPOLLIN, on_ready, connection, error)
+                                   : NULL;
     if (!watch) {
         error_set(error, ERROR_OUT_OF_MEMORY, "connection", "no memory");
+        sealed_link_destroy(link);
         free(in);
         free(connection);
         return NULL;
     }
+    if (in_bytes)
+        memcpy(in, saved->bytes, in_bytes);
     uint64_t now_ns = clock_now_ns();
     *connection = (struct connection){
         .loop = loop,
@@ -59,16 +75,42 @@ struct connection *connection_create(struct loop *loop, int fd, const struct con
         .watch = watch,
         .timer = {.call = on_timer, .context = connection},
         .turn_end = {.call = turn_end, .context = connection},
+        .link = link,
         .in = in,
-        .in_capacity = HANDSHAKE_HELLO_MAX_BYTES,
+        .in_capacity = in_capacity,
+        .in_used = in_bytes,
         .connected_ns = now_ns,
         .last_received_ns = now_ns,
         .last_sent_ns = now_ns,
         .messages_left = MESSAGES_A_TURN,
     };
     out_queue_init(&connection->out);
+    if (saved && saved->is_open) {
+        connection->state = CONNECTION_OPEN;
+        if (!greeting_make_room(connection))
+            connection->state = CONNECTION_CLOSED; /* as if its client had gone at once */
+    }
     loop_defer(loop, &connection->turn_end);
     return connection;
+}
+
+bool connection_save(const struct connection *connection, const uint8_t *message, size_t message_bytes,
+                     struct connection_saved *saved)
+{
+    *saved = (struct connection_saved){
+        .in_bytes = message_bytes + connection->in_used,
+        .link_bytes = connection->link ? sealed_link_save(connection->link, NULL) : 0,
+        .is_open = connection->state == CONNECTION_OPEN,
+    };
+    saved->bytes = malloc(saved->in_bytes + saved->link_bytes);
+    if (!saved->bytes)
+        return false;
+    if (message)
+        memcpy(saved->bytes, message, message_bytes);
+    memcpy(saved->bytes + message_bytes, connection->in, connection->in_used);
+    if (connection->link)
+        sealed_link_save(connection->link, saved->bytes + saved->in_bytes);
+    return true;
 }
 
 static void destroy(struct connection *connection)
@@ -103,7 +145,8 @@ static void queue_error(struct connection *connection, enum protocol_error_code 
 void connection_finish(struct connection *connection, enum protocol_error_code code, const char *field,
                        const char *text)
 {
-    if (connection->state == CONNECTION_HELLO || connection->state == CONNECTION_WRONG_KEY) {
+    if (connection->state == CONNECTION_HELLO || connection->state == CONNECTION_WRONG_KEY ||
+        connection->state == CONNECTION_ROUTED) {
         /* Before this state, no message may be sent. */
         connection_close(connection);
         return;
@@ -285,6 +328,7 @@ static bool may_read(const struct connection *connection)
     case CONNECTION_LINGERING:
         return true;
     case CONNECTION_WRONG_KEY:
+    case CONNECTION_ROUTED:
     case CONNECTION_FLUSHING:
     case CONNECTION_CLOSED:
         return false;
@@ -375,8 +419,11 @@ static void turn_end(void *context)
     struct connection *connection = context;
     bool was_held = connection->in_used && !connection->message_began_ns;
     connection->messages_left = messages_a_turn(connection);
-    if (may_process(connection) && (was_held || has_waiting_records(connection)))
-        process(connection); /* messages that arrived before it was held, or had had its turn */
+    /* Messages that arrived before it was held or had had its turn, or a hello that another process has read. */
+    if (connection->state == CONNECTION_HELLO
+            ? connection->in_used > 0
+            : may_process(connection) && (was_held || has_waiting_records(connection)))
+        process(connection);
     flush(connection);
     if (connection->state == CONNECTION_FLUSHING && has_flushed(connection))
         linger(connection);

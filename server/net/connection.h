@@ -45,6 +45,10 @@ struct connection_handler {
     void (*key_failed)(void *context);
     /* The client holds the key of that index; its hello is next. */
     void (*key_proved)(void *context, size_t index);
+    /* NULL, or what takes the place of hello(): the client is to be served by another process, to which
+     * connection_save() hands it as it is before its hello. It waits until it is closed, or told why it is not
+     * served (connection_refuse()). */
+    void (*route)(void *context, const struct handshake_hello *hello);
     /* Fills the reply. False: the client is refused with reply->text. */
     bool (*hello)(void *context, const struct handshake_hello *hello, struct handshake_reply *reply);
     /* Hello was answered, messages may be sent. */
@@ -64,6 +68,7 @@ struct connection_handler {
 enum connection_state {
     CONNECTION_HELLO,     /* waits for the client's first bytes */
     CONNECTION_WRONG_KEY, /* its refusal is delayed; nothing is read */
+    CONNECTION_ROUTED,    /* another process is to serve it; nothing is read */
     CONNECTION_OPEN,
     CONNECTION_FLUSHING,  /* goodbye is queued; nothing is read */
     CONNECTION_LINGERING, /* goodbye is sent; incoming bytes are read and dropped, so that the kernel delivers it
@@ -104,10 +109,26 @@ struct connection {
     uint64_t received_bytes, sent_bytes;
 };
 
-/* Takes over the descriptor (non-blocking) when it succeeds. */
+/* A client as it came: what was read of it, to be passed on in the order in which it came. */
+struct connection_saved {
+    size_t in_bytes;   /* at the start of `bytes`: in the open */
+    size_t link_bytes; /* behind them: a saved link; 0: it is not sealed */
+    uint8_t *bytes;    /* malloc'ed */
+    bool is_open;      /* its hello was answered */
+};
+
+/* Takes over the descriptor (non-blocking) when it succeeds. `saved`: what another process has read of it, or
+ * NULL. */
 struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
                                      const struct connection_entry *entry,
-                                     const struct connection_handler *handler, void *context, struct error *error);
+                                     const struct connection_handler *handler, void *context,
+                                     const struct connection_saved *saved, struct error *error);
+/* For another process: in the state CONNECTION_ROUTED, or where it is open and nothing waits to be sent. `message`
+ * was read of it already, and is to be read first; NULL: nothing is. False: out of memory. */
+bool connection_save(const struct connection *connection, const uint8_t *message, size_t message_bytes,
+                     struct connection_saved *saved);
+/* Tells a client whose hello has come why it is not served, and closes. */
+void connection_refuse(struct connection *connection, const char *text, uint64_t capabilities);
 
 /* Control message. False, with a line in the log: it cannot be encoded, or the connection is closing. */
 bool connection_send(struct connection *connection, uint32_t request, uint32_t channel,

@@ -33,6 +33,14 @@ static void end(struct connection *connection)
     connection->closing_since_ns = clock_now_ns();
 }
 
+void connection_refuse(struct connection *connection, const char *text, uint64_t capabilities)
+{
+    struct handshake_reply reply = {.capabilities = capabilities};
+    strncpy(reply.text, text, sizeof(reply.text) - 1);
+    if (queue_reply(connection, &reply))
+        end(connection);
+}
+
 static void refuse_hello(struct connection *connection, struct handshake_reply *reply)
 {
     reply->version = 0;
@@ -51,8 +59,13 @@ void greeting_turn_away(int fd, const char *why, uint64_t capabilities)
     (void)sent; /* a peer that cannot hear it sees the end */
 }
 
-static bool make_room_for_messages(struct connection *connection, size_t capacity_bytes)
+bool greeting_make_room(struct connection *connection)
 {
+    /* Of a sealed connection, space for a record of any size behind the start of any message. */
+    const size_t room_bytes = FRAMING_MESSAGE_MAX_BYTES + (connection->link ? SEALED_PLAIN_MAX_BYTES : 0);
+    const size_t capacity_bytes = room_bytes > connection->in_used ? room_bytes : connection->in_used;
+    if (connection->scratch_data)
+        return true;
     uint8_t *in = malloc(capacity_bytes);
     void *scratch_data = malloc(SCRATCH_BYTES);
     if (!in || !scratch_data) {
@@ -121,8 +134,7 @@ static void go_on_with_seal(struct connection *connection)
     switch (sealed_link_handshake(connection->link, &error)) {
     case SEALED_CONSUMED:
         connection->handler->key_proved(connection->context, sealed_key_index(connection->link->sealed));
-        /* Space for a record of any size behind the start of any message. */
-        if (!make_room_for_messages(connection, FRAMING_MESSAGE_MAX_BYTES + SEALED_PLAIN_MAX_BYTES))
+        if (!greeting_make_room(connection))
             connection_close(connection);
         return;
     case SEALED_NEED_MORE:
@@ -168,11 +180,16 @@ static void answer_hello(struct connection *connection)
         refuse_hello(connection, &reply);
         return;
     }
+    if (connection->handler->route) {
+        connection->state = CONNECTION_ROUTED;
+        connection->handler->route(connection->context, &hello);
+        return;
+    }
     if (!connection->handler->hello(connection->context, &hello, &reply)) {
         refuse_hello(connection, &reply);
         return;
     }
-    if (!connection->link && !make_room_for_messages(connection, FRAMING_MESSAGE_MAX_BYTES)) {
+    if (!greeting_make_room(connection)) {
         connection_close(connection);
         return;
     }

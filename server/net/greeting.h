@@ -3,6 +3,7 @@
 #ifndef FARLIGHT_NET_GREETING_H
 #define FARLIGHT_NET_GREETING_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct connection;
@@ -12,6 +13,8 @@ struct connection;
 void greeting_process(struct connection *connection);
 /* Says to a client of whom nothing was read yet why it has to go, as far as the kernel takes it at once. */
 void greeting_turn_away(int fd, const char *why, uint64_t capabilities);
+/* Makes room for messages of any size, where there is none yet. False: out of memory. */
+bool greeting_make_room(struct connection *connection);
 /* Sends the refusal of a wrong key, after its delay. */
 void greeting_refuse_key(struct connection *connection);
 

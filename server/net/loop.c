@@ -216,6 +216,7 @@ bool loop_run(struct loop *loop, struct error *error)
         if (!loop_turn(loop, error))
             return false;
     }
+    loop->stopped = false; /* it may be run again */
     return true;
 }
 

@@ -145,6 +145,7 @@ void timeouts_check(struct connection *connection, uint64_t now_ns)
         if (since(connection->closing_since_ns, now_ns) >= GOODBYE_NS)
             connection_close(connection);
         return;
+    case CONNECTION_ROUTED: /* whoever routes it knows how long that may take */
     case CONNECTION_CLOSED:
         return;
     }
@@ -168,7 +169,7 @@ uint64_t timeouts_next_check_ns(const struct connection *connection, uint64_t no
             no_later(&wait_ns, now_ns, since(now_ns, connection->seal_due_ns), now_ns);
     } else if (connection->state == CONNECTION_WRONG_KEY)
         no_later(&wait_ns, connection->closing_since_ns, limits->wrong_key_ms * NS_PER_MS, now_ns);
-    else if (connection->state != CONNECTION_OPEN)
+    else if (connection->state != CONNECTION_OPEN && connection->state != CONNECTION_ROUTED)
         no_later(&wait_ns, connection->closing_since_ns, GOODBYE_NS, now_ns);
     else {
         if (connection->over_soft_since_ns)

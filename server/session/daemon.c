@@ -3,32 +3,23 @@
 
 #include "base/clock.h"
 #include "base/log.h"
-#include "base/log_rate.h"
-#include "net/activation.h"
-#include "net/greeting.h"
-#include "net/notify.h"
+#include "net/handover.h"
+#include "session/others.h"
 #include "session/session.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <inttypes.h>
+#include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-/* Few at once, so that the first clients can finish their handshake before the next are counted. */
-#define ACCEPTS_A_TURN 4
-/* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
-#define ACCEPT_PAUSE_NS UINT64_C(100000000)
-
 /* In which clients may take their goodbye when the daemon stops. */
 #define STOP_NS UINT64_C(400000000)
-
-#define BLANKS " \t"
-
-/* In the time in which the service manager wants to hear something. */
+/* In the time after which a device that makes no progress counts as lost. */
 #define WATCHDOG_LOOKS 4
 
 static void own_signals(sigset_t *set)
@@ -36,7 +27,6 @@ static void own_signals(sigset_t *set)
     sigemptyset(set);
     sigaddset(set, SIGTERM);
     sigaddset(set, SIGINT);
-    sigaddset(set, SIGHUP);
 }
 
 void daemon_block_signals(void)
@@ -45,117 +35,12 @@ void daemon_block_signals(void)
     own_signals(&set);
     sigprocmask(SIG_BLOCK, &set, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGHUP, SIG_IGN);
 }
 
 void daemon_init(struct daemon *daemon)
 {
     *daemon = (struct daemon){.signal_fd = -1};
-}
-
-static bool listen_at(struct daemon *daemon, const char *text, bool beyond_loopback, struct error *error)
-{
-    struct address address;
-    if (daemon->listener_count == DAEMON_LISTENERS_MAX)
-        return error_set(error, ERROR_LIMIT, text, "at most %d addresses", DAEMON_LISTENERS_MAX);
-    if (!address_parse(&address, text, error) ||
-        !listener_open(&daemon->listeners[daemon->listener_count], &address, beyond_loopback, error))
-        return false;
-    daemon->listener_count++;
-    return true;
-}
-
-/* Takes the first address off `*rest`; NULL: none is left. A path may have blanks, so an address ends where the
- * next one begins: with "unix:", "tcp:" or another word and a colon. */
-static char *next_address(char **rest)
-{
-    char *address = *rest + strspn(*rest, BLANKS), *end = address, *next = address;
-    do {
-        end = next + strcspn(next, BLANKS);
-        next = end + strspn(end, BLANKS);
-    } while (*next && next[strcspn(next, "/:" BLANKS)] != ':');
-    *end = '\0';
-    *rest = next;
-    return address[0] ? address : NULL;
-}
-
-bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error)
-{
-    char *copy = strdup(addresses), *rest = copy;
-    bool ok = copy || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
-    for (char *address; ok && (address = next_address(&rest));)
-        ok = listen_at(daemon, address, beyond_loopback, error);
-    free(copy);
-    return ok && (daemon->listener_count || error_set(error, ERROR_INVALID, "server.listen", "no address"));
-}
-
-bool daemon_listen_activated(struct daemon *daemon, bool beyond_loopback, size_t *count, struct error *error)
-{
-    char names[DAEMON_LISTENERS_MAX][ACTIVATION_NAME_BYTES];
-    for (size_t i = 0; i < DAEMON_LISTENERS_MAX; i++)
-        activation_name(i, names[i]);
-    *count = activation_take();
-    if (*count > DAEMON_LISTENERS_MAX)
-        return error_set(error, ERROR_LIMIT, "LISTEN_FDS", "at most %d sockets", DAEMON_LISTENERS_MAX);
-    for (size_t i = 0; i < *count; i++) {
-        if (!listener_adopt(&daemon->listeners[i], ACTIVATION_FD_FIRST + (int)i, names[i], beyond_loopback, error))
-            return false;
-        daemon->listener_count++;
-    }
-    return true;
-}
-
-/* ---- clients ----------------------------------------------------------------------------------------- */
-
-static void watch_listeners(struct daemon *daemon, bool watched)
-{
-    for (size_t i = 0; i < daemon->listener_count; i++) {
-        if (daemon->listener_watches[i])
-            loop_watch_change(daemon->listener_watches[i], watched ? (uint32_t)EPOLLIN : 0);
-    }
-}
-
-static void on_accept_timer(void *context)
-{
-    watch_listeners(context, true);
-}
-
-static void pause_accepting(struct daemon *daemon)
-{
-    watch_listeners(daemon, false);
-    loop_timer_start(daemon->loop, &daemon->accept_timer, ACCEPT_PAUSE_NS);
-}
-
-static bool accept_one(struct daemon *daemon, const struct listener *listener)
-{
-    struct address peer;
-    bool retry_later;
-    int fd = listener_accept(listener, &peer, &retry_later);
-    if (retry_later)
-        pause_accepting(daemon);
-    if (fd < 0)
-        return false;
-    struct error error = {0};
-    if (hub_add_client(&daemon->hub, fd, &listener->address, &peer, &error))
-        return true;
-    if (log_is_due(address_network(&peer), "turned away"))
-        log_write(LOG_WARNING, "session", "a client is turned away: %s", error.text);
-    greeting_turn_away(fd, error.text, error.kind == ERROR_DENIED ? 0 : HANDSHAKE_TRY_AGAIN);
-    close(fd);
-    return true;
-}
-
-static void accept_from(struct daemon *daemon, const struct listener *listener)
-{
-    for (int i = 0; i < ACCEPTS_A_TURN && accept_one(daemon, listener); i++)
-        continue;
-}
-
-static void on_listeners(void *context, uint32_t epoll_events)
-{
-    (void)epoll_events;
-    struct daemon *daemon = context;
-    for (size_t i = 0; i < daemon->listener_count; i++)
-        accept_from(daemon, &daemon->listeners[i]);
 }
 
 /* ---- the end ----------------------------------------------------------------------------------------- */
@@ -166,26 +51,9 @@ static void stop(struct daemon *daemon)
         loop_stop(daemon->loop); /* asked twice: without goodbye */
         return;
     }
-    notify_manager("STOPPING=1");
-    for (size_t i = 0; i < daemon->listener_count; i++) {
-        loop_watch_remove(daemon->listener_watches[i]);
-        daemon->listener_watches[i] = NULL;
-        listener_close(&daemon->listeners[i]);
-    }
-    daemon->listener_count = 0;
+    channel_send(&daemon->front, CHANNEL_ENDING, NULL, 0, NULL);
     loop_timer_start(daemon->loop, &daemon->stop_timer, STOP_NS);
     hub_stop(&daemon->hub);
-}
-
-/* systemd's notify-reload wants the time along, to tell this answer from one to a signal before. */
-static void reload(struct daemon *daemon)
-{
-    char state[64];
-    snprintf(state, sizeof(state), "RELOADING=1\nMONOTONIC_USEC=%" PRIu64, clock_now_ns() / 1000);
-    notify_manager(state);
-    if (daemon->reload)
-        daemon->reload(daemon->reload_context);
-    notify_manager("READY=1");
 }
 
 static void on_signal(void *context, uint32_t epoll_events)
@@ -195,32 +63,11 @@ static void on_signal(void *context, uint32_t epoll_events)
     struct signalfd_siginfo info;
     if (read(daemon->signal_fd, &info, sizeof(info)) != (ssize_t)sizeof(info))
         return;
-    if (info.ssi_signo == SIGHUP) {
-        if (!daemon->hub.stopping)
-            reload(daemon);
+    /* Who manages services tells the front too, which then tells its workers. */
+    if (daemon->front.watch && daemon->hub.stopping)
         return;
-    }
-    log_write(LOG_INFO, "session", "stopping: %s", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
-    stop(daemon);
-}
-
-static void on_emptied(void *context)
-{
-    struct daemon *daemon = context;
-    if (daemon->hub.stopping)
-        loop_stop(daemon->loop);
-    else if (daemon->unused_ns)
-        loop_timer_start(daemon->loop, &daemon->unused_timer, daemon->unused_ns);
-}
-
-/* A client that has come since then starts the timer again when it goes. */
-static void on_unused_timer(void *context)
-{
-    struct daemon *daemon = context;
-    if (daemon->hub.stopping || daemon->hub.sessions.count)
-        return;
-    log_write(LOG_INFO, "session", "stopping: there was no client for %" PRIu64 " s",
-              daemon->unused_ns / UINT64_C(1000000000));
+    log_write(daemon->front.watch ? LOG_DEBUG : LOG_INFO, "session", "stopping: %s",
+              info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
     stop(daemon);
 }
 
@@ -248,15 +95,135 @@ static void on_device_gone(void *context)
     stop(daemon);
 }
 
-/* A driver that hangs cannot be healed from within, so the manager hears nothing more; nor where this thread
- * hangs. A ping that is left out because of one long slice is made up for by the next. */
+/* ---- the front --------------------------------------------------------------------------------------- */
+
+static void send_counts(struct daemon *daemon, uint32_t unused_s)
+{
+    const struct channel_counts counts = {
+        .clients = (uint32_t)daemon->hub.introduced, .handed = daemon->handed, .unused_s = unused_s};
+    channel_send(&daemon->front, CHANNEL_COUNTS, &counts, sizeof(counts), NULL);
+}
+
+static void on_counted(void *context)
+{
+    send_counts(context, 0);
+}
+
+static void on_emptied(void *context)
+{
+    struct daemon *daemon = context;
+    if (daemon->hub.stopping)
+        loop_stop(daemon->loop);
+    else
+        loop_timer_start(daemon->loop, &daemon->unused_timer, daemon->unused_s * UINT64_C(1000000000));
+}
+
+/* A client that has come since then starts the timer again when it goes. */
+static void on_unused_timer(void *context)
+{
+    struct daemon *daemon = context;
+    if (!daemon->hub.stopping && !daemon->hub.sessions.count)
+        send_counts(daemon, daemon->unused_s);
+}
+
+static void take_client(struct daemon *daemon, const void *payload, size_t bytes, const int fds[CHANNEL_FDS])
+{
+    struct handover handover;
+    struct error error = {0};
+    daemon->handed++;
+    bool ok = handover_take(&handover, payload, bytes, fds[1], &error);
+    if (ok) {
+        ok = hub_add_client(&daemon->hub, fds[0], &handover, &error);
+        explicit_bzero(handover.saved.bytes, handover.saved.in_bytes + handover.saved.link_bytes);
+        free(handover.saved.bytes);
+    }
+    if (!ok) {
+        log_write(LOG_WARNING, "session", "a client is turned away: %s", error.text);
+        close(fds[0]);
+        send_counts(daemon, 0);
+    }
+}
+
+static void send_ready(struct daemon *daemon, bool has_owner)
+{
+    channel_send(&daemon->front, CHANNEL_READY, &has_owner, sizeof(has_owner), NULL);
+}
+
+static void take_owner(struct daemon *daemon, const void *payload)
+{
+    uint64_t owner;
+    memcpy(&owner, payload, sizeof(owner));
+    daemon->hub.worker_of = owner;
+    daemon->owned(daemon->front_context, owner);
+    send_ready(daemon, true);
+}
+
+/* A driver that hangs cannot be healed from within. One long slice is no sign of it: a look that finds no progress
+ * is followed by others before the time is over. */
 static void on_watchdog_timer(void *context)
 {
     struct daemon *daemon = context;
     const struct engine_port *engine = &daemon->hub.options.engine;
+    const uint64_t now_ns = clock_now_ns();
     if (engine->is_alive(engine->context, &daemon->engine_turns))
-        notify_manager("WATCHDOG=1");
+        daemon->alive_ns = now_ns;
+    else if (now_ns - daemon->alive_ns >= daemon->watchdog_ns)
+        channel_send(&daemon->front, CHANNEL_HANGS, NULL, 0, NULL);
     loop_timer_start(daemon->loop, &daemon->watchdog_timer, daemon->watchdog_ns / WATCHDOG_LOOKS);
+}
+
+static void on_received(void *context, enum channel_kind kind, const void *payload, size_t bytes,
+                        const int fds[CHANNEL_FDS])
+{
+    struct daemon *daemon = context;
+    switch (kind) {
+    case CHANNEL_CONFIG:
+        daemon->configured(daemon->front_context, payload, bytes);
+        channel_send(&daemon->front, CHANNEL_CONFIG, NULL, 0, NULL);
+        return;
+    case CHANNEL_CLIENT:
+        take_client(daemon, payload, bytes, fds);
+        return;
+    case CHANNEL_OWNER:
+        if (bytes == sizeof(uint64_t))
+            take_owner(daemon, payload);
+        return;
+    case CHANNEL_ASK:
+    case CHANNEL_ASKED:
+    case CHANNEL_ANSWER:
+        others_received(daemon->hub.others, kind, payload, bytes);
+        return;
+    case CHANNEL_PING:
+        channel_send(&daemon->front, CHANNEL_PING, NULL, 0, NULL);
+        return;
+    case CHANNEL_READY:
+    case CHANNEL_ENDING:
+    case CHANNEL_FAILED:
+    case CHANNEL_HANGS:
+    case CHANNEL_COUNTS:
+        return;
+    }
+}
+
+/* The front was killed, or has crashed: clients are to see just that. */
+static void on_front_gone(void *context)
+{
+    struct daemon *daemon = context;
+    loop_stop(daemon->loop);
+}
+
+bool daemon_serve_front(struct daemon *daemon, int fd, struct error *error)
+{
+    daemon->front = (struct channel){.received = on_received, .closed = on_front_gone, .context = daemon};
+    daemon->hub.counted = on_counted;
+    if (!channel_open(&daemon->front, daemon->loop, fd, error))
+        return false;
+    others_reach(daemon->hub.others, &daemon->front);
+    daemon->alive_ns = clock_now_ns();
+    if (daemon->watchdog_ns)
+        on_watchdog_timer(daemon);
+    send_ready(daemon, false);
+    return true;
 }
 
 /* ---- life -------------------------------------------------------------------------------------------- */
@@ -286,55 +253,29 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
     daemon->hub.emptied = on_emptied;
     daemon->hub.device_gone = on_device_gone;
     daemon->hub.call_context = daemon;
-    daemon->accept_timer = (struct loop_timer){.call = on_accept_timer, .context = daemon};
     daemon->stop_timer = (struct loop_timer){.call = on_stop_timer, .context = daemon};
     daemon->unused_timer = (struct loop_timer){.call = on_unused_timer, .context = daemon};
     daemon->watchdog_timer = (struct loop_timer){.call = on_watchdog_timer, .context = daemon};
-    daemon->watchdog_ns = notify_watchdog_ns();
-    if (daemon->watchdog_ns)
-        on_watchdog_timer(daemon);
-    if (!watch_signals(daemon, error))
-        return false;
-    on_emptied(daemon); /* as yet there is no client */
-    for (size_t i = 0; i < daemon->listener_count; i++) {
-        daemon->listener_watches[i] =
-            loop_watch_add(loop, daemon->listeners[i].fd, EPOLLIN, on_listeners, daemon, error);
-        if (!daemon->listener_watches[i])
-            return false;
-    }
-    return true;
+    return watch_signals(daemon, error);
 }
 
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error)
 {
-    struct address own = {.storage_bytes = sizeof(own.storage)}, peer = {.storage_bytes = sizeof(peer.storage)};
+    struct handover handover = {.peer.storage_bytes = sizeof(handover.peer.storage), .is_owner = true};
+    struct address *peer = &handover.peer;
     char field[32];
     snprintf(field, sizeof(field), "--fd %d", fd);
-    if (getsockname(fd, (struct sockaddr *)&own.storage, &own.storage_bytes) < 0 ||
-        getpeername(fd, (struct sockaddr *)&peer.storage, &peer.storage_bytes) < 0)
+    if (getpeername(fd, (struct sockaddr *)&peer->storage, &peer->storage_bytes) < 0)
         return error_set(error, ERROR_INVALID, field, "not a connected socket: %s", strerror(errno));
     int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
         return error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
-    daemon->hub.owner = daemon->hub.last_number + 1;
-    return hub_add_client(&daemon->hub, fd, &own, &peer, error);
-}
-
-void daemon_print_ready(const struct daemon *daemon, FILE *stream)
-{
-    for (size_t i = 0; i < daemon->listener_count; i++) {
-        char text[ADDRESS_TEXT_BYTES];
-        address_print(&daemon->listeners[i].address, text);
-        fprintf(stream, "READY %s\n", text);
-    }
-    if (!daemon->listener_count)
-        fprintf(stream, "READY\n");
-    fflush(stream);
+    return auth_identify(&handover.identity, fd, peer, true, error) &&
+           hub_add_client(&daemon->hub, fd, &handover, error);
 }
 
 bool daemon_run(struct daemon *daemon, bool *device_gone, struct error *error)
 {
-    notify_manager("READY=1");
     bool ok = loop_run(daemon->loop, error);
     *device_gone = daemon->device_gone;
     return ok;
@@ -351,14 +292,11 @@ static void close_sessions(struct daemon *daemon)
 
 void daemon_finish(struct daemon *daemon)
 {
-    for (size_t i = 0; i < daemon->listener_count; i++) {
-        loop_watch_remove(daemon->listener_watches[i]);
-        listener_close(&daemon->listeners[i]);
-    }
     if (daemon->loop) {
+        daemon->hub.counted = NULL;
         close_sessions(daemon);
+        channel_close(&daemon->front);
         loop_watch_remove(daemon->signal_watch);
-        loop_timer_stop(daemon->loop, &daemon->accept_timer);
         loop_timer_stop(daemon->loop, &daemon->stop_timer);
         loop_timer_stop(daemon->loop, &daemon->unused_timer);
         loop_timer_stop(daemon->loop, &daemon->watchdog_timer);

@@ -1,56 +1,51 @@
 /* SPDX-License-Identifier: MIT */
-/* The network side as a whole: listeners, signals, sessions. Runs on the thread that calls it. */
+/* The process that serves: one client, which has started it, or those that a front hands over. Runs on the thread
+ * that calls it. */
 #ifndef FARLIGHT_SESSION_DAEMON_H
 #define FARLIGHT_SESSION_DAEMON_H
 
-#include "net/listen.h"
+#include "net/channel.h"
 #include "session/hub.h"
 
-#include <signal.h>
 #include <stdbool.h>
-#include <stdio.h>
-
-#define DAEMON_LISTENERS_MAX 16
 
 struct daemon {
     struct loop *loop;
     struct hub hub;
-    struct listener listeners[DAEMON_LISTENERS_MAX];
-    struct loop_watch *listener_watches[DAEMON_LISTENERS_MAX];
-    size_t listener_count;
+    struct channel front; /* closed: it serves one client alone */
+    uint32_t handed;      /* clients that came from there */
     int signal_fd;
     struct loop_watch *signal_watch;
-    struct loop_timer accept_timer, stop_timer; /* after which listeners are looked at again */
-    struct loop_timer watchdog_timer;           /* after which the service manager is told that all goes on */
-    uint64_t watchdog_ns;                       /* it wants to hear that so often; 0: it does not */
-    uint64_t engine_turns;                      /* for engine_is_alive() */
-    struct loop_timer unused_timer;             /* runs from the last client's end */
-    uint64_t unused_ns;                         /* without a client, after which it ends; 0: it does not */
-    bool device_gone;                           /* the engine's is lost for good: that is why it ends */
-    /* Reads the configuration again and hands it to hub_reload(), at SIGHUP; NULL: that changes nothing. */
-    loop_call_fn *reload;
-    void *reload_context;
+    struct loop_timer stop_timer;
+    struct loop_timer unused_timer; /* runs from the last client's end */
+    uint32_t unused_s;              /* without a client, after which the front is told so */
+    bool device_gone;               /* the engine's is lost for good: that is why it ends */
+    struct loop_timer watchdog_timer;
+    uint64_t watchdog_ns;  /* without progress, after which the front is told that the device hangs; 0: never */
+    uint64_t engine_turns; /* for engine_is_alive() */
+    uint64_t alive_ns;
+    /* From the front came another configuration, and whose process this is. */
+    void (*configured)(void *context, const void *setup, size_t bytes);
+    void (*owned)(void *context, uint64_t owner);
+    void *front_context;
 };
 
-/* Blocks SIGTERM, SIGINT and SIGHUP in the calling thread, for the loop to handle; call it before any thread
- * starts, so that all inherit the mask. SIGPIPE is ignored. */
+/* Blocks SIGTERM and SIGINT in the calling thread, for the loop to handle; call it before any thread starts, so
+ * that all inherit the mask. SIGPIPE and SIGHUP are ignored. */
 void daemon_block_signals(void);
 /* Zeroes it. */
 void daemon_init(struct daemon *daemon);
-/* Reserves addresses, separated by blanks (at least one; their paths may have blanks); clients wait until
- * daemon_start(). */
-bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error);
-/* The same with the sockets that the service manager has handed over; *count: how many these were, 0 if we were
- * started otherwise. */
-bool daemon_listen_activated(struct daemon *daemon, bool beyond_loopback, size_t *count, struct error *error);
+/* Makes loop and hub. On failure daemon_finish() takes down what was begun. */
 bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error);
-/* Serves the client at a connected socket, and ends with it. It may listen besides. */
+/* The client at this connected socket is served, and the daemon ends with it. Takes over the descriptor when it
+ * succeeds. */
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
-/* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone where it listens nowhere. */
-void daemon_print_ready(const struct daemon *daemon, FILE *stream);
-/* Until SIGTERM or SIGINT comes, the device is lost for good (then *device_gone is true), or the client of
- * daemon_serve_fd() is gone. Says goodbye to all. */
+/* Clients come from the front at that end of a channel, which is told that they can be served; the daemon ends
+ * with it. Takes over the descriptor when it succeeds. */
+bool daemon_serve_front(struct daemon *daemon, int fd, struct error *error);
+/* Until SIGTERM or SIGINT, after a goodbye to the clients. *device_gone: it ended because its GPU is lost for
+ * good. */
 bool daemon_run(struct daemon *daemon, bool *device_gone, struct error *error);
-void daemon_finish(struct daemon *daemon); /* whatever was begun; before the engine is destroyed */
+void daemon_finish(struct daemon *daemon);
 
 #endif

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "session/others.h"
 #include "session/session.h"
 
 #include <stdlib.h>
@@ -211,72 +212,24 @@ static void on_engine(void *context, uint32_t epoll_events)
             hub->device_gone(hub->call_context);
         else if (session)
             session_engine_event(session, event);
+        else if (!event->client && event->request)
+            others_answer(hub->others, event);
         engine_event_destroy(event);
     }
 }
 
 /* ---- clients ----------------------------------------------------------------------------------------- */
 
-static bool may_be_turned_away(const struct session *session, const struct owner *owner, bool has_wrong_key)
+bool hub_add_client(struct hub *hub, int fd, const struct handover *handover, struct error *error)
 {
-    return session->owner == owner && session->is_unauthenticated &&
-           (session->connection->state == CONNECTION_WRONG_KEY || !has_wrong_key);
-}
-
-static uint32_t count_to_turn_away(const struct hub *hub, const struct owner *owner, bool has_wrong_key)
-{
-    uint32_t count = 0;
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&hub->sessions, &cursor, NULL, &value))
-        count += may_be_turned_away(value, owner, has_wrong_key);
-    return count;
-}
-
-/* Of the owner's connections that have not introduced themselves one is closed, by chance: an owner that takes all
- * places loses its own, and cannot tell which. Those go first that are known to have a wrong key. */
-static void turn_one_away(struct hub *hub, const struct owner *owner)
-{
-    uint32_t wrong = count_to_turn_away(hub, owner, true);
-    uint32_t chosen = arc4random_uniform(wrong ? wrong : owner->unauthenticated);
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
-        struct session *session = value;
-        if (may_be_turned_away(session, owner, wrong) && chosen-- == 0) {
-            session_turn_away(session, "too many connections have not introduced themselves; try again later");
-            return;
-        }
-    }
-}
-
-static void make_place(struct hub *hub, const struct owner *owner, bool is_tcp)
-{
-    const struct session_limits *limits = &hub->options.limits;
-    if (is_tcp && owner->unauthenticated >= limits->unauthenticated_per_address)
-        turn_one_away(hub, owner);
-    else if (hub->unauthenticated && hub->unauthenticated >= limits->unauthenticated / 2)
-        turn_one_away(hub, owners_most_unauthenticated(&hub->owners));
-}
-
-bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
-                    struct error *error)
-{
-    bool sealed_only = !hub->options.insecure && auth_needs_key(own, peer, hub->options.keys);
-    struct auth_identity identity;
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
-    if (!auth_identify(&identity, fd, peer, hub->options.insecure || hub->options.keys, error))
-        return false;
-    bool is_owner = hub->last_number + 1 == hub->owner; /* local clients with full rights */
-    if (!is_owner && identity.has_user && readers_have(&hub->options.readers, identity.user))
-        identity.read_only = true;
-    struct owner *owner = owner_find(&hub->owners, owner_number(&identity, peer));
+    struct owner *owner = owner_find(&hub->owners, auth_owner_number(&handover->identity, &handover->peer));
     if (!owner)
         return error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
-    make_place(hub, owner, !address_is_unix(peer));
-    struct session *session =
-        session_create(hub, hub->last_number + 1, fd, sealed_only, peer, &identity, owner, error);
+    if (handover->is_owner)
+        hub->owner = hub->last_number + 1;
+    struct session *session = session_create(hub, hub->last_number + 1, fd, handover, owner, error);
     owner_unref(&hub->owners, owner);
     if (!session)
         return false;
@@ -328,9 +281,7 @@ bool hub_reload(struct hub *hub, const struct hub_options *options, struct error
     hub->options.limits = options->limits;
     set_connection_limits(hub, &options->connection_limits);
     hub->options.engine_limits = options->engine_limits;
-    hub->options.readers = options->readers;
-    auth_keys_unref(hub->options.keys);
-    hub->options.keys = auth_keys_ref(options->keys);
+    hub->options.keys = options->keys;
     end_those_without_key(hub);
     blob_store_limit(hub->blobs, options->limits.blob_bytes, options->limits.blob_cache_bytes);
     return true;
@@ -343,15 +294,15 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
     *hub = (struct hub){
         .loop = loop,
         .options = *options,
-        .started_ns = clock_now_ns(),
+        .last_number = options->first_client,
         .retry_timer = {.call = retry, .context = hub},
     };
-    auth_keys_ref(hub->options.keys);
     set_connection_limits(hub, &options->connection_limits);
     hub->turn_end = &hub->turn_first;
     hub->itself = owner_find(&hub->owners, OWNER_ITSELF);
     hub->blobs = blob_store_create(options->limits.blob_bytes, options->limits.blob_cache_bytes);
-    if (!hub->blobs || !hub->itself) {
+    hub->others = others_create(hub);
+    if (!hub->blobs || !hub->itself || !hub->others) {
         error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
         goto fail;
     }
@@ -362,7 +313,7 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
         return true;
     }
 fail:
-    auth_keys_unref(hub->options.keys);
+    others_destroy(hub->others);
     blob_store_destroy(hub->blobs);
     owner_unref(&hub->owners, hub->itself);
     owners_finish(&hub->owners);
@@ -388,8 +339,8 @@ void hub_finish(struct hub *hub)
         free(value);
     hashmap_finish(&hub->departed);
     owners_finish(&hub->owners);
+    others_destroy(hub->others);
     hasher_destroy(hub->hasher);
     blob_store_destroy(hub->blobs);
     hashmap_finish(&hub->sessions);
-    auth_keys_unref(hub->options.keys);
 }

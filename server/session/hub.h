@@ -4,11 +4,10 @@
 #define FARLIGHT_SESSION_HUB_H
 
 #include "base/hashmap.h"
-#include "net/attempts.h"
 #include "net/auth.h"
 #include "net/connection.h"
+#include "net/handover.h"
 #include "net/loop.h"
-#include "net/readers.h"
 #include "session/blob_store.h"
 #include "session/engine_port.h"
 #include "session/hasher.h"
@@ -24,15 +23,14 @@ struct session;
 struct hub_options {
     struct session_limits limits;
     struct connection_limits connection_limits;
+    uint64_t started_ns;    /* when the daemon was */
+    uint64_t first_client;  /* clients are numbered from the next one on */
     bool owner_may_be_idle; /* the client of daemon_serve_fd() is not disconnected for its silence */
-    struct readers readers; /* of the Unix socket */
     struct engine_port engine;
     struct timeline *timeline;          /* hears of every frame that was sent; may be NULL */
     struct engine_limits engine_limits; /* as the engine has them; told to clients */
     uint64_t device_bytes;              /* likewise; 0: no limit */
-    struct auth_keys *keys;             /* with which clients come in sealed, from everywhere; hub_init() and
-                                           hub_reload() take references of their own */
-    bool insecure;                      /* peers beyond loopback are accepted without a key too */
+    struct auth_key_numbers keys;       /* that the daemon knows; clients with another one go */
 };
 
 struct hub {
@@ -44,20 +42,22 @@ struct hub {
     struct owners owners;
     struct owner *itself; /* of commands that no client has asked for */
     struct hashmap
-        departed; /* struct departed *, by number: clients that are gone and that the engine still knows */
-    size_t unauthenticated;
-    struct attempts attempts;   /* sealed handshakes */
-    uint64_t frame_bytes;       /* maximum of the frames of all jobs */
+        departed;         /* struct departed *, by number: clients that are gone and that the engine still knows */
+    size_t introduced;    /* sessions whose hello is done */
+    uint64_t frame_bytes; /* maximum of the frames of all jobs */
     uint64_t transaction_bytes; /* of edits that are not answered */
-    uint64_t last_number, started_ns;
+    uint64_t last_number;
     bool stopping;
+    uint64_t worker_of;                    /* auth_owner_number() of whose process this is; 0 may be root */
     uint64_t owner;                        /* number of the client that the daemon serves alone; 0: none */
     struct connection_limits owner_limits; /* of that one */
     loop_call_fn *owner_gone,
         *emptied,     /* called when that client is gone, and when the last session is; may be NULL */
-        *device_gone; /* the engine's device is lost for good; may be NULL */
+        *device_gone, /* the engine's device is lost for good; may be NULL */
+        *counted;     /* there are more or fewer introduced sessions; may be NULL */
     void *call_context;
 
+    struct others *others; /* the daemon's other workers */
     struct loop_watch *engine_watch;
     /* Owners with commands that did not fit the engine's queue, in the order of their turns. */
     struct owner *turn_first, **turn_end;
@@ -67,13 +67,12 @@ struct hub {
 bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *options, struct error *error);
 void hub_finish(struct hub *hub); /* all sessions are gone */
 
-/* A new client, which came to our address `own`; takes over the descriptor when it succeeds. */
-bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
-                    struct error *error);
+/* A new client; takes over the descriptor when it succeeds. Of `handover` without bytes nothing was read yet. */
+bool hub_add_client(struct hub *hub, int fd, const struct handover *handover, struct error *error);
 /* Says goodbye to all clients; `emptied` is called when they are gone, at once if there are none. */
 void hub_stop(struct hub *hub);
 
-/* Applies limits, readers and keys to new requests and new clients; everything else stays. False: out of memory,
+/* Applies limits and keys to new requests and new clients; everything else stays. False: out of memory,
  * nothing is changed. */
 bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error);
 

@@ -4,7 +4,6 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/log_rate.h"
-#include "net/notify.h"
 #include "session/scene_record.h"
 
 #include <inttypes.h>
@@ -14,10 +13,6 @@
 #include <string.h>
 
 #define SCENE 1u /* its number while it is restored */
-
-/* The service manager waits on for as long as it hears this. */
-#define EXTEND_NS UINT64_C(1000000000)
-#define EXTEND_STATE "EXTEND_TIMEOUT_USEC=30000000"
 
 #define LOOK_MS 50 /* between two looks at whether the daemon is to stop */
 
@@ -38,8 +33,8 @@ static void name_record(uint8_t record_name[STORE_NAME_BYTES], uint64_t principa
 static void *read_scene(void *context, const struct scene *scene, uint64_t principal, enum sharing sharing,
                         const atomic_bool *abandoned)
 {
-    (void)context;
-    struct store_record *record = calloc(1, sizeof(*record));
+    struct store *const *store = context;
+    struct store_record *record = *store ? calloc(1, sizeof(*record)) : NULL;
     if (!record)
         return NULL;
     name_record(record->name, principal, scene->name);
@@ -55,10 +50,10 @@ static void *read_scene(void *context, const struct scene *scene, uint64_t princ
 
 static void write_scene(void *context, void *made, const atomic_bool *abandoned)
 {
-    struct store *store = context;
+    struct store *const *store = context;
     struct store_record *record = made;
     struct error error = {0};
-    if (!store_put(store, record, abandoned, &error) && log_is_due(record->owner, "not kept"))
+    if (!store_put(*store, record, abandoned, &error) && log_is_due(record->owner, "not kept"))
         log_write(LOG_WARNING, "store", "a scene is not kept on disk: %s%s%s", error.text,
                   error.remedy[0] ? "; " : "", error.remedy);
     store_record_finish(record);
@@ -68,11 +63,13 @@ static void write_scene(void *context, void *made, const atomic_bool *abandoned)
 static void forget_scene(void *context, uint64_t principal, const char *name)
 {
     uint8_t record_name[STORE_NAME_BYTES];
+    struct store *const *store = context;
     name_record(record_name, principal, name);
-    store_remove(context, record_name);
+    if (*store)
+        store_remove(*store, record_name);
 }
 
-struct engine_keeper keeper_port(struct store *store)
+struct engine_keeper keeper_port(struct store **store)
 {
     return (struct engine_keeper){
         .context = store, .read = read_scene, .write = write_scene, .forget = forget_scene};
@@ -83,7 +80,7 @@ struct engine_keeper keeper_port(struct store *store)
 struct restoring {
     struct store *store;
     struct hub *hub;
-    uint64_t principal, told_ns;
+    uint64_t principal;
     uint64_t bytes;
 };
 
@@ -93,15 +90,6 @@ static bool is_asked_to_stop(void)
     sigset_t pending;
     return sigpending(&pending) == 0 &&
            (sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1);
-}
-
-static void tell_manager(struct restoring *restoring)
-{
-    uint64_t now_ns = clock_now_ns();
-    if (now_ns - restoring->told_ns < EXTEND_NS)
-        return;
-    restoring->told_ns = now_ns;
-    notify_manager(EXTEND_STATE);
 }
 
 /* From the store into memory, where its next client finds it, too. */
@@ -131,7 +119,6 @@ static bool resolve(void *context, const struct record_blob_ref *reference, cons
         return true;
     if (is_asked_to_stop())
         return error_set(error, ERROR_CANCELLED, "", "the daemon stops");
-    tell_manager(restoring);
     *blob = blob_store_find(restoring->hub->blobs, restoring->principal, reference->hash, reference->size_bytes);
     if (!*blob)
         *blob = load_blob(restoring, reference, error);
@@ -157,7 +144,6 @@ static bool wait_for_answer(struct restoring *restoring, uint64_t client, uint32
         poll(&events, 1, LOOK_MS);
         if (is_asked_to_stop())
             return error_set(error, ERROR_CANCELLED, "", "the daemon stops");
-        tell_manager(restoring);
     }
 }
 
@@ -234,7 +220,6 @@ void keeper_restore(struct store *store, struct hub *hub)
     uint8_t(*names)[STORE_NAME_BYTES] = store_names(store, &count);
     for (size_t i = 0; i < count && !is_asked_to_stop(); i++) {
         struct error error = {0};
-        tell_manager(&restoring);
         bool restored = restore_one(&restoring, names[i], &error);
         store_tried(store, names[i]);
         if (restored || error.kind == ERROR_CANCELLED)

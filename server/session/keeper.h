@@ -6,8 +6,8 @@
 #include "session/hub.h"
 #include "store/store.h"
 
-/* For the engine's thread of that kind; `store` outlives the engine. */
-struct engine_keeper keeper_port(struct store *store);
+/* For the engine's thread of that kind. *store outlives the engine; while it is NULL nothing is kept. */
+struct engine_keeper keeper_port(struct store **store);
 
 /* Makes the scenes of the store again, as their users' and keys' lingering ones, before any client is served. What
  * cannot be restored is removed, or stays on the disk where memory or a limit is the reason, and the log says so.

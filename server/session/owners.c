@@ -3,20 +3,9 @@
 
 #include <stdlib.h>
 
-/* Kinds of numbers: users are 32-bit numbers, keys have the top bit set; those between are of clients that nobody
- * knows. */
+/* Users are 32-bit numbers, keys have the top bit set; those between are of clients that nobody knows. */
 #define KEY_BIT (UINT64_C(1) << 63)
-#define NETWORK_BIT (UINT64_C(1) << 62)
 #define SESSION_BIT (UINT64_C(1) << 32)
-
-uint64_t owner_number(const struct auth_identity *identity, const struct address *peer)
-{
-    if (identity->has_key)
-        return KEY_BIT | identity->key;
-    if (identity->has_user)
-        return identity->user;
-    return (address_network(peer) & ~KEY_BIT) | NETWORK_BIT;
-}
 
 blob_principal principal_number(const struct auth_identity *identity, uint64_t session)
 {
@@ -63,19 +52,6 @@ void owner_unref(struct owners *owners, struct owner *owner)
 void owners_finish(struct owners *owners)
 {
     hashmap_finish(&owners->by_number);
-}
-
-struct owner *owners_most_unauthenticated(const struct owners *owners)
-{
-    struct owner *most = NULL;
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&owners->by_number, &cursor, NULL, &value)) {
-        struct owner *owner = value;
-        if (owner->unauthenticated > (most ? most->unauthenticated : 0))
-            most = owner;
-    }
-    return most;
 }
 
 uint64_t owner_share(uint64_t limit, uint32_t percent)

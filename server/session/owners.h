@@ -19,9 +19,8 @@ struct engine_command;
 struct owner {
     uint64_t number;
     size_t references;
-    uint32_t clients;         /* introduced */
-    uint32_t unauthenticated; /* connections whose handshake is not complete */
-    uint64_t frame_bytes;     /* maximum of the frames of its jobs */
+    uint32_t clients;     /* introduced */
+    uint64_t frame_bytes; /* maximum of the frames of its jobs */
     uint64_t transaction_bytes;
     /* Its commands that are not with the engine yet, in order; owners take turns. */
     struct engine_command *waiting, **waiting_end;
@@ -36,8 +35,6 @@ struct owners {
     struct hashmap by_number;
 };
 
-/* Whose client this is. */
-uint64_t owner_number(const struct auth_identity *identity, const struct address *peer);
 /* To whom blobs and kept scenes belong: the same of users and keys; a client that nobody knows shares with no
  * other. */
 blob_principal principal_number(const struct auth_identity *identity, uint64_t session);
@@ -49,9 +46,6 @@ struct owner *owner_find(struct owners *owners, uint64_t number);
 struct owner *owner_ref(struct owner *owner);
 void owner_unref(struct owners *owners, struct owner *owner); /* accepts NULL */
 void owners_finish(struct owners *owners);
-
-/* The owner that has most unauthenticated connections; NULL: none has any. */
-struct owner *owners_most_unauthenticated(const struct owners *owners);
 
 /* What one owner may have of the `limit` of all; 0 %: all of it. At least 1. */
 uint64_t owner_share(uint64_t limit, uint32_t percent);

@@ -2,13 +2,17 @@
 #include "session/scenes.h"
 
 #include "protocol/codec.h"
+#include "session/others.h"
 #include "session/scene_record.h"
 #include "session/session.h"
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-#define LIST_MAX 256 /* of the message */
+/* For which a worker that does not answer is waited for: a list goes without it, an attach may need it. */
+#define LIST_NS UINT64_C(500000000)
+#define ATTACH_NS UINT64_C(10000000000)
 
 struct session_scene {
     enum session_scene_state state;
@@ -209,14 +213,14 @@ static void answer(struct session *session, struct request *request, const struc
     request_answer_error(session, request, &error);
 }
 
-void scenes_listed(struct session *session, struct request *request, const struct engine_scene_list *list)
+void scenes_fill_list(struct message *message, struct record_scene_entry entries[SCENES_LIST_MAX],
+                      const struct engine_scene_list *list)
 {
-    struct record_scene_entry entries[LIST_MAX];
-    struct message message;
-    message_init(&message, MESSAGE_SCENE_LIST_REPLY);
-    message.scene_list_reply.scenes = entries;
-    message.scene_list_reply.scenes_count = (uint16_t)(list->count < LIST_MAX ? list->count : LIST_MAX);
-    for (uint32_t i = 0; i < message.scene_list_reply.scenes_count; i++) {
+    message_init(message, MESSAGE_SCENE_LIST_REPLY);
+    message->scene_list_reply.scenes = entries;
+    message->scene_list_reply.scenes_count =
+        (uint16_t)(list->count < SCENES_LIST_MAX ? list->count : SCENES_LIST_MAX);
+    for (uint32_t i = 0; i < message->scene_list_reply.scenes_count; i++) {
         const struct engine_scene_entry *from = &list->scenes[i];
         entries[i] = (struct record_scene_entry){
             .revision = from->revision,
@@ -226,7 +230,102 @@ void scenes_listed(struct session *session, struct request *request, const struc
             .name = from->name,
         };
     }
-    answer(session, request, &message);
+}
+
+static const struct record_scene_entry *find_entry(const struct message_scene_list_reply *list, const char *name)
+{
+    for (uint32_t i = 0; i < list->scenes_count; i++) {
+        if (strcmp(list->scenes[i].name, name) == 0)
+            return &list->scenes[i];
+    }
+    return NULL;
+}
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(((const struct record_scene_entry *)a)->name, ((const struct record_scene_entry *)b)->name);
+}
+
+static void on_listed(void *context, struct session *session, struct request *request,
+                      const struct others_answer *answers)
+{
+    struct record_scene_entry entries[SCENES_LIST_MAX];
+    struct message message;
+    scenes_fill_list(&message, entries, context);
+    struct message_scene_list_reply *reply = &message.scene_list_reply;
+    for (const struct others_answer *other = answers; other; other = other->next) {
+        const struct message_scene_list_reply *more = &other->message.scene_list_reply;
+        for (uint32_t i = 0; i < more->scenes_count && reply->scenes_count < SCENES_LIST_MAX; i++) {
+            /* Who attaches to such a name gets the scene that is nearest. */
+            if (!find_entry(reply, more->scenes[i].name))
+                entries[reply->scenes_count++] = more->scenes[i];
+        }
+    }
+    qsort(entries, reply->scenes_count, sizeof(entries[0]), by_name);
+    if (session)
+        answer(session, request, &message);
+    free(context);
+}
+
+void scenes_listed(struct session *session, struct request *request, struct engine_scene_list *list)
+{
+    others_ask(session->hub->others, CHANNEL_SCENES, session, request, LIST_NS, on_listed, list);
+}
+
+struct search {
+    char name[SCENE_NAME_MAX + 1];
+    struct error error; /* where no worker has it */
+};
+
+static void move_or_refuse(struct session *session, struct request *request, uint32_t worker,
+                           const struct search *search)
+{
+    struct error error = {0};
+    struct message attach;
+    message_init(&attach, MESSAGE_SCENE_ATTACH);
+    attach.scene_attach.scene = request->scene;
+    attach.scene_attach.name = search->name;
+    scenes_failed(session, request, true);
+    if (session_move(session, worker, request->id, &attach))
+        return;
+    error_set(
+        &error, ERROR_UNSUPPORTED, "scene_attach.name",
+        "\"%s\" is a scene of another user's: a client attaches to it while it has no scene and no other request",
+        search->name);
+    error_remedy(&error, "attach to it over a connection of its own");
+    request_answer_error(session, request, &error);
+}
+
+static void on_searched(void *context, struct session *session, struct request *request,
+                        const struct others_answer *answers)
+{
+    struct search *search = context;
+    const struct others_answer *other = answers;
+    while (other && !find_entry(&other->message.scene_list_reply, search->name))
+        other = other->next;
+    if (session)
+        session_hold(session, session->owner->held);
+    if (session && other) {
+        move_or_refuse(session, request, other->worker, search);
+    } else if (session) {
+        scenes_failed(session, request, true);
+        request_answer_error(session, request, &search->error);
+    }
+    free(search);
+}
+
+void scenes_find_elsewhere(struct session *session, struct request *request, const struct error *error)
+{
+    struct search *search = calloc(1, sizeof(*search));
+    if (!search) {
+        scenes_failed(session, request, true);
+        request_answer_error(session, request, error);
+        return;
+    }
+    search->error = *error;
+    snprintf(search->name, sizeof(search->name), "%s", session_scene_name(session, request->scene));
+    session_hold(session, true); /* its next messages are for who has the scene */
+    others_ask(session->hub->others, CHANNEL_SCENES, session, request, ATTACH_NS, on_searched, search);
 }
 
 void scenes_described(struct session *session, struct request *request,

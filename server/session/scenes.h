@@ -7,6 +7,12 @@
 #include "protocol/framing.h"
 #include "session/requests.h"
 
+#define SCENES_LIST_MAX 256 /* of the message */
+
+/* A SCENE_LIST_REPLY of this worker, which refers to `entries` and the list. */
+void scenes_fill_list(struct message *message, struct record_scene_entry entries[SCENES_LIST_MAX],
+                      const struct engine_scene_list *list);
+
 enum session_scene_state { SCENE_OPENING = 1, SCENE_OPEN, SCENE_CLOSING };
 
 void scenes_open(struct session *session, struct request *request, const struct message_scene_open *open);
@@ -28,7 +34,10 @@ const char *session_scene_name(const struct session *session, uint32_t scene);
 /* The engine's answers: to an open or an attach, to a close, to the others. */
 void scenes_opened(struct session *session, struct request *request, uint64_t revision);
 void scenes_closed(struct session *session, struct request *request);
-void scenes_listed(struct session *session, struct request *request, const struct engine_scene_list *list);
+/* With the shared scenes of other workers; takes over the list. */
+void scenes_listed(struct session *session, struct request *request, struct engine_scene_list *list);
+/* An attach that the engine refused with `error`: the client goes to the worker that has the scene, if one has. */
+void scenes_find_elsewhere(struct session *session, struct request *request, const struct error *error);
 void scenes_described(struct session *session, struct request *request,
                       const struct engine_scene_description *description);
 void scenes_objects_listed(struct session *session, struct request *request,

@@ -5,11 +5,11 @@
 #include "base/log.h"
 #include "base/log_rate.h"
 #include "encode/stream.h"
-#include "net/greeting.h"
 #include "session/dispatch.h"
 #include "session/edits.h"
 #include "session/frames.h"
 #include "session/jobs.h"
+#include "session/others.h"
 #include "session/stats.h"
 #include "session/upload.h"
 #include "protocol/version.h"
@@ -135,6 +135,10 @@ static void on_failed(struct session *session, struct request *request, const st
 {
     struct error error = event->error;
     error_set(&error, ERROR_INTERNAL, NULL, "the engine gave no reason");
+    if (request->kind == REQUEST_SCENE_ATTACH && error.kind == ERROR_UNKNOWN_ID) {
+        scenes_find_elsewhere(session, request, &error);
+        return;
+    }
     switch (request->kind) {
     case REQUEST_JOB:
         job_failed(session, request, &error);
@@ -174,12 +178,16 @@ void session_engine_event(struct session *session, struct engine_event *event)
         }
         return;
     case ENGINE_STATS_READY:
-        if (request->kind == REQUEST_STATS && event->stats)
+        if (request->kind == REQUEST_STATS && event->stats) {
             stats_answer(session, request, event->stats);
+            event->stats = NULL;
+        }
         return;
     case ENGINE_SCENES_LISTED:
-        if (request->kind == REQUEST_SCENE_LIST && event->list)
+        if (request->kind == REQUEST_SCENE_LIST && event->list) {
             scenes_listed(session, request, event->list);
+            event->list = NULL;
+        }
         return;
     case ENGINE_SCENE_DESCRIBED:
         if (request->kind == REQUEST_SCENE_DESCRIBE && event->description)
@@ -263,62 +271,12 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
     };
 }
 
-static size_t introduced_count(const struct hub *hub)
-{
-    return hub->sessions.count - hub->unauthenticated;
-}
-
-static uint64_t on_seal_wait_ns(void *context)
-{
-    const struct session *session = context;
-    struct hub *hub = session->hub;
-    /* Unix peers have no address that others could be kept apart from. */
-    return address_is_unix(&session->peer)
-               ? 0
-               : attempts_wait_ns(&hub->attempts, address_network(&session->peer),
-                                  hub->options.limits.handshakes_a_second, clock_now_ns());
-}
-
-static void on_key_failed(void *context)
-{
-    const struct session *session = context;
-    if (log_is_due(session->owner->number, "wrong key"))
-        log_write(LOG_WARNING, "session", "a wrong key came from %s", session->identity.name);
-}
-
-static void count_unauthenticated(struct session *session, bool counts)
-{
-    if (session->is_unauthenticated == counts)
-        return;
-    session->is_unauthenticated = counts;
-    session->hub->unauthenticated += counts ? 1 : (size_t)-1;
-    session->owner->unauthenticated += counts ? 1 : UINT32_MAX;
-}
-
-static void on_key_proved(void *context, size_t index)
-{
-    struct session *session = context;
-    struct owners *owners = &session->hub->owners;
-    auth_identify_by_key(&session->identity, session->keys, index);
-    session->principal = principal_number(&session->identity, session->number);
-    struct owner *owner = owner_find(owners, owner_number(&session->identity, &session->peer));
-    if (!owner)
-        return; /* it goes on with the share of its network */
-    count_unauthenticated(session, false);
-    owner_unref(owners, session->owner);
-    session->owner = owner;
-    session->connection->entry.log_source = owner->number;
-    session->connection->entry.sharers = &owner->clients;
-    session_hold(session, owner->held);
-    count_unauthenticated(session, true);
-}
-
 static const char replaced_key[] = "the daemon's key was replaced; connect with the new one";
 
 /* Whether its key, if it came by one, is still one of the daemon's. */
 static bool is_key_valid(const struct session *session)
 {
-    return !session->identity.has_key || auth_keys_have(session->hub->options.keys, &session->identity);
+    return !session->identity.has_key || auth_numbers_have(&session->hub->options.keys, &session->identity);
 }
 
 /* Whoever runs the daemon can always look at it. */
@@ -332,7 +290,7 @@ static bool has_place(const struct session *session, char text[HANDSHAKE_TEXT_MA
 {
     const struct session_limits *limits = &session->hub->options.limits;
     const size_t text_bytes = HANDSHAKE_TEXT_MAX_BYTES + 1;
-    size_t all = introduced_count(session->hub);
+    size_t all = session->hub->introduced;
     bool at_home = is_at_home(session);
     if (all >= limits->clients + (at_home ? PLACES_AT_HOME : 0u)) {
         snprintf(text, text_bytes, "%u clients are connected, the limit; try again later", limits->clients);
@@ -382,15 +340,26 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     return reply->text[0] == '\0';
 }
 
-static void on_opened(void *context)
+static void count_introduced(struct hub *hub, int more)
 {
-    struct session *session = context;
+    hub->introduced += (size_t)more;
+    if (hub->counted)
+        hub->counted(hub->call_context);
+}
+
+static void introduce(struct session *session)
+{
     session->introduced = true;
-    count_unauthenticated(session, false);
     session->owner->clients++;
+    count_introduced(session->hub, 1);
     log_write(LOG_DEBUG, "session", "client %" PRIu64 " is %s, %s", session->number, session->name,
               session->identity.name);
-    upload_begin(session);
+}
+
+static void on_opened(void *context)
+{
+    introduce(context);
+    upload_begin(context);
 }
 
 static void on_room(void *context)
@@ -436,16 +405,15 @@ static void on_closed(void *context)
     requests_finish(&session->requests);
     upload_finish(session);
     scenes_finish(session);
-    count_unauthenticated(session, false);
     if (session->introduced) {
         session->owner->clients--;
+        count_introduced(hub, -1);
         hub_departed(hub, session->number, session->owner, session->transaction_bytes);
         hub_submit(hub, session->owner, session->farewell);
     } else {
         engine_command_destroy(session->farewell);
     }
     owner_unref(&hub->owners, session->owner);
-    auth_keys_unref(session->keys);
     bool was_owner = session->number == hub->owner;
     free(session);
     if (was_owner && hub->owner_gone)
@@ -455,9 +423,6 @@ static void on_closed(void *context)
 }
 
 static const struct connection_handler connection_handler = {
-    .seal_wait_ns = on_seal_wait_ns,
-    .key_failed = on_key_failed,
-    .key_proved = on_key_proved,
     .hello = on_hello,
     .opened = on_opened,
     .message = dispatch_message,
@@ -469,8 +434,7 @@ static const struct connection_handler connection_handler = {
 
 /* ---- life -------------------------------------------------------------------------------------------- */
 
-struct session *session_create(struct hub *hub, uint64_t number, int fd, bool sealed_only,
-                               const struct address *peer, const struct auth_identity *identity,
+struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct handover *handover,
                                struct owner *owner, struct error *error)
 {
     struct session *session = calloc(1, sizeof(*session));
@@ -480,38 +444,60 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
     }
     session->hub = hub;
     session->number = number;
-    session->keys = auth_keys_ref(hub->options.keys);
-    session->identity = *identity;
-    session->peer = *peer;
+    session->identity = handover->identity;
+    session->peer = handover->peer;
+    session->can_h264 = handover->can_h264;
+    session->can_abandon = handover->can_abandon;
+    memcpy(session->name, handover->name, sizeof(session->name));
     session->principal = principal_number(&session->identity, session->number);
     session->farewell = hub_command(ENGINE_CLIENT_GONE, number, 0);
-    const struct connection_entry entry = {
-        .keys = session->keys ? session->keys->keys : NULL,
-        .key_count = session->keys ? session->keys->count : 0,
-        .sealed_only = sealed_only,
-        .log_source = owner->number,
-        .sharers = &owner->clients,
-    };
+    const struct connection_entry entry = {.log_source = owner->number, .sharers = &owner->clients};
+    const struct connection_saved *saved = handover->saved.bytes ? &handover->saved : NULL;
     session->connection = session->farewell ? connection_create(hub->loop, fd, connection_limits_of(session),
-                                                                &entry, &connection_handler, session, error)
+                                                                &entry, &connection_handler, session, saved, error)
                                             : NULL;
     if (!session->connection) {
         error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
         engine_command_destroy(session->farewell);
-        auth_keys_unref(session->keys);
         free(session);
         return NULL;
     }
     session->owner = owner_ref(owner);
-    count_unauthenticated(session, true);
+    if (handover->is_open) {
+        introduce(session);
+        upload_begin(session); /* which says again what its client knows */
+    }
     return session;
 }
 
-void session_turn_away(struct session *session, const char *why)
+/* ---- to another worker ------------------------------------------------------------------------------- */
+
+static bool may_move(const struct session *session)
 {
-    count_unauthenticated(session, false);
-    greeting_turn_away(session->connection->fd, why, HANDSHAKE_TRY_AGAIN);
-    connection_close(session->connection);
+    return session->connection->state == CONNECTION_OPEN && !session->connection->out.queued_bytes &&
+           session->owner->number == session->hub->worker_of && session->number != session->hub->owner &&
+           session->requests.in_flight.count == 1 && !session->scenes.count && !session->jobs &&
+           !session->blobs.offer_count && !session->transaction_edits;
+}
+
+bool session_move(struct session *session, uint32_t worker, uint32_t request, const struct message *message)
+{
+    uint8_t bytes[SCENE_NAME_MAX + 256];
+    struct handover handover = {.identity = session->identity,
+                                .peer = session->peer,
+                                .to_worker = worker,
+                                .is_open = true,
+                                .can_h264 = session->can_h264,
+                                .can_abandon = session->can_abandon};
+    struct writer writer;
+    struct error error = {0};
+    memcpy(handover.name, session->name, sizeof(handover.name));
+    writer_init(&writer, bytes, sizeof(bytes));
+    if (!may_move(session) || !message_write(&writer, request, 0, message) ||
+        !others_hand_over(session->hub->others, session->connection, &handover, bytes, writer.used_bytes, &error))
+        return false;
+    connection_close(session->connection); /* the socket is the other worker's */
+    return true;
 }
 
 void session_check_key(struct session *session)

@@ -29,12 +29,10 @@ struct session {
     uint64_t number;
     struct connection *connection;
     struct auth_identity identity;
-    struct auth_keys *keys; /* as they were when it came: others may be read while it proves that it has one */
     struct address peer;
     blob_principal principal;
     struct owner *owner; /* whose share it uses */
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
-    bool is_unauthenticated;         /* it counts as such: the hello is not done */
     bool introduced;                 /* the hello is done: the engine may know it */
     bool can_h264;                   /* the client decodes it, and an encoder is here */
     bool can_abandon;                /* frames of views may end unfinished */
@@ -50,12 +48,12 @@ struct session {
     uint32_t job_count;
 };
 
-/* `sealed_only`: it may not come in without a key. */
-struct session *session_create(struct hub *hub, uint64_t number, int fd, bool sealed_only,
-                               const struct address *peer, const struct auth_identity *identity,
+/* As hub_add_client(). */
+struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct handover *handover,
                                struct owner *owner, struct error *error);
-/* Of one that has not introduced itself: says why, and closes. */
-void session_turn_away(struct session *session, const char *why);
+/* Another worker is to serve it, which is to read `message` first. False: it cannot go, as it has more than this
+ * one request, or does not read what it is told; nothing is changed. */
+bool session_move(struct session *session, uint32_t worker, uint32_t request, const struct message *message);
 /* After the daemon's keys were replaced: goodbye to one whose key is none of them. */
 void session_check_key(struct session *session);
 void session_stop(struct session *session); /* the daemon stops: goodbye */

@@ -5,11 +5,15 @@
 #include "protocol/codec.h"
 #include "protocol/version.h"
 #include "session/jobs.h"
+#include "session/others.h"
 #include "session/session.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* For which a worker that does not answer is waited for: its figures are left out. */
+#define OTHERS_NS UINT64_C(500000000)
 
 #define CLIENTS_MAX 256
 #define SCENES_MAX 256
@@ -48,7 +52,12 @@ static void fill_client(struct record_client_stat *stat, char name[NAME_BYTES], 
 }
 
 /* A read-only client is told of itself alone. */
-static uint32_t fill_clients(struct stats_storage *storage, const struct session *asker)
+static bool may_hear_of(const struct stats_asker *asker, const struct session *session)
+{
+    return !asker->read_only || session == asker->session;
+}
+
+static uint32_t fill_clients(struct stats_storage *storage, const struct stats_asker *asker)
 {
     const struct hub *hub = asker->hub;
     uint64_t now_ns = clock_now_ns();
@@ -57,7 +66,7 @@ static uint32_t fill_clients(struct stats_storage *storage, const struct session
     void *value;
     while (count < CLIENTS_MAX && hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
         const struct session *session = value;
-        if (!session->introduced || (asker->identity.read_only && session != asker))
+        if (!session->introduced || !may_hear_of(asker, session))
             continue;
         fill_client(&storage->clients[count], storage->client_names[count], session, now_ns);
         count++;
@@ -66,13 +75,13 @@ static uint32_t fill_clients(struct stats_storage *storage, const struct session
 }
 
 /* Scenes that other owners keep have no name for this client, and are not listed for a read-only one. */
-static uint32_t fill_scenes(struct stats_storage *storage, const struct session *asker,
+static uint32_t fill_scenes(struct stats_storage *storage, const struct stats_asker *asker,
                             const struct engine_stats *stats)
 {
     uint32_t count = 0;
     for (uint32_t i = 0; i < stats->scene_count && count < SCENES_MAX; i++) {
         const struct engine_scene_stat *from = &stats->scenes[i];
-        if (asker->identity.read_only && !from->is_known)
+        if (asker->read_only && !from->is_known)
             continue;
         storage->scenes[count++] = (struct record_scene_stat){
             .client = from->client,
@@ -91,7 +100,7 @@ static uint32_t fill_scenes(struct stats_storage *storage, const struct session 
 }
 
 /* A client of the same user or key has the scene, or a scene of that name is listed for this client anyway. */
-static bool may_know_scene(const struct session *asker, const struct session *owner, const char *name,
+static bool may_know_scene(const struct stats_asker *asker, const struct session *owner, const char *name,
                            const struct engine_stats *stats)
 {
     bool may = owner->principal == asker->principal;
@@ -116,8 +125,7 @@ static void fill_job(struct record_job_stat *stat, const struct job *job, uint64
     };
 }
 
-/* A read-only client is told of its own alone. */
-static uint32_t fill_jobs(struct stats_storage *storage, const struct session *asker,
+static uint32_t fill_jobs(struct stats_storage *storage, const struct stats_asker *asker,
                           const struct engine_stats *stats)
 {
     const uint64_t now_ns = clock_now_ns();
@@ -126,7 +134,7 @@ static uint32_t fill_jobs(struct stats_storage *storage, const struct session *a
     void *value;
     while (hashmap_next(&asker->hub->sessions, &cursor, NULL, &value)) {
         const struct session *session = value;
-        if (asker->identity.read_only && session != asker)
+        if (!may_hear_of(asker, session))
             continue;
         for (const struct job *job = session->jobs; job && count < JOBS_MAX; job = job->next) {
             struct record_job_stat *stat = &storage->jobs[count++];
@@ -159,7 +167,7 @@ static uint32_t fill_stages(struct stats_storage *storage, const struct engine_s
 
 static void fill(struct message_stats_reply *reply, const struct hub *hub, const struct engine_stats *stats)
 {
-    reply->uptime_ns = clock_now_ns() - hub->started_ns;
+    reply->uptime_ns = clock_now_ns() - hub->options.started_ns;
     reply->frames = stats->frames;
     reply->rays = stats->rays;
     reply->host_bytes = stats->host_bytes;
@@ -175,38 +183,117 @@ static void fill(struct message_stats_reply *reply, const struct hub *hub, const
     reply->driver = stats->device.version;
 }
 
-void stats_answer(struct session *session, struct request *request, const struct engine_stats *stats)
+/* A very busy daemon has more to tell than one message holds: the totals matter more than the last scenes and
+ * jobs. */
+static void make_fit(struct message *message)
+{
+    struct message_stats_reply *reply = &message->stats_reply;
+    while ((reply->scenes_count || reply->running_count) &&
+           message_payload_bytes(message) > CODEC_CONTROL_PAYLOAD_MAX_BYTES)
+        --*(reply->scenes_count > reply->running_count ? &reply->scenes_count : &reply->running_count);
+}
+
+struct stats_storage *stats_fill(struct message *message, const struct stats_asker *asker,
+                                 const struct engine_stats *stats)
 {
     struct stats_storage *storage = calloc(1, sizeof(*storage));
+    if (!storage)
+        return NULL;
+    message_init(message, MESSAGE_STATS_REPLY);
+    struct message_stats_reply *reply = &message->stats_reply;
+    fill(reply, asker->hub, stats);
+    reply->clients = storage->clients;
+    reply->clients_count = fill_clients(storage, asker);
+    reply->scenes = storage->scenes;
+    reply->scenes_count = fill_scenes(storage, asker, stats);
+    reply->stages = storage->stages;
+    reply->stages_count = fill_stages(storage, stats);
+    reply->running = storage->jobs;
+    reply->running_count = fill_jobs(storage, asker, stats);
+    make_fit(message);
+    return storage;
+}
+
+/* ---- of all workers ---------------------------------------------------------------------------------- */
+
+static void add_stage(struct stats_storage *storage, struct message_stats_reply *reply,
+                      const struct record_stage_total *more)
+{
+    uint32_t i = 0;
+    while (i < reply->stages_count &&
+           (storage->stages[i].stage != more->stage || storage->stages[i].clock != more->clock))
+        i++;
+    if (i == STAGES_MAX)
+        return;
+    struct record_stage_total *total = &storage->stages[i];
+    if (i == reply->stages_count) {
+        *total = *more;
+        reply->stages_count++;
+        return;
+    }
+    total->count += more->count;
+    total->total_ns += more->total_ns;
+    total->max_ns = more->max_ns > total->max_ns ? more->max_ns : total->max_ns;
+}
+
+static void add_other(struct stats_storage *storage, struct message_stats_reply *reply,
+                      const struct message_stats_reply *other)
+{
+    reply->frames += other->frames;
+    reply->rays += other->rays;
+    reply->host_bytes += other->host_bytes;
+    reply->device_bytes += other->device_bytes;
+    reply->blob_bytes += other->blob_bytes;
+    reply->blobs += other->blobs;
+    reply->jobs += other->jobs;
+    reply->device_objects += other->device_objects;
+    for (uint32_t i = 0; i < other->clients_count && reply->clients_count < CLIENTS_MAX; i++)
+        storage->clients[reply->clients_count++] = other->clients[i];
+    for (uint32_t i = 0; i < other->scenes_count && reply->scenes_count < SCENES_MAX; i++)
+        storage->scenes[reply->scenes_count++] = other->scenes[i];
+    for (uint32_t i = 0; i < other->running_count && reply->running_count < JOBS_MAX; i++)
+        storage->jobs[reply->running_count++] = other->running[i];
+    for (uint32_t i = 0; i < other->stages_count; i++)
+        add_stage(storage, reply, &other->stages[i]);
+}
+
+static void send_sum(struct session *session, struct request *request, const struct engine_stats *stats,
+                     const struct others_answer *answers)
+{
+    struct error error = {0};
+    struct message message;
+    struct stats_storage *storage = stats_fill(&message,
+                                               &(struct stats_asker){.hub = session->hub,
+                                                                     .session = session,
+                                                                     .principal = session->principal,
+                                                                     .read_only = session->identity.read_only},
+                                               stats);
     if (!storage) {
-        struct error error = {0};
         error_set(&error, ERROR_OUT_OF_MEMORY, "stats", "no memory");
         request_answer_error(session, request, &error);
         return;
     }
-    struct message message;
-    message_init(&message, MESSAGE_STATS_REPLY);
-    struct message_stats_reply *reply = &message.stats_reply;
-    fill(reply, session->hub, stats);
-    reply->clients = storage->clients;
-    reply->clients_count = fill_clients(storage, session);
-    reply->scenes = storage->scenes;
-    reply->scenes_count = fill_scenes(storage, session, stats);
-    reply->stages = storage->stages;
-    reply->stages_count = fill_stages(storage, stats);
-    reply->running = storage->jobs;
-    reply->running_count = fill_jobs(storage, session, stats);
-    /* A very busy daemon has more to tell than one message holds: the totals matter more than the last scenes and
-     * jobs. */
-    while ((reply->scenes_count || reply->running_count) &&
-           message_payload_bytes(&message) > CODEC_CONTROL_PAYLOAD_MAX_BYTES)
-        --*(reply->scenes_count > reply->running_count ? &reply->scenes_count : &reply->running_count);
+    for (const struct others_answer *answer = answers; answer; answer = answer->next)
+        add_other(storage, &message.stats_reply, &answer->message.stats_reply);
+    make_fit(&message);
     if (session_send(session, request->id, 0, &message)) {
         request_answered(session, request);
     } else {
-        struct error error = {0};
         error_set(&error, ERROR_INTERNAL, "stats", "the numbers cannot be sent");
         request_answer_error(session, request, &error);
     }
     free(storage);
+}
+
+static void on_others(void *context, struct session *session, struct request *request,
+                      const struct others_answer *answers)
+{
+    if (session)
+        send_sum(session, request, context, answers);
+    engine_stats_destroy(context);
+}
+
+void stats_answer(struct session *session, struct request *request, struct engine_stats *stats)
+{
+    others_ask(session->hub->others, CHANNEL_STATS, session, request, OTHERS_NS, on_others, stats);
 }

@@ -4,8 +4,23 @@
 #define FARLIGHT_SESSION_STATS_H
 
 #include "engine/engine.h"
+#include "session/hub.h"
 #include "session/requests.h"
 
-void stats_answer(struct session *session, struct request *request, const struct engine_stats *stats);
+struct message;
+
+/* For whom the figures are. */
+struct stats_asker {
+    const struct hub *hub;
+    const struct session *session; /* NULL: a client of another worker */
+    blob_principal principal;
+    bool read_only; /* it hears of itself alone, and of scenes that it may attach to */
+};
+
+/* Answers with the figures of all workers; takes over the stats. */
+void stats_answer(struct session *session, struct request *request, struct engine_stats *stats);
+/* A STATS_REPLY of this worker, which refers to what is returned; for free(). NULL: out of memory. */
+struct stats_storage *stats_fill(struct message *message, const struct stats_asker *asker,
+                                 const struct engine_stats *stats);
 
 #endif

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -118,4 +119,19 @@ bool store_folder_each(int folder, void (*each)(void *context, const char *name)
     }
     closedir(entries);
     return true;
+}
+
+int store_folder_lock(int folder, const char *path, struct error *error)
+{
+    int fd = openat(folder, "lock", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, S_IRUSR | S_IWUSR);
+    if (fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) == 0)
+        return fd;
+    if (errno == EWOULDBLOCK)
+        error_set(error, ERROR_BUSY, path, "another daemon uses the folder");
+    else
+        error_set(error, ERROR_INVALID, path, "%s", strerror(errno));
+    error_remedy(error, "give each daemon a folder of its own in scenes.store");
+    if (fd >= 0)
+        close(fd);
+    return -1;
 }

@@ -16,6 +16,9 @@
 /* The folder, made if it is not there; its owner is this process' user, and nobody else may enter. `at` is a
  * folder or AT_FDCWD. < 0 and *error: it is not like that. */
 int store_folder_open(int at, const char *path, struct error *error);
+/* Takes the folder for this process: a descriptor that holds it until it is closed. < 0 and *error: ERROR_BUSY,
+ * another process has it, or it cannot be taken. */
+int store_folder_lock(int folder, const char *path, struct error *error);
 /* Writes a file that is on the disk before it has its name. */
 bool store_file_write(int folder, const char *name, const void *data, size_t size_bytes,
                       const atomic_bool *abandoned, struct error *error);

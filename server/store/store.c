@@ -367,17 +367,6 @@ static void drop_incomplete(struct store *store)
     }
 }
 
-static bool lock_folder(struct store *store, const char *folder, struct error *error)
-{
-    store->lock_file =
-        openat(store->folder, "lock", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, S_IRUSR | S_IWUSR);
-    if (store->lock_file >= 0 && flock(store->lock_file, LOCK_EX | LOCK_NB) == 0)
-        return true;
-    error_set(error, ERROR_INVALID, folder, errno == EWOULDBLOCK ? "another daemon uses the folder" : "%s",
-              strerror(errno));
-    return error_remedy(error, "give each daemon a folder of its own in scenes.store");
-}
-
 struct store *store_open(const char *folder, uint64_t limit_bytes, struct error *error)
 {
     struct store *store = calloc(1, sizeof(*store));
@@ -389,7 +378,8 @@ struct store *store_open(const char *folder, uint64_t limit_bytes, struct error 
     store->limit_bytes = limit_bytes;
     store->folder = store->scenes = store->blobs = store->lock_file = -1;
     store->folder = store_folder_open(AT_FDCWD, folder, error);
-    bool ok = store->folder >= 0 && lock_folder(store, folder, error);
+    store->lock_file = store->folder < 0 ? -1 : store_folder_lock(store->folder, folder, error);
+    bool ok = store->lock_file >= 0;
     if (ok)
         store->scenes = store_folder_open(store->folder, "scenes", error);
     if (ok && store->scenes >= 0)

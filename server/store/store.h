@@ -25,6 +25,17 @@ struct store_record {
 };
 void store_record_finish(struct store_record *record); /* releases what it holds, not the struct */
 
+/* A folder of a daemon's, with a store of each owner in it. */
+struct store_folder;
+/* Takes the folder for this process, and makes it where its parent is there. NULL and *error: as for store_open().
+ */
+struct store_folder *store_claim(const char *path, struct error *error);
+void store_release(struct store_folder *folder); /* accepts NULL */
+/* Those who have a record in it, at most `max`. */
+size_t store_owners(const struct store_folder *folder, uint64_t *owners, size_t max);
+/* The owner's in such a folder. One that is about to end may have it: that is waited for. */
+struct store *store_open_owner(const char *path, uint64_t owner, uint64_t limit_bytes, struct error *error);
+
 /* Opens the folder, and makes it where its parent is there. Records that cannot be used are removed, and the log
  * says so. NULL and *error: it is not the user's own, another process uses it, or it cannot be read. */
 struct store *store_open(const char *folder, uint64_t limit_bytes, struct error *error);

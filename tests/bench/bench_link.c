@@ -57,10 +57,10 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     return true;
 }
 
-static bool on_key_allowed(void *context)
+static uint64_t on_seal_wait_ns(void *context)
 {
     (void)context;
-    return true;
+    return 0;
 }
 
 static void on_key(void *context)
@@ -123,7 +123,7 @@ static void accept_one(void *context, uint32_t epoll_events)
                                                     .queued_soft_ms = 10000,
                                                     .queued_soft_bytes = 16 << 20,
                                                     .queued_hard_bytes = 64 << 20};
-    static const struct connection_handler handler = {.key_allowed = on_key_allowed,
+    static const struct connection_handler handler = {.seal_wait_ns = on_seal_wait_ns,
                                                       .key_failed = on_key,
                                                       .key_proved = on_key_proved,
                                                       .hello = on_hello,
@@ -141,7 +141,7 @@ static void accept_one(void *context, uint32_t epoll_events)
     int fd = listener_accept(&served.listener, &peer, &retry_later);
     if (fd < 0)
         return;
-    served.connection = connection_create(served.loop, fd, &limits, &entry, &handler, NULL, &error);
+    served.connection = connection_create(served.loop, fd, &limits, &entry, &handler, NULL, NULL, &error);
     if (!served.connection)
         die(error.text);
 }

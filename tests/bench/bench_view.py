@@ -56,7 +56,7 @@ def frames_of(told):
 
 
 def watch(bench, daemon, model, *options):
-    return json.loads(command(*bench.form("view"), daemon.address, *model, "--pid", daemon.process.pid,
+    return json.loads(command(*bench.form("view"), daemon.address, *model, "--pid", daemon.workers()[0],
                               *options))
 
 

@@ -105,11 +105,11 @@ def ours(daemon, name, job, counts, options=()):
                    "--filter", "box", "--size", OPTIONS.size, "--samples", count, "--seed", seed, "--fov", job["fov"],
                    "--environment", environment, *OPTIONS.option, *options]
         command += [f"--{key.replace('_', '-')}=" + ",".join(map(str, job[key])) for key in ("eye", "look_at", "up")]
-        before = cpu_s(daemon.process.pid)
+        before = cpu_s(daemon.workers()[0])
         result = farlight_test.farlight(*command, timeout=TIMEOUT_S)
         if result.returncode:
             raise RuntimeError(f"farlight: {result.stderr.strip().splitlines()[-1]}")
-        return count, cpu_s(daemon.process.pid) - before, pictures.read(output)
+        return count, cpu_s(daemon.workers()[0]) - before, pictures.read(output)
 
     render(1, 0, OPTIONS.out / "warm.exr")
     return [render(count, seed, OPTIONS.out / f"{name}.ours{''.join(options)}-{count}.exr")

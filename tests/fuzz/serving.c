@@ -140,8 +140,10 @@ bool serving_connect(unsigned number)
     int pair[2];
     FUZZ_REQUIRE(client->fd < 0 && socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, pair) == 0);
     struct address address = {.storage.ss_family = AF_UNIX, .storage_bytes = sizeof(sa_family_t)};
+    const struct handover handover = {.identity = {.known = true, .has_user = true, .user = 1000},
+                                      .peer = address};
     struct error error = {0};
-    if (!hub_add_client(&serving_hub, pair[0], &address, &address, &error)) {
+    if (!hub_add_client(&serving_hub, pair[0], &handover, &error)) {
         close(pair[0]);
         close(pair[1]);
         return false;
@@ -243,7 +245,7 @@ void serving_begin(void)
 void serving_check_empty(void)
 {
     FUZZ_REQUIRE(serving_hub.sessions.count == 0);
-    FUZZ_REQUIRE(serving_hub.unauthenticated == 0);
+    FUZZ_REQUIRE(serving_hub.introduced == 0);
     FUZZ_REQUIRE(serving_hub.frame_bytes == 0);
     FUZZ_REQUIRE(!serving_hub.turn_first);
     FUZZ_REQUIRE(blob_store_bytes(serving_hub.blobs) == 0);

@@ -104,6 +104,15 @@ class Daemon:
         self.log.flush()
         return pathlib.Path(self.log.name).read_text()
 
+    def workers(self):
+        """Numbers of the processes that serve its users."""
+        return [int(child) for child in pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()]
+
+    def signal_all(self, number):
+        """Sends a signal to it and to its workers."""
+        for process in (self.process.pid, *self.workers()):
+            os.kill(process, number)
+
     @property
     def path(self):
         return self.address.removeprefix("unix:")

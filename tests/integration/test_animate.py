@@ -266,11 +266,11 @@ class Lost(Animations):
         with Daemon() as daemon:
             child = self.start("silent", "--server", daemon.address, "--lost-after", "3", "--retry-for", "1")
             self.wait_for_files("silent", 2, child)
-            daemon.process.send_signal(signal.SIGSTOP)
+            daemon.signal_all(signal.SIGSTOP)
             try:
                 errors = self.finish(child, 75)
             finally:
-                daemon.process.send_signal(signal.SIGCONT)
+                daemon.signal_all(signal.SIGCONT)
             self.assertIn("counts as lost: it answered nothing, no ping either, for 3 s", errors)
             self.assertIn("given up after", errors)
             made = self.digests("silent")
@@ -287,7 +287,7 @@ class Lost(Animations):
             with self.subTest(lost_after=lost_after), Daemon() as daemon:
                 child = self.start(name, "--server", daemon.address, "--lost-after", lost_after, "--retry-for", "10m")
                 self.wait_for_files(name, 2, child)
-                daemon.process.send_signal(signal.SIGSTOP)
+                daemon.signal_all(signal.SIGSTOP)
                 try:
                     if is_lost:
                         while "trying again" not in child.stderr.readline():
@@ -295,7 +295,7 @@ class Lost(Animations):
                     else:
                         time.sleep(5)
                 finally:
-                    daemon.process.send_signal(signal.SIGCONT)
+                    daemon.signal_all(signal.SIGCONT)
                 errors = self.finish(child, 0)
                 self.assertEqual(self.digests(name), self.whole())
                 if not is_lost:

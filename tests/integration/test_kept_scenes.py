@@ -15,6 +15,7 @@ class KeptScenes(Case):
     def setUp(self):
         super().setUp()
         self.store = self.folder / "store"
+        self.own = self.store / f"{os.getuid():016x}"  # of this user
 
     def daemon(self, **options):
         environment = {**os.environ, "FARLIGHT_SCENES_STORE": str(self.store)}
@@ -22,7 +23,7 @@ class KeptScenes(Case):
         return Daemon(environment=environment)
 
     def records(self):
-        folder = self.store / "scenes"
+        folder = self.own / "scenes"
         return sorted(entry.name for entry in folder.iterdir() if "." not in entry.name) if folder.exists() else []
 
     def scenes(self, daemon):
@@ -81,7 +82,7 @@ class KeptScenes(Case):
                 wait_until(self.records, "the scene is not written")
                 serving.stop()
             wait_until(lambda: not self.scenes(daemon), "the scene stays")
-            wait_until(lambda: not any((self.store / "blobs").iterdir()), "its blobs stay")
+            wait_until(lambda: not any((self.own / "blobs").iterdir()), "its blobs stay")
             self.assertEqual(self.records(), [])
 
     def test_what_was_tampered_with_is_left_out_and_the_rest_is_there(self):
@@ -93,14 +94,14 @@ class KeptScenes(Case):
             wait_until(lambda: len(self.records()) == expected, "the scenes are not written")
             self.kill(daemon)
         self.assertEqual(expected, 3)
-        record = self.store / "scenes" / self.records()[0]
+        record = self.own / "scenes" / self.records()[0]
         data = bytearray(record.read_bytes())
         data[-1] ^= 1
         record.write_bytes(data)
         with self.daemon() as daemon:
             self.assertEqual(len(self.scenes(daemon)), expected - 1)
             self.assertIn("no scene that can be restored", daemon.messages())
-        blob = next((self.store / "blobs").iterdir())
+        blob = next((self.own / "blobs").iterdir())
         data = bytearray(blob.read_bytes())
         data[0] ^= 1
         blob.write_bytes(data)
@@ -113,7 +114,7 @@ class KeptScenes(Case):
             with Serving(bundled_scenes() / "teapot.glb", "--server", daemon.address):
                 wait_until(self.records, "the scene is not written")
             self.kill(daemon)
-        record = self.store / "scenes" / self.records()[0]
+        record = self.own / "scenes" / self.records()[0]
         record.rename(record.with_suffix(".trying"))
         with self.daemon() as daemon:
             self.assertEqual(self.scenes(daemon), [])

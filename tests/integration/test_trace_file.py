@@ -155,7 +155,7 @@ class OfTheDaemon(Traced):
             while time.monotonic() < deadline and '"send"' not in path.read_text():
                 time.sleep(0.02)
             self.check_form(json.loads(path.read_text() + "]"))
-            daemon.process.kill()
+            daemon.signal_all(signal.SIGKILL)
             daemon.process.wait()
         self.check_form(json.loads(path.read_text() + "]"))
 

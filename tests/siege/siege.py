@@ -114,11 +114,10 @@ def percentile(values, share):
     return sorted(values)[min(len(values) - 1, int(share * len(values)))] if values else float("inf")
 
 
-def resident_mib(process):
-    for line in pathlib.Path(f"/proc/{process.pid}/status").read_text().splitlines():
-        if line.startswith("VmHWM:"):
-            return int(line.split()[1]) >> 10
-    return 0
+def resident_mib(daemon):
+    """The most that one of its processes has had; limits are for each."""
+    statuses = (pathlib.Path(f"/proc/{process}/status").read_text() for process in (daemon.process.pid, *daemon.workers()))
+    return max(int(line.split()[1]) >> 10 for status in statuses for line in status.splitlines() if line.startswith("VmHWM:"))
 
 
 def besieged(name, limits, folder, seconds=0.0, looks=0, niceness=0):
@@ -132,7 +131,7 @@ def besieged(name, limits, folder, seconds=0.0, looks=0, niceness=0):
         user = STRANGER if os.geteuid() == 0 else 0
         address = daemon.path if user else f"127.0.0.1:{tcp}"
         innocent = Innocent(daemon.path)
-        before_mib = resident_mib(daemon.process)
+        before_mib = resident_mib(daemon)
         attacker = None
         if name:
             attacker = subprocess.Popen([sys.executable, HERE / "attacks.py", name, str(user), address], stdout=subprocess.PIPE,
@@ -145,7 +144,7 @@ def besieged(name, limits, folder, seconds=0.0, looks=0, niceness=0):
         newcomer_s = come_new(daemon) if name else 0
         before = time.monotonic()
         log_bytes_a_s = (len(daemon.messages()) - log_before) / max(before - begin, 1)
-        peak_mib = resident_mib(daemon.process)
+        peak_mib = resident_mib(daemon)
         stuck = innocent.client
         daemon.process.terminate()
         waits = innocent.end(before)

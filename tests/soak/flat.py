@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What a daemon has, looked at from outside and asked for, while nobody is there; and whether it stays the same."""
+import collections
 import contextlib
 import json
 import pathlib
@@ -34,15 +35,15 @@ def look(daemon):
     result = farlight_test.farlight("stats", "--json", "--server", daemon.address)
     assert result.returncode == 0, result.stderr
     stats = json.loads(result.stdout)
-    folder = pathlib.Path(f"/proc/{daemon.process.pid}")
-    status = dict(line.split(":", 1) for line in (folder / "status").read_text().splitlines())
-    threads, compiling = threads_of(folder)
+    has = collections.Counter()  # all of its processes
+    for process in (daemon.process.pid, *daemon.workers()):
+        folder = pathlib.Path(f"/proc/{process}")
+        status = dict(line.split(":", 1) for line in (folder / "status").read_text().splitlines())
+        threads, compiling = threads_of(folder)
+        has.update(rss=int(status["VmRSS"].split()[0]) * KIB, data=int(status["VmData"].split()[0]) * KIB, threads=threads,
+                   compiling=compiling, descriptors=len(list((folder / "fd").iterdir())))
     return {
-        "rss": int(status["VmRSS"].split()[0]) * KIB,
-        "data": int(status["VmData"].split()[0]) * KIB,
-        "threads": threads,
-        "compiling": compiling,
-        "descriptors": len(list((folder / "fd").iterdir())),
+        **has,
         "scenes": len(stats["scenes"]),
         "clients": len(stats["clients"]),  # who asks is one
         "blob_bytes": stats["blob_bytes"],

@@ -45,10 +45,11 @@ MAY_INCLUDE = {
     "server/check": (BASE, GPU, SCENE, "server/render"),
     "server/encode": (BASE, "protocol/pixels"),
     "server/net": (BASE, "protocol", "protocol/sealed"),
+    "server/front": (BASE, "server/net"),
     "server/engine": ("protocol/common", BASE, GPU, SCENE, "server/render", "server/check", "server/encode"),
     "server/store": (BASE, "protocol"),
     "server/session": (BASE, SCENE, "server/encode", "server/net", "server/store", "server/engine", "protocol", "protocol/common"),
-    "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session", "protocol/common"),
+    "server": (BASE, GPU, "server/check", "server/net", "server/front", "server/store", "server/engine", "server/session", "protocol/common"),
     "client/warp": ("shaders/quadtree",),  # no protocol, GL, window or socket
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
     "client/edit": ("protocol", "protocol/common", "client/lib"),  # a part of the library

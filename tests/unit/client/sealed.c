@@ -140,11 +140,6 @@ static void play_refusal(struct daemon *daemon)
 
 TEST(other_refusals_are_reported_too)
 {
-    refusal = SEALED_TOO_MANY;
-    assert_false(connect_sealed(play_refusal));
-    check_error(FL_ERROR_REFUSED, "too many");
-    assert_true(error.retryable);
-    assert_int_equal(error.retry_after_ms, 60000);
     refusal = SEALED_NO_KEY;
     assert_false(connect_sealed(play_refusal));
     check_error(FL_ERROR_REFUSED, "no key");

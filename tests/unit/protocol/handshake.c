@@ -49,17 +49,16 @@ static struct handshake_reply some_reply(void)
         .unauthenticated_max = 26,
         .unauthenticated_per_address = 27,
         .wrong_key_ms = 28,
-        .wrong_keys_per_minute = 29,
-        .depth_max = 30,
-        .blobs_per_client = 31,
-        .transaction_edits = 32,
-        .scene_linger_seconds = 33,
-        .scenes_lingering = 34,
-        .ldc_memory_bytes = 35,
-        .abuffer_memory_bytes = 36,
-        .ldc_layers_max = 37,
-        .lost_after_ms = 38,
-        .handshakes_per_second = 39,
+        .depth_max = 29,
+        .blobs_per_client = 30,
+        .transaction_edits = 31,
+        .scene_linger_seconds = 32,
+        .scenes_lingering = 33,
+        .ldc_memory_bytes = 34,
+        .abuffer_memory_bytes = 35,
+        .ldc_layers_max = 36,
+        .lost_after_ms = 37,
+        .handshakes_per_second = 38,
     };
     for (size_t i = 0; i < HANDSHAKE_NONCE_BYTES; i++) {
         reply.nonce[i] = (uint8_t)(0xb0 + i);
@@ -121,24 +120,24 @@ TEST(the_reply_has_its_frozen_layout)
     struct handshake_reply reply = some_reply(), back;
     struct decode_error error;
     size_t consumed, count = handshake_reply_encode(bytes, &reply);
-    static const uint8_t head[] = {'F', 'A', 'R', 'L', 1, 0, 200, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0xb0, 0xb1};
+    static const uint8_t head[] = {'F', 'A', 'R', 'L', 1, 0, 196, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0xb0, 0xb1};
     static const uint8_t limits[] = {0,  0, 0, 0, 0,  1, 0, 0, 2,  0, 0, 0, 0,  0, 0, 0, 3,  0, 0, 0, 4, 0,
                                      0,  0, 5, 0, 0,  0, 6, 0, 0,  0, 7, 0, 0,  0, 8, 0, 0,  0, 9, 0, 0, 0,
                                      10, 0, 0, 0, 11, 0, 0, 0, 12, 0, 0, 0, 13, 0, 0, 0, 14, 0, 0, 0};
     static const uint8_t texts[] = {9, 'f', 'a', 'r', 'l', 'i', 'g', 'h', 't', 'd', 14, 'n'};
-    assert_int_equal(count, 248 + 1 + 9 + 1 + 14 + 7);
+    assert_int_equal(count, 244 + 1 + 9 + 1 + 14 + 3);
     assert_memory_equal(bytes, head, sizeof(head));
     assert_int_equal(bytes[32], 0xc0);
     assert_memory_equal(bytes + 48, limits, sizeof(limits));
-    /* Those that came later, from 15 on: 7 of 8 bytes, 13 of 4, the tracers', and two more. */
+    /* Those that came later, from 15 on: 7 of 8 bytes, 12 of 4, the tracers', and two more. */
     size_t offset = 48 + sizeof(limits);
-    for (uint8_t value = 15; value <= 39; value++) {
-        size_t bytes_of_it = value < 22 || value == 35 || value == 36 ? 8 : 4;
+    for (uint8_t value = 15; value <= 38; value++) {
+        size_t bytes_of_it = value < 22 || value == 34 || value == 35 ? 8 : 4;
         uint8_t expected[8] = {value};
         assert_memory_equal(bytes + offset, expected, bytes_of_it);
         offset += bytes_of_it;
     }
-    assert_memory_equal(bytes + 248, texts, sizeof(texts));
+    assert_memory_equal(bytes + 244, texts, sizeof(texts));
     assert_int_equal(parse_reply_copy(&back, bytes, count, &consumed, &error), HANDSHAKE_CONSUMED);
     assert_int_equal(consumed, count);
     assert_int_equal(back.version, 1);
@@ -190,7 +189,7 @@ TEST(names_of_the_maximum_length_fit)
     memset(reply.name, 'n', HANDSHAKE_NAME_MAX_BYTES);
     memset(reply.text, 't', HANDSHAKE_TEXT_MAX_BYTES);
     assert_int_equal(handshake_hello_encode(bytes, &hello), 104);
-    assert_int_equal(handshake_reply_encode(bytes, &reply), 576);
+    assert_int_equal(handshake_reply_encode(bytes, &reply), 568);
     hello.name[HANDSHAKE_NAME_MAX_BYTES] = 'n'; /* no NUL any more */
     reply.text[HANDSHAKE_TEXT_MAX_BYTES] = 't';
     assert_int_equal(handshake_hello_encode(bytes, &hello), 0);
@@ -272,21 +271,21 @@ TEST(limits_of_an_older_and_of_a_newer_daemon_are_understood)
     size_t consumed, count = handshake_reply_encode(bytes, &reply);
     size_t texts = 1 + strlen(reply.name) + 1 + strlen(reply.text);
     for (size_t limits_bytes = 0; limits_bytes <= 256; limits_bytes += 4) {
-        size_t kept = limits_bytes < 200 ? limits_bytes : 200;
+        size_t kept = limits_bytes < 196 ? limits_bytes : 196;
         memset(other, 0, sizeof(other));
         memcpy(other, bytes, 48 + kept);
         memset(other + 48 + kept, 0xee, limits_bytes - kept);
         other[6] = (uint8_t)limits_bytes;
         other[7] = (uint8_t)(limits_bytes >> 8);
-        memcpy(other + 48 + limits_bytes, bytes + 248, texts);
+        memcpy(other + 48 + limits_bytes, bytes + 244, texts);
         size_t length = (48 + limits_bytes + texts + 7) & ~(size_t)7;
         assert_int_equal(parse_reply_copy(&back, other, length, &consumed, &error), HANDSHAKE_CONSUMED);
         assert_int_equal(consumed, length);
         assert_string_equal(back.name, reply.name);
         assert_int_equal(back.limits.idle_seconds, limits_bytes >= 64 ? 14 : 0);
         assert_int_equal(back.limits.queued_soft_bytes, limits_bytes >= 72 ? 15 : 0);
-        assert_int_equal(back.limits.ldc_layers_max, limits_bytes >= 192 ? 37 : 0);
-        assert_int_equal(back.limits.lost_after_ms, limits_bytes >= 196 ? 38 : 0);
+        assert_int_equal(back.limits.ldc_layers_max, limits_bytes >= 188 ? 36 : 0);
+        assert_int_equal(back.limits.lost_after_ms, limits_bytes >= 192 ? 37 : 0);
         assert_int_equal(back.limits.handshake_ms, limits_bytes >= 20 ? 3 : 0);
         assert_int_equal(back.limits.scene_memory_bytes, limits_bytes >= 16 ? 2 : 0);
     }

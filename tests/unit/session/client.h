@@ -10,6 +10,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 
@@ -110,15 +111,37 @@ static inline void send_bytes(struct client *client, const void *data, size_t by
     }
 }
 
-/* Until both have proved that they have the key. */
-static inline void seal_with(struct client *client, const struct sealed_key *key)
+static inline void pass_on(struct sealed_link *from, struct sealed_link *to)
 {
+    size_t bytes, free_bytes;
+    const uint8_t *waiting = sealed_link_waiting(from, &bytes);
+    if (!waiting)
+        return;
+    uint8_t *space = sealed_link_space(to, &free_bytes);
+    assert_true(bytes <= free_bytes);
+    memcpy(space, waiting, bytes);
+    sealed_link_came(to, bytes);
+    sealed_link_sent(from, bytes);
+}
+
+/* The exchange in memory, which a front has with a client that it hands over; `saved` gets the daemon's end. */
+static inline void seal_with(struct client *client, const struct sealed_key *key, struct connection_saved *saved)
+{
+    struct decode_error error = {0};
+    struct sealed_link *server = sealed_link_server(key, 1);
     client->link = sealed_link_client(key);
-    assert_non_null(client->link);
-    while (!sealed_is_open(client->link->sealed)) {
-        send_sealed(client);
-        receive_some(client);
+    assert_true(server && client->link);
+    while (!sealed_is_open(client->link->sealed) || !sealed_is_open(server->sealed)) {
+        pass_on(client->link, server);
+        sealed_link_handshake(server, &error);
+        pass_on(server, client->link);
+        sealed_link_handshake(client->link, &error);
     }
+    *saved = (struct connection_saved){.link_bytes = sealed_link_save(server, NULL)};
+    saved->bytes = malloc(saved->link_bytes);
+    assert_non_null(saved->bytes);
+    sealed_link_save(server, saved->bytes);
+    sealed_link_destroy(server);
 }
 
 static inline void send_message(struct client *client, uint32_t request, uint32_t channel,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A daemon on a thread of its own that listens, with the real engine but for its renderer, and any number of
+/* A daemon on a thread of its own, with the real engine but for its renderer, and any number of
  * clients of it here. */
 #ifndef FARLIGHT_TESTS_CLIENTS_FIXTURE_H
 #define FARLIGHT_TESTS_CLIENTS_FIXTURE_H
@@ -7,20 +7,24 @@
 #include "tests/unit/engine/engine_fake.h"
 #include "tests/unit/session/client.h"
 
+#include "net/handover.h"
+#include "session/others.h"
 #include "session/session.h"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
-#include <sys/un.h>
+#include <unistd.h>
 
 /* ---- the daemon -------------------------------------------------------------------------------------- */
 
 static struct {
     struct daemon daemon;
     pthread_t thread;
-    char folder[64], address[96];
+    int front; /* the test's end of the channel by which clients are handed over */
 } served;
 
 static inline void *run(void *context)
@@ -33,15 +37,13 @@ static inline void *run(void *context)
 }
 
 static struct hub_options options; /* which a test may change before it starts the daemon */
+static bool users_look_only;       /* as the front says of readers */
 
 static inline int set_options(void **state)
 {
     (void)state;
     options = (struct hub_options){
         .limits = {.clients = 16,
-                   .unauthenticated = 16,
-                   .unauthenticated_per_address = 16,
-                   .handshakes_a_second = 1000,
                    .requests_in_flight = 64,
                    .scenes_per_client = 3,
                    .jobs_per_client = 4,
@@ -69,6 +71,7 @@ static inline int set_options(void **state)
                               .queued_hard_bytes = 64 << 20},
         .engine_limits = {.scene_linger_ms = 600000},
     };
+    users_look_only = false;
     daemon_block_signals();
     return 0;
 }
@@ -78,12 +81,14 @@ static inline void start_daemon(void)
     struct error error = {0};
     start((struct engine_options){.limits = options.engine_limits});
     options.engine = engine_port(engine);
-    strcpy(served.folder, "/tmp/farlight-test-XXXXXX");
-    assert_non_null(mkdtemp(served.folder));
-    snprintf(served.address, sizeof(served.address), "unix:%s/s tcp:127.0.0.1:0", served.folder);
+    int ends[2];
+    assert_true(channel_pair(ends, &error));
+    served.front = ends[1];
     daemon_init(&served.daemon);
-    assert_true(daemon_listen(&served.daemon, served.address, false, &error));
+    served.daemon.unused_s = 3600;
     assert_true(daemon_start(&served.daemon, &options, &error));
+    assert_true(daemon_serve_front(&served.daemon, ends[0], &error));
+    others_reach(served.daemon.hub.others, NULL); /* the test answers no question */
     assert_int_equal(pthread_create(&served.thread, NULL, run, NULL), 0);
 }
 
@@ -98,25 +103,35 @@ static inline uint64_t expect_ok(struct client *client, uint32_t request)
     return client->message.ok.revision;
 }
 
-/* Over the Unix socket, where all are one user, or over TCP, where everybody is somebody else. Says nothing yet.
- */
-static inline struct client *knock(bool over_tcp)
+/* A user, or with `is_stranger` somebody whom nobody knows. Says nothing yet. */
+static inline struct client *knock(bool is_stranger)
 {
     struct client *client = calloc(1, sizeof(*client));
+    int pair[2];
+    struct handover handover = {.peer = {.storage.ss_family = AF_UNIX, .storage_bytes = sizeof(sa_family_t)}};
+    if (!is_stranger)
+        handover.identity = (struct auth_identity){
+            .known = true, .has_user = true, .user = geteuid(), .read_only = users_look_only};
+    else
+        handover.peer.storage.ss_family = AF_INET;
+    snprintf(handover.identity.name, sizeof(handover.identity.name), "%s", is_stranger ? "a stranger" : "a user");
     assert_non_null(client);
-    const struct address *address = &served.daemon.listeners[over_tcp].address;
-    client->fd = socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_true(client->fd >= 0);
-    assert_int_equal(connect(client->fd, (const struct sockaddr *)&address->storage, address->storage_bytes), 0);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+    assert_int_equal(fcntl(pair[0], F_SETFL, O_NONBLOCK), 0);
+    const int fds[CHANNEL_FDS] = {pair[0], memfd_create("nothing was read", MFD_CLOEXEC)};
+    channel_say(served.front, CHANNEL_CLIENT, &handover, sizeof(handover), fds);
+    close(fds[0]);
+    close(fds[1]);
+    client->fd = pair[1];
     size_t place = 0;
     while (present[place])
         place++;
     return present[place] = client;
 }
 
-static inline struct client *come(bool over_tcp)
+static inline struct client *come(bool is_stranger)
 {
-    struct client *client = knock(over_tcp);
+    struct client *client = knock(is_stranger);
     greet_with(client, 0);
     return client;
 }
@@ -156,8 +171,8 @@ static inline int tear_down(void **state)
     kill(getpid(), SIGTERM); /* blocked in every thread: the daemon's loop takes it */
     pthread_join(served.thread, NULL);
     daemon_finish(&served.daemon);
+    close(served.front);
     stop();
-    assert_int_equal(rmdir(served.folder), 0); /* it has taken its socket away */
     return 0;
 }
 

@@ -168,10 +168,10 @@ TEST(what_is_dumped_reads_back_the_same)
 TEST(readers_are_names_and_numbers_of_users)
 {
     struct config config;
-    struct hub_options options;
+    struct front_options options;
     struct error error = {0};
     assert_true(read_text(&config, "[server]\nreaders = root 4294967 0\n", &error));
-    assert_true(config_hub(&config, &options, &error));
+    assert_true(config_front(&config, &options, &error));
     assert_int_equal(options.readers.count, 3);
     assert_true(readers_have(&options.readers, 0));
     assert_true(readers_have(&options.readers, 4294967));
@@ -182,12 +182,12 @@ TEST(readers_are_names_and_numbers_of_users)
         snprintf(text, sizeof(text), "[server]\nreaders = 0 %s\n", wrong[i]);
         error = (struct error){0};
         assert_true(read_text(&config, text, &error));
-        assert_false(config_hub(&config, &options, &error));
+        assert_false(config_front(&config, &options, &error));
         assert_string_equal(error.field, "server.readers");
         assert_non_null(strstr(error.text, wrong[i]));
     }
     config_defaults(&config);
-    assert_true(config_hub(&config, &options, &error));
+    assert_true(config_front(&config, &options, &error));
     assert_int_equal(options.readers.count, 0);
 }
 

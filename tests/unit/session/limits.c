@@ -210,33 +210,6 @@ TEST(one_user_leaves_places_for_others)
     go(other);
 }
 
-/* Those that say nothing give way to the next, whichever user they are: only a client of their own may have to
- * come again, and none of another. */
-TEST(silent_connections_keep_no_one_out)
-{
-    options.limits.unauthenticated = 8;
-    options.limits.unauthenticated_per_address = 64;
-    start_daemon();
-    struct client *client = come(false), *silent[32];
-    for (int i = 0; i < 32; i++)
-        silent[i] = knock(true);
-    expect_alive(client, 900);
-    struct client *late = knock(false);
-    expect_alive(client, 900); /* `late` is silent as well for now, and stays */
-    come(false);
-    greet_with(late, 0);
-    expect_alive(late, 900);
-    int told = 0;
-    for (int i = 0; i < 32; i++) {
-        if (has_come(silent[i], 0)) {
-            assert_non_null(strstr(receive_reply(silent[i]).text, "have not introduced themselves"));
-            told++;
-        }
-        go(silent[i]);
-    }
-    assert_true(told >= 32 - 4); /* half of the limit may stay */
-}
-
 /* Begins a transaction with one edit, for which room for 32 is taken. */
 static void begin_with_node(struct client *client, uint32_t request)
 {

@@ -300,7 +300,7 @@ static bool submit(void *context, struct engine_command *command, struct error *
 static void keep(struct store *store, const struct scene *scene)
 {
     static const atomic_bool not_abandoned;
-    const struct engine_keeper keeper = keeper_port(store);
+    const struct engine_keeper keeper = keeper_port(&store);
     struct store_record record = record_of(scene);
     hash_blobs(&record);
     store_record_finish(&record);

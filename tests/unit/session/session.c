@@ -325,8 +325,7 @@ TEST(a_sealed_client_without_a_hello_is_disconnected)
 {
     struct connection_limits limits = patient;
     limits.handshake_ms = 200;
-    start(&limits);
-    seal_with(&session_key);
+    start_sealed(&limits, &session_key);
     expect_closed();
 }
 
@@ -335,8 +334,7 @@ TEST(a_client_with_an_unfinished_record_is_disconnected)
     struct connection_limits limits = patient;
     limits.progress_grace_ms = 50;
     limits.progress_bytes_per_s = 1000000;
-    start(&limits);
-    seal_with(&session_key);
+    start_sealed(&limits, &session_key);
     greet();
     const uint8_t length_and_a_byte[5] = {200};
     send_plainly(length_and_a_byte, sizeof(length_and_a_byte));
@@ -345,8 +343,7 @@ TEST(a_client_with_an_unfinished_record_is_disconnected)
 
 TEST(a_changed_record_is_reported_and_closes_the_connection)
 {
-    start(&patient);
-    seal_with(&session_key);
+    start_sealed(&patient, &session_key);
     greet();
     uint8_t record[21] = {17};
     send_plainly(record, sizeof(record));
@@ -354,58 +351,4 @@ TEST(a_changed_record_is_reported_and_closes_the_connection)
     assert_string_equal(client.message.error.field, "record");
     expect(MESSAGE_GOODBYE, 0);
     expect_end();
-}
-
-/* The only session; the daemon's thread sleeps. */
-static const struct session *only_session(void)
-{
-    size_t cursor = 0;
-    void *session = NULL;
-    assert_true(hashmap_next(&served.hub.sessions, &cursor, NULL, &session));
-    return session;
-}
-
-TEST(a_key_names_its_holder_and_its_rights)
-{
-    static const struct sealed_key *const keys[] = {&session_key, &session_reader_key, NULL};
-    blob_principal principals[3];
-    for (size_t i = 0; i < 3; i++) {
-        start(&patient);
-        if (keys[i])
-            seal_with(keys[i]);
-        greet();
-        expect_alive(1);
-        const struct session *session = only_session();
-        principals[i] = session->principal;
-        assert_true(session->identity.known);
-        assert_int_equal(session->identity.has_key, keys[i] != NULL);
-        assert_int_equal(session->identity.read_only, keys[i] == &session_reader_key);
-        if (i < 2)
-            tear_down(NULL);
-    }
-    assert_int_not_equal(principals[0], principals[1]);
-    assert_int_equal(principals[2], getuid());
-    assert_true(principals[0] > UINT32_MAX && principals[1] > UINT32_MAX);
-}
-
-TEST(a_wrong_key_is_answered_after_a_while)
-{
-    static const struct sealed_key wrong = {.bytes = "nobody knows this one"};
-    struct connection_limits limits = patient;
-    limits.wrong_key_ms = 300;
-    start(&limits);
-    uint64_t before_ns = clock_now_ns();
-    struct decode_error error = {0};
-    enum sealed_result result;
-    client.link = sealed_link_client(&wrong);
-    while ((result = sealed_link_handshake(client.link, &error)) == SEALED_NEED_MORE) {
-        struct pollfd fd = {.fd = client.fd, .events = POLLIN};
-        send_sealed();
-        assert_int_equal(poll(&fd, 1, 20000), 1);
-        assert_true(receive_sealed());
-    }
-    assert_true(clock_now_ns() - before_ns >= UINT64_C(300000000));
-    assert_int_equal(result, SEALED_REFUSED);
-    assert_int_equal(sealed_status(client.link->sealed), SEALED_WRONG_KEY);
-    assert_false(receive_sealed());
 }

@@ -9,6 +9,7 @@
 #include "base/sys.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -75,13 +76,7 @@ static inline void *run(void *context)
     return NULL;
 }
 
-static const struct sealed_key session_key = {.bytes = "whoever knows this may come in!"},
-                               session_reader_key = {.bytes = "whoever knows this may look on!"};
-static struct auth_keys session_keys = {
-    .refs = 1, /* never the last one */
-    .keys = {{.bytes = "whoever knows this may come in!"}, {.bytes = "whoever knows this may look on!"}},
-    .read_only = {false, true},
-    .count = 2};
+static const struct sealed_key session_key = {.bytes = "whoever knows this may come in!"};
 
 /* The one client hears all of these. */
 #define send_bytes(...) send_bytes(&client, __VA_ARGS__)
@@ -95,7 +90,6 @@ static struct auth_keys session_keys = {
 #define expect_error(...) expect_error(&client, __VA_ARGS__)
 #define expect_end() expect_end(&client)
 #define expect_alive(...) expect_alive(&client, __VA_ARGS__)
-#define seal_with(...) seal_with(&client, __VA_ARGS__)
 #define greet_with(...) greet_with(&client, __VA_ARGS__)
 #define begin_edit(...) begin_edit(&client, __VA_ARGS__)
 #define send_node(...) send_node(&client, __VA_ARGS__)
@@ -108,7 +102,20 @@ static inline void greet(void)
     assert_int_equal(client.limits.requests_in_flight, 64);
 }
 
-static inline void start(const struct connection_limits *connection_limits)
+/* A client of this user, or one that has proved to a front that it has the key. */
+static inline void hand_over(int fd, const struct sealed_key *key)
+{
+    struct error error = {0};
+    struct handover handover = {
+        .identity = {.known = true, .has_key = true, .key = sealed_key_number(key), .name = "key, user 0"},
+        .peer = {.storage.ss_family = AF_UNIX, .storage_bytes = sizeof(sa_family_t)},
+        .is_owner = true};
+    seal_with(&client, key, &handover.saved);
+    assert_true(hub_add_client(&served.hub, fd, &handover, &error));
+    free(handover.saved.bytes);
+}
+
+static inline void start_sealed(const struct connection_limits *connection_limits, const struct sealed_key *key)
 {
     struct hub_options options = {
         .limits = {.clients = 4,
@@ -134,17 +141,28 @@ static inline void start(const struct connection_limits *connection_limits)
                    .frame_window_bytes = 64 << 20},
         .connection_limits = *connection_limits,
         .engine = engine_begin(),
-        .keys = &session_keys,
     };
     struct error error = {0};
     int pair[2];
+    if (key)
+        options.keys = (struct auth_key_numbers){.numbers = {sealed_key_number(key)}, .count = 1};
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
     daemon_init(&served);
     assert_true(daemon_start(&served, &options, &error));
-    assert_true(daemon_serve_fd(&served, pair[0], &error));
     memset(&client, 0, sizeof(client));
     client.fd = pair[1];
+    if (key) {
+        assert_int_equal(fcntl(pair[0], F_SETFL, O_NONBLOCK), 0);
+        hand_over(pair[0], key);
+    } else {
+        assert_true(daemon_serve_fd(&served, pair[0], &error));
+    }
     assert_int_equal(pthread_create(&thread, NULL, run, NULL), 0);
+}
+
+static inline void start(const struct connection_limits *connection_limits)
+{
+    start_sealed(connection_limits, NULL);
 }
 
 static const struct connection_limits patient = {
@@ -165,9 +183,7 @@ static inline int set_up_with(bool sealed, bool calls_cut_short)
         sys.sendmsg = short_sendmsg;
         sys.epoll_wait = interrupted_wait;
     }
-    start(&patient);
-    if (sealed)
-        seal_with(&session_key);
+    start_sealed(&patient, sealed ? &session_key : NULL);
     greet();
     return 0;
 }

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/* The processes that serve: one for each user, key or network of clients that nobody knows. */
+#ifndef FARLIGHT_FRONT_WORKERS_H
+#define FARLIGHT_FRONT_WORKERS_H
+
+#include "front/front.h"
+#include "net/channel.h"
+
+#include <sys/types.h>
+
+struct worker {
+    struct front *front;
+    struct worker *next;
+    uint32_t number;
+    bool has_owner;
+    uint64_t owner; /* auth_owner_number() */
+    char name[48];  /* of the owner, for people */
+    pid_t pid;
+    int pid_fd;
+    struct loop_watch *pid_watch;
+    struct channel channel;
+    bool is_ready, is_stopping;
+    bool was_ready;        /* its device could be used */
+    bool has_daemon_owner; /* it serves the client with which the daemon ends */
+    uint32_t handed;
+    uint32_t pings_due;   /* that it has not answered */
+    uint32_t configs_due; /* that it has not taken yet, of those after its first */
+    struct channel_counts counts;
+    struct error failure; /* why it ends, in its own words */
+};
+
+/* Starts a process that belongs to nobody yet. NULL and *error: it cannot be started. */
+struct worker *workers_start(struct front *front, struct error *error);
+/* Whose it is, before the first client. */
+void workers_assign(struct worker *worker, uint64_t owner, const char *name);
+/* The owner's, started if there is none. */
+struct worker *workers_of(struct front *front, uint64_t owner, const char *name, struct error *error);
+uint32_t workers_clients(const struct front *front);
+void workers_stop(struct front *front); /* asks them to end */
+void workers_kill(struct front *front);
+/* Asks each that is ready for a sign, and kills those that have given none several times. */
+void workers_ping(struct front *front);
+void workers_send_setup(struct front *front);
+bool workers_have_setup(const struct front *front); /* what was sent is in force */
+void workers_finish(struct front *front);           /* kills those that are left */
+
+#endif

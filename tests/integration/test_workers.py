@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""A user is a process: who comes is served by the worker of his user or address, which breaks, hangs and ends alone."""
+import contextlib
+import json
+import os
+import signal
+import struct
+import subprocess
+import time
+
+import tiny_client
+from farlight_test import BIN, Case, Daemon, bundled_scenes, farlight, long_test
+from test_serve import SCENE_ATTACH, is_gone, wait_until
+
+LOOK = (0, 1, 5), (0, 0, 0), (0, 1, 0), 0.8
+TERM_S = 5  # of SIGTERM, which takes 0.8 s and the time that a busy machine takes
+
+
+class Workers(Case):
+    @contextlib.contextmanager
+    def daemon(self, **options):
+        """One that listens for a user, and for whom nobody knows; its TCP address."""
+        with Daemon("--listen", "tcp:127.0.0.1:0", **options) as daemon:
+            daemon.tcp = ("127.0.0.1", int(daemon.process.stdout.readline().rpartition(":")[2]))
+            yield daemon
+
+    def client(self, where, name="", sharing=tiny_client.PRIVATE):
+        """With a scene of its own."""
+        client = tiny_client.Client(where)
+        self.addCleanup(client.socket.close)
+        blobs, edits = tiny_client.triangle()
+        client.open_scene(1, name, sharing)
+        client.upload(blobs)
+        client.commit(1, edits)
+        return client
+
+    @staticmethod
+    def attach(client, name, scene=1):
+        return client.ask(SCENE_ATTACH, tiny_client.payload(struct.pack("<I", scene), tiny_client.string(name)))
+
+    def renders(self, client, channel=2):
+        count = len(client.frames)
+        client.wait(client.render(1, channel, (32, 24), LOOK))
+        self.assertEqual(len(client.frames), count + 1)
+        return client.frames[-1].digest
+
+    def test_each_has_a_process_and_figures_are_of_all(self):
+        with self.daemon() as daemon:
+            one, other = self.client(daemon.path), self.client(daemon.tcp)
+            self.assertEqual(self.renders(one), self.renders(other))
+            self.assertEqual(len(daemon.workers()), 2)
+            self.client(daemon.path)
+            self.assertEqual(len(daemon.workers()), 2)
+            stats = json.loads(self.expect(farlight("stats", "--json", "--server", daemon.address), 0).stdout)
+            self.assertEqual(len(stats["clients"]), 4)
+            self.assertEqual(len(stats["scenes"]), 3)
+            self.assertEqual(stats["frames"], 2)
+            self.assertEqual(len({client["client"] for client in stats["clients"]}), 4)
+
+    def test_one_that_is_killed_ends_alone_and_its_clients_go_on_with_another(self):
+        frames = ["--frames", "1-12", "--samples", "2", "--size", "96x72", "--digests"]
+        model = bundled_scenes() / "carousel.glb"
+        self.expect(farlight("animate", model, *frames, "-o", self.folder / "whole-%d.png"), 0)
+        with self.daemon() as daemon:
+            other = self.client(daemon.tcp)
+            before = self.renders(other)
+            of_other = set(daemon.workers())
+            child = subprocess.Popen([BIN / "farlight", "animate", model, *frames, "-o", self.folder / "%d.png", "--server", daemon.address],
+                                     stderr=subprocess.PIPE, text=True)
+            wait_until((self.folder / "2.png").exists, "no frame comes")
+            killed, = set(daemon.workers()) - of_other
+            os.kill(killed, signal.SIGKILL)
+            self.assertEqual(child.wait(300), 0, child.stderr.read())
+            child.stderr.close()
+            self.assertEqual(self.renders(other, 3), before)
+        for number in range(1, 13):
+            self.assertEqual((self.folder / f"{number}.png").read_bytes(), (self.folder / f"whole-{number}.png").read_bytes())
+
+    def test_a_scene_of_another_user_is_attached_to_by_the_first_request(self):
+        with self.daemon() as daemon:
+            owner = self.client(daemon.tcp, "shown", tiny_client.SHARED)
+            guest = tiny_client.Client(daemon.path)
+            self.addCleanup(guest.socket.close)
+            guest.revision(self.attach(guest, "shown"))
+            self.assertEqual(self.renders(guest), self.renders(owner))
+            for name in ("shown", "nothing"):
+                busy = self.client(daemon.path)
+                with self.assertRaises(tiny_client.Failed) as failure:
+                    busy.revision(self.attach(busy, name, 2))
+                self.assertEqual("no other request" in str(failure.exception), name == "shown", failure.exception)
+                self.assertEqual("is shared, or kept" in str(failure.exception), name == "nothing", failure.exception)
+                self.renders(busy)
+            self.assertIn("shown", self.expect(farlight("scenes", "--server", daemon.address), 0).stdout)
+
+    def test_what_does_not_answer_holds_up_neither_figures_nor_the_end(self):
+        with self.daemon() as daemon:
+            self.client(daemon.path)
+            before = set(daemon.workers())
+            self.client(daemon.tcp)
+            stopped, = set(daemon.workers()) - before
+            os.kill(stopped, signal.SIGSTOP)
+            begin = time.monotonic()
+            self.expect(farlight("stats", "--server", daemon.address), 0)
+            self.assertLess(time.monotonic() - begin, TERM_S)
+            begin = time.monotonic()
+            self.assertEqual(daemon.stop(), 0)
+            self.assertLess(time.monotonic() - begin, TERM_S)
+            self.assertTrue(is_gone(stopped))
+
+    @long_test
+    def test_one_that_does_not_answer_for_long_is_replaced(self):
+        with self.daemon() as daemon:
+            self.client(daemon.path)
+            stopped, = daemon.workers()
+            os.kill(stopped, signal.SIGSTOP)
+            wait_until(lambda: is_gone(stopped), "it is there still")
+            self.renders(self.client(daemon.path))
+            self.assertIn("it does not answer", daemon.messages())
+
+    def test_workers_end_with_the_front_however_that_ends(self):
+        with self.daemon() as daemon:
+            self.client(daemon.path)
+            self.client(daemon.tcp)
+            workers = daemon.workers()
+            self.assertEqual(len(workers), 2)
+            daemon.process.kill()
+            for worker in workers:
+                wait_until(lambda worker=worker: is_gone(worker), "it is there still")
