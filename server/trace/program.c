@@ -9,6 +9,7 @@
 #include <stdio.h>
 
 #define OWN_DEFINES_MAX 12
+#define SURFACE_DEFINES_MAX (TRACE_SURFACE_DEFINES + 1)
 
 /* Rays at the time 0 see the first pose, as does a program without motion. */
 bool trace_has_motion(const struct gpu_scene *scene, const struct wave *wave)
@@ -23,20 +24,16 @@ void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave)
         gpu_buffer_bind_texels(scene->device, wave->times, UNIT_RAY_TIMES, GL_R32F);
 }
 
-void trace_bind_counts(const struct gpu_program *program, const struct wave *wave)
-{
-    if (wave->counts)
-        gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
-    gpu_uniform_uint(program, "counts_place", wave->counts ? wave->counts_index + 1 : 0);
-}
-
 /* Rays first .. end - 1, some to an invocation. */
 static void dispatch_rays(const struct gpu_program *program, const struct gpu_scene *scene,
                           const struct wave *wave, uint32_t first, uint32_t end, uint32_t rays_an_invocation)
 {
     gpu_uniform_uint(program, "first_ray", first);
     gpu_uniform_uint(program, "ray_count", end);
-    trace_bind_counts(program, wave);
+    if (wave->counts) {
+        gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
+        gpu_uniform_uint(program, "counts_index", wave->counts_index);
+    }
     if (wave->counts && first == 0 && end == wave->ray_count)
         gpu_dispatch_indirect(program, wave->counts,
                               wave->counts_index * sizeof(struct wave_counts) +
@@ -59,6 +56,8 @@ size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
     if (trace_has_motion(scene, wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    if (wave->counts)
+        defines[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
     /* For closest hits a translucent surface is like any other: no second program for it. */
     if (scene->has_translucent && wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
@@ -121,6 +120,19 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
 
 /* ---- surfaces ---- */
 
+const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scene, const struct wave *wave,
+                                                    const char *compute, const struct gpu_define *defines,
+                                                    struct error *error)
+{
+    struct gpu_define all[SURFACE_DEFINES_MAX + 2] = {0};
+    size_t n = 0;
+    for (; n < SURFACE_DEFINES_MAX && defines && defines[n].name; n++)
+        all[n] = defines[n];
+    if (wave->counts)
+        all[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
+    return gpu_program_get(scene->device, &(struct gpu_program_source){.compute = compute, .defines = all}, error);
+}
+
 void trace_surface_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
                                const struct ray_range *rays)
 {
@@ -151,8 +163,8 @@ bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays,
     size_t n = trace_surface_defines(scene, defines);
     if (trace_has_motion(scene, rays->wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
-    const struct gpu_program *program = gpu_program_get(
-        scene->device, &(struct gpu_program_source){.compute = "trace/surface.comp", .defines = defines}, error);
+    const struct gpu_program *program =
+        trace_surface_program_get(scene, rays->wave, "trace/surface.comp", defines, error);
     if (program)
         trace_surface_program_run(program, scene, rays);
     return program != NULL;

@@ -32,12 +32,10 @@ struct trace_program_source {
 bool trace_has_motion(const struct gpu_scene *scene, const struct wave *wave);
 /* Defines of a program that reads the rays of the wave and the primitives of the scene: at most TRACE_WAVE_DEFINES
  * to `defines`, as shaders/trace/wave.comp lists them. Returns how many. */
-#define TRACE_WAVE_DEFINES 9
+#define TRACE_WAVE_DEFINES 10
 size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave, struct gpu_define *defines);
 /* Binds the rays as texels, and their times if the program is compiled with HAS_MOTION. */
 void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave);
-/* Binds the wave's counts and sets `counts_place`, for common/range.glsl. */
-void trace_bind_counts(const struct gpu_program *program, const struct wave *wave);
 
 /* Compiled for what the scene has (spheres, cutouts, translucent surfaces, motion where the wave has times) and
  * for the kind of wave, or from the device's cache. The tracer may set uniforms of its own on it before
@@ -54,8 +52,12 @@ uint32_t trace_rays_a_dispatch(const struct gpu_device *device, uint64_t rounds_
 void trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
                        const struct ray_range *rays, const struct trace_program_source *source);
 
-/* Runs a surface program ("<tracer>/surface.comp"), whose own buffers and uniforms are set already: binds rays and
- * hits, and dispatches. Intersections become hits, in place. */
+/* A surface program in two steps: the tracer may bind its buffers and set its uniforms between them. `compute` is
+ * "<tracer>/surface.comp"; `defines` ends with {0}, NULL: none; at most TRACE_SURFACE_DEFINES and another. */
+const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scene, const struct wave *wave,
+                                                    const char *compute, const struct gpu_define *defines,
+                                                    struct error *error);
+/* Binds rays and hits, sets `first_ray` and `ray_count`, and dispatches: intersections become hits, in place. */
 void trace_surface_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
                                const struct ray_range *rays);
 /* What a program that includes common/surface.glsl may leave out of it: at most TRACE_SURFACE_DEFINES to

@@ -2,7 +2,7 @@
 // From the intersections of a closest-hit wave to hits: the second half of A-buffer tracing, in place of
 // trace/surface.comp. A hit is the sample's own primitive at its point nearest to the intersection.
 //
-// Defines: HAS_SPHERES, HAS_DISCS as the scene has them.
+// Defines: HAS_SPHERES, HAS_DISCS as the scene has them; those of common/range.glsl.
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/surface.glsl"

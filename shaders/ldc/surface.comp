@@ -4,7 +4,7 @@
 // those at the sample's place are off where facets bend within a cell, most on spheres of few cells. Normals of maps are
 // kept as they were sampled. Discs, which no cube holds, become hits as for every tracer.
 //
-// Defines: HAS_SPHERES, HAS_DISCS as the scene has them; those of common/surface.glsl.
+// Defines: HAS_SPHERES, HAS_DISCS as the scene has them; those of common/range.glsl and common/surface.glsl.
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/intersection.glsl"

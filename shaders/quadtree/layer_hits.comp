@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Rays that begin at the eye of a view: what one of its layers shows where they pass, as intersections.
 //
-// Defines: HAS_SPHERES as the scene has them.
+// Defines: HAS_SPHERES as the scene has them; those of common/range.glsl.
 #include "shared/hit.h"
 #include "shared/path.h"
 #include "common/dispatch.glsl"

@@ -2,7 +2,7 @@
 // From the intersections of a closest-hit wave to hits: the second half of every exact tracer. It is apart from the
 // traversal, whose program stays small, and which need not carry barycentrics.
 //
-// Defines: HAS_SPHERES, HAS_MOTION as the scene has them; those of common/surface.glsl.
+// Defines: HAS_SPHERES, HAS_MOTION as the scene has them; those of common/range.glsl and common/surface.glsl.
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/intersection.glsl"

@@ -12,7 +12,8 @@
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
 //   HAS_TRANSMISSION     and tints them on the way
 //   EVEN_ALPHA           none of these has a texture or vertex colours
-//   PACKET_RAYS          how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
+//   HAS_COUNTS           only the device knows how many rays there are
+//   PACKET_RAYS        how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
 //
 // A traverse.glsl defines one of these, for ANY_HIT or not, and for PACKET_RAYS 1 or more:
 //   void trace_closest(trace_ray r, inout candidate best);

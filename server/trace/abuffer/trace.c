@@ -20,8 +20,8 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
     if (scene->disc_count > 0)
         defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
-    const struct gpu_program *program = gpu_program_get(
-        scene->device, &(struct gpu_program_source){.compute = "abuffer/surface.comp", .defines = defines}, error);
+    const struct gpu_program *program =
+        trace_surface_program_get(scene, rays->wave, "abuffer/surface.comp", defines, error);
     if (!program)
         return false;
     gpu_uniform_int(program, "abuffer_drawn_count", (int32_t)store->drawn_count);

@@ -14,8 +14,8 @@ bool ldc_surfaces(struct ldc_store *store, const struct gpu_scene *scene, const 
     size_t n = trace_surface_defines(scene, defines);
     if (scene->disc_count > 0)
         defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
-    const struct gpu_program *program = gpu_program_get(
-        scene->device, &(struct gpu_program_source){.compute = "ldc/surface.comp", .defines = defines}, error);
+    const struct gpu_program *program =
+        trace_surface_program_get(scene, rays->wave, "ldc/surface.comp", defines, error);
     if (!program)
         return false;
     gpu_buffer_bind_texels(scene->device, &store->surface, UNIT_TRACER_0, GL_RGBA32UI);

@@ -147,9 +147,8 @@ bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, 
                          uint32_t layer, struct error *error)
 {
     const struct gpu_define defines[] = {{scene->has_spheres ? "HAS_SPHERES" : NULL, "1"}, {NULL, NULL}};
-    const struct gpu_program *program = gpu_program_get(
-        scene->device, &(struct gpu_program_source){.compute = "quadtree/layer_hits.comp", .defines = defines},
-        error);
+    const struct gpu_program *program =
+        trace_surface_program_get(scene, rays->wave, "quadtree/layer_hits.comp", defines, error);
     if (!program)
         return false;
     quadtree_store_bind(store);

@@ -78,10 +78,12 @@ const struct gpu_program *rayspace_program_get(const struct gpu_scene *scene, co
                                                const char *compute, const struct gpu_define *own,
                                                struct error *error)
 {
-    struct gpu_define defines[RAYSPACE_DEFINES + 2] = {0};
+    struct gpu_define defines[RAYSPACE_DEFINES + 3] = {0};
     size_t n = 0;
     if (state->base.wave.kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
+    if (state->base.wave.counts)
+        defines[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
     for (size_t i = 0; i < RAYSPACE_DEFINES && own && own[i].name; i++)
         defines[n++] = own[i];
     return gpu_program_get(scene->device, &(struct gpu_program_source){.compute = compute, .defines = defines},
@@ -96,7 +98,9 @@ void rayspace_bind_wave(const struct gpu_scene *scene, struct rayspace_state *st
     gpu_buffer_bind_texels(scene->device, &state->order, UNIT_RAYSPACE_ORDER, GL_R32UI);
     gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
     gpu_buffer_bind_storage(&state->answers, BIND_RAYSPACE_ANSWERS);
-    trace_bind_counts(program, wave);
+    if (wave->counts)
+        gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
+    gpu_uniform_uint(program, "counts_index", wave->counts_index);
     gpu_uniform_uint(program, "ray_count", wave->ray_count);
 }
 
