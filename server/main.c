@@ -32,9 +32,9 @@
 
 /* A worker without a client ends so long after the last scene that may have lingered. */
 #define WORKER_UNUSED_S 60u
-/* Beyond it, scenes of others come back when they do. */
+/* Workers that restore scenes at the start, at most: scenes of further owners come back when these do. */
 #define OWNERS_MAX 64
-/* Clients have numbers of their own in each worker. */
+/* Each worker numbers its clients from another multiple of this on. */
 #define WORKER_CLIENTS UINT64_C(1000000)
 
 /* glibc looks for it by name, which -fvisibility=hidden would hide. */
@@ -209,7 +209,7 @@ static int check(const struct config *config, bool json)
 
 /* ---- a process that serves --------------------------------------------------------------------------- */
 
-/* What the front tells a worker, first of all and when the configuration was read again. */
+/* The front tells a worker this first of all, and when the configuration was read again. */
 struct worker_setup {
     struct config config;         /* without files of keys, which are the front's alone */
     struct auth_key_numbers keys; /* that clients may have come with */
@@ -232,6 +232,12 @@ static void fill_hub(const struct worker_setup *setup, struct hub_options *optio
     options->keys = setup->keys;
 }
 
+/* Nothing lingers any more by then. */
+static uint32_t unused_s(const struct config *config)
+{
+    return config->scene_linger_s + WORKER_UNUSED_S;
+}
+
 static void configured(void *context, const void *bytes, size_t count)
 {
     struct serving *serving = context;
@@ -241,12 +247,13 @@ static void configured(void *context, const void *bytes, size_t count)
         return;
     memcpy(&serving->setup, bytes, count);
     fill_hub(&serving->setup, &options);
+    serving->daemon.unused_s = unused_s(&serving->setup.config);
     if (!hub_reload(&serving->daemon.hub, &options, &error))
         log_write(LOG_ERROR, "config", "the configuration stays as it was: %s", error.text);
     log_set_level((enum log_level)serving->setup.config.log_level);
 }
 
-/* What was kept for the owner is there before its first client. */
+/* Restores scenes that were kept for the owner, before its first client comes. */
 static void owned(void *context, uint64_t owner)
 {
     struct serving *serving = context;
@@ -278,8 +285,7 @@ static bool serve_with_engine(struct serving *serving, struct engine *engine, in
     daemon->owned = owned;
     daemon->front_context = serving;
     daemon->watchdog_ns = serving->setup.watchdog_ns;
-    /* Nothing lingers any more by then. */
-    daemon->unused_s = serving->setup.config.scene_linger_s + WORKER_UNUSED_S;
+    daemon->unused_s = unused_s(&serving->setup.config);
     bool ok = daemon_start(daemon, &options, error) &&
               (is_worker ? daemon_serve_front(daemon, fd, error) : daemon_serve_fd(daemon, fd, error));
     ok = ok && daemon_run(daemon, &serving->device_gone, error);
@@ -381,17 +387,14 @@ struct source {
     struct store_folder *folder; /* NULL: scenes end with the daemon */
 };
 
-/* False: something in the configuration cannot be understood. The caller has a reference to options->keys. */
+/* False: something in the configuration cannot be understood. The caller has a reference to options->keys in any
+ * case. */
 static bool fill_front(struct source *source, const struct config *config, struct front_options *options,
                        struct error *error)
 {
     struct engine_options engine;
-    if (!config_front(config, options, error))
+    if (!config_front(config, options, error) || !config_engine(config, &engine, error))
         return false;
-    if (!config_engine(config, &engine, error)) {
-        auth_keys_unref(options->keys);
-        return false;
-    }
     source->setup->config = *config;
     source->setup->config.key_file[0] = source->setup->config.reader_key_file[0] = '\0';
     source->setup->keys = auth_keys_numbers(options->keys);
@@ -436,14 +439,13 @@ static bool run_front(struct source *source, struct front *front, struct error *
     uint64_t owners[OWNERS_MAX];
     source->setup->started_ns = clock_now_ns();
     source->setup->watchdog_ns = notify_watchdog_ns();
-    if (!fill_front(source, source->config, &options, error))
-        return false;
+    const bool filled = fill_front(source, source->config, &options, error);
     options.owner_fd = source->arguments->fd;
     options.owners = owners;
     options.owner_count = source->folder ? store_owners(source->folder, owners, OWNERS_MAX) : 0;
     front->reload = reload;
     front->reload_context = source;
-    bool ok = begin_to_listen(front, source->config, source->config->insecure || options.keys, error) &&
+    bool ok = filled && begin_to_listen(front, source->config, source->config->insecure || options.keys, error) &&
               front_run(front, &options, stdout, error);
     front_finish(front);
     auth_keys_unref(options.keys);
@@ -469,9 +471,7 @@ static int be_front(const struct arguments *arguments, struct config *config)
 int main(int argc, char **argv)
 {
     static const struct argp argp = {option_table, parse_option, NULL, "The farlight rendering daemon.", 0, 0, 0};
-    struct arguments arguments = {
-        .fd = -1,
-    };
+    struct arguments arguments = {.fd = -1};
     struct config config;
     struct error error = {0};
     argp_err_exit_status = 2;

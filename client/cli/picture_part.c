@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/picture_part.h"
+#include "lib/frame_part.h"
 #include "lib/imported.h"
 #include "protocol/codec.h"
 #include "protocol/version.h"
@@ -70,9 +71,7 @@ bool cli_picture_part_complete(struct cli_job *job)
                   wanted->height);
         return fl_error_remedy(&job->error, "divide it into at most %u", most);
     }
-    /* What auto chooses differs from device to device, and a rasteriser would draw the whole picture for each
-     * square.
-     */
+    /* Auto chooses by the device, and a rasteriser would draw the whole picture for each square. */
     if (wanted->primary == PROTOCOL_PRIMARY_AUTO)
         wanted->primary = PROTOCOL_PRIMARY_TRACE;
     return true;
@@ -108,7 +107,7 @@ static bool add_job(XXH3_state_t *state, const struct cli_job *job, struct fl_er
     return true;
 }
 
-/* What the file is made of beside the pixels. */
+/* Choices for the file that change its pixels, and the names of its layers. */
 static void add_file(XXH3_state_t *state, const struct cli_job *job)
 {
     add_text(state, FARLIGHT_VERSION);
@@ -202,21 +201,14 @@ static struct fl_frame *begin_frame(const struct squares *squares, struct fl_fra
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
-    *frame = *square;
-    square->structure = NULL; /* which the picture has now */
+    fl_frame_alike(frame, square, squares->width, squares->height);
+    frame->structure = square->structure; /* which the picture has from now on */
+    frame->structure_count = square->structure_count;
+    square->structure = NULL;
     square->structure_count = 0;
-    frame->width = squares->width;
-    frame->height = squares->height;
     frame->pixels = pixels;
     frame->pixels_bytes = bytes;
     frame->primary_rays = frame->shadow_rays = frame->secondary_rays = 0;
-    frame->stages = NULL;
-    frame->stage_count = 0;
-    frame->wave_comparisons = NULL;
-    frame->wave_comparison_count = 0;
-    frame->encoded = NULL;
-    frame->depth = NULL;
-    frame->normals = frame->sticking = NULL;
     return frame;
 }
 

@@ -8,7 +8,7 @@
 #include "cli/cli.h"
 #include "protocol/common/squares.h"
 
-/* All zero at first. */
+/* A part while its squares come; zeroed before the first use. */
 struct cli_picture_part {
     struct squares squares;
     uint32_t first, next, end; /* its squares, and the one that is to be rendered */
@@ -18,7 +18,7 @@ struct cli_picture_part {
 
 /* After the command line: whether the job's options go with parts. True, if none is asked for. */
 bool cli_picture_part_complete(struct cli_job *job);
-/* Of a scene that is settled. Squares that have come before stay, if device and scene are still the same. */
+/* The scene is settled. Squares that have come before stay, if device and scene are still the same. */
 bool cli_picture_part_begin(struct cli_picture_part *part, struct cli_job *job, struct fl_connection *connection,
                             const struct fl_scene *scene, struct fl_error *error);
 /* Whether the file is this part of this picture, by this device. */

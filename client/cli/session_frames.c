@@ -218,7 +218,7 @@ static bool render_part(struct session *session, struct fl_error *error)
     return write_frame(session, part->frame, error);
 }
 
-/* What is left of one run, as one job. */
+/* Renders the rest of one run, as one job. */
 static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct message_render options = session->job->options;

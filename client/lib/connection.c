@@ -149,7 +149,7 @@ bool fl_connection_heed_silence(struct fl_connection *connection, struct fl_erro
     if (connection->lost_after_ns == 0 || (!heard && monotonic_now_ns() < connection->look_ns))
         return true;
     connection->stream.heard = false;
-    /* Time in which nobody listened, as while this process was stopped, is no silence of the daemon's. */
+    /* The daemon was not silent while nobody listened, as when this process was stopped. */
     connection->silent_ns = heard ? 0 : connection->silent_ns + silence_ns(connection);
     connection->look_ns = monotonic_now_ns() + silence_ns(connection);
     if (heard)

@@ -21,6 +21,26 @@ static void copy_rows(uint8_t *to, const struct fl_frame *frame, const struct fl
     }
 }
 
+void fl_frame_alike(struct fl_frame *to, const struct fl_frame *frame, uint32_t width, uint32_t height)
+{
+    *to = *frame;
+    to->width = width;
+    to->height = height;
+    to->pixels = NULL;
+    to->pixels_bytes = 0;
+    to->stages = NULL;
+    to->stage_count = 0;
+    to->wave_comparisons = NULL;
+    to->wave_comparison_count = 0;
+    to->structure = NULL;
+    to->structure_count = 0;
+    to->encoded = NULL;
+    to->encoded_bytes = 0;
+    to->depth = NULL;
+    to->normals = NULL;
+    to->sticking = NULL;
+}
+
 struct fl_frame *fl_frame_cut(const struct fl_frame *frame, const struct fl_frame_part *part,
                               struct fl_error *error)
 {
@@ -42,24 +62,10 @@ struct fl_frame *fl_frame_cut(const struct fl_frame *frame, const struct fl_fram
         return NULL;
     }
     copy_rows(pixels, frame, part, pixel_bytes);
-    *cut = *frame;
-    cut->width = part->width;
-    cut->height = part->height;
+    fl_frame_alike(cut, frame, part->width, part->height);
     cut->pixels = pixels;
     cut->pixels_bytes = bytes;
     cut->digest = XXH3_64bits(pixels, bytes);
-    /* What belongs to the whole frame stays with it. */
-    cut->stages = NULL;
-    cut->stage_count = 0;
-    cut->wave_comparisons = NULL;
-    cut->wave_comparison_count = 0;
-    cut->structure = NULL;
-    cut->structure_count = 0;
-    cut->encoded = NULL;
-    cut->encoded_bytes = 0;
-    cut->depth = NULL;
-    cut->normals = NULL;
-    cut->sticking = NULL;
     for (int row = 0; row < 3; row++) {
         float *to = cut->world_from_view + (size_t)(4 * row);
         to[3] += to[0] * part->eye[0] + to[1] * part->eye[1];

@@ -11,6 +11,9 @@ struct fl_frame_part {
     float eye[2];
 };
 
+/* What describes a frame, for one of another size: without pixels, times, comparisons, structure and attachments,
+ * which are `frame`'s. */
+void fl_frame_alike(struct fl_frame *to, const struct fl_frame *frame, uint32_t width, uint32_t height);
 /* A copy of a part of all layers of a decoded frame, without times, comparisons, structure and attachments. NULL:
  * there is no such part, or no memory. */
 struct fl_frame *fl_frame_cut(const struct fl_frame *frame, const struct fl_frame_part *part,

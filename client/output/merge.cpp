@@ -31,7 +31,7 @@ constexpr int channels_max = 256;   // more than there are of all layers
 constexpr uint32_t band_rows = 64u; // a multiple of the rows that are compressed together
 constexpr char part_name[] = "farlight/part";
 constexpr uint64_t rays_max = UINT64_MAX / SQUARES_PARTS_MAX; // so that their sum is one
-// What a part has of its own; of the whole there are as many as of all parts.
+// Counts that each part has of its own rays; the whole has their sum.
 constexpr const char *counts[] = {"farlight/primary_rays", "farlight/shadow_rays", "farlight/secondary_rays"};
 
 struct part {

@@ -8,8 +8,6 @@
 #include "net/greeting.h"
 #include "net/handover.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -172,6 +170,7 @@ static void hand_over(struct caller *caller)
     }
     worker->handed++;
     worker->has_daemon_owner = worker->has_daemon_owner || caller->is_owner;
+    caller->is_owner = false;             /* the worker sees its end */
     connection_close(caller->connection); /* the socket is the worker's */
 }
 
@@ -214,6 +213,8 @@ static void on_closed(void *context)
     *place = caller->next;
     uncount(caller);
     auth_keys_unref(caller->keys);
+    if (caller->is_owner)
+        front_stop(caller->front);
     free(caller);
 }
 
@@ -267,18 +268,12 @@ static void insert(struct front *front, struct caller *caller)
 
 bool callers_add_owner(struct front *front, int fd, struct error *error)
 {
-    struct address peer = {.storage_bytes = sizeof(peer.storage)};
+    struct address peer;
     struct auth_identity identity;
-    char field[32];
-    snprintf(field, sizeof(field), "--fd %d", fd);
-    if (getpeername(fd, (struct sockaddr *)&peer.storage, &peer.storage_bytes) < 0)
-        return error_set(error, ERROR_INVALID, field, "not a connected socket: %s", strerror(errno));
-    const int flags = fcntl(fd, F_GETFL);
-    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
-        return error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
-    struct caller *caller = auth_identify(&identity, fd, &peer, true, error)
-                                ? create(front, fd, &identity, &peer, false, error)
-                                : NULL;
+    struct caller *caller =
+        listen_take_connected(fd, &peer, error) && auth_identify(&identity, fd, &peer, true, error)
+            ? create(front, fd, &identity, &peer, false, error)
+            : NULL;
     if (!caller)
         return false;
     caller->is_owner = true;

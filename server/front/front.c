@@ -148,18 +148,22 @@ static void on_listeners(void *context, uint32_t epoll_events)
 
 /* ---- the end ----------------------------------------------------------------------------------------- */
 
+static void close_listeners(struct front *front)
+{
+    for (size_t i = 0; i < front->listener_count; i++) {
+        loop_watch_remove(front->listener_watches[i]);
+        listener_close(&front->listeners[i]);
+    }
+    front->listener_count = 0;
+}
+
 void front_stop(struct front *front)
 {
     if (front->stopping)
         return;
     front->stopping = true;
     notify_manager("STOPPING=1");
-    for (size_t i = 0; i < front->listener_count; i++) {
-        loop_watch_remove(front->listener_watches[i]);
-        front->listener_watches[i] = NULL;
-        listener_close(&front->listeners[i]);
-    }
-    front->listener_count = 0;
+    close_listeners(front);
     loop_timer_start(front->loop, &front->stop_timer, STOP_NS);
     workers_stop(front);
     if (!front->workers)
@@ -345,10 +349,10 @@ static bool start(struct front *front, const struct front_options *options, stru
     front->stop_timer = (struct loop_timer){.call = on_stop_timer, .context = front};
     front->unused_timer = (struct loop_timer){.call = on_unused_timer, .context = front};
     front->watchdog_timer = (struct loop_timer){.call = on_watchdog_timer, .context = front};
-    if (!set_options(front, options))
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     front->ping_timer = (struct loop_timer){.call = on_ping_timer, .context = front};
     front->extend_timer = (struct loop_timer){.call = on_extend_timer, .context = front};
+    if (!set_options(front, options))
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     return watch_signals(front, error) && watch_all_listeners(front, error) && start_workers(front, error) &&
            (options->owner_fd < 0 || callers_add_owner(front, options->owner_fd, error));
 }
@@ -366,7 +370,7 @@ static void print_ready(const struct front *front, FILE *stream)
 
 bool front_run(struct front *front, const struct front_options *options, FILE *stream, struct error *error)
 {
-    /* The first turn of the loop ends when the first worker is ready, or has failed. */
+    /* The loop is run first until the first workers are ready, or have failed. */
     if (!start(front, options, error) || !loop_run(front->loop, error))
         return false;
     if (!front->ready && !front->stopping) {
@@ -387,10 +391,7 @@ bool front_run(struct front *front, const struct front_options *options, FILE *s
 
 void front_finish(struct front *front)
 {
-    for (size_t i = 0; i < front->listener_count; i++) {
-        loop_watch_remove(front->listener_watches[i]);
-        listener_close(&front->listeners[i]);
-    }
+    close_listeners(front);
     if (front->loop) {
         callers_close(front);
         workers_finish(front);

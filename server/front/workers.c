@@ -315,7 +315,7 @@ static void on_closed(void *context)
 
 /* ---- for the front ---- */
 
-/* False: nothing of it is left but the process, which ends as its channel has. */
+/* False: nothing of it is left. */
 static bool watch(struct worker *worker, int fd, struct error *error)
 {
     struct loop *loop = worker->front->loop;
@@ -331,6 +331,8 @@ static bool watch(struct worker *worker, int fd, struct error *error)
     if (worker->pid_watch)
         return true;
     error_set(error, ERROR_INTERNAL, NULL, "cannot watch a worker: %s", strerror(errno));
+    if (worker->pid_fd >= 0)
+        close(worker->pid_fd);
     channel_close(&worker->channel);
     return false;
 }
@@ -347,9 +349,14 @@ struct worker *workers_start(struct front *front, struct error *error)
     *worker = (struct worker){.front = front, .number = ++front->workers_started, .name = "of nobody yet"};
     bool ok = spawn(worker, fds[1], error);
     close(fds[1]);
-    if (!ok)
+    if (!ok) {
         close(fds[0]);
-    if (!ok || !watch(worker, fds[0], error)) {
+    } else if (!watch(worker, fds[0], error)) {
+        kill(worker->pid, SIGKILL);
+        waitpid(worker->pid, NULL, 0);
+        ok = false;
+    }
+    if (!ok) {
         free(worker);
         return NULL;
     }
@@ -374,11 +381,11 @@ struct worker *workers_of(struct front *front, uint64_t owner, const char *name,
     uint32_t count = 0;
     for (struct worker *worker = front->workers; worker; worker = worker->next) {
         count++;
-        if (worker->is_stopping)
+        if (worker->is_stopping || !worker->channel.watch) /* it ends, which may take it a while */
             continue;
         if (worker->has_owner && worker->owner == owner) {
-            snprintf(worker->name, sizeof(worker->name), "%s",
-                     name); /* one whose scenes were restored has none yet */
+            /* One whose scenes were restored has no name yet. */
+            snprintf(worker->name, sizeof(worker->name), "%s", name);
             return worker;
         }
         if (!worker->has_owner)

@@ -89,16 +89,15 @@ bool auth_numbers_have(const struct auth_key_numbers *keys, const struct auth_id
 }
 
 /* Users are 32-bit numbers, keys have the top bit set, networks the next. */
-#define KEY_BIT (UINT64_C(1) << 63)
 #define NETWORK_BIT (UINT64_C(1) << 62)
 
 uint64_t auth_owner_number(const struct auth_identity *identity, const struct address *peer)
 {
     if (identity->has_key)
-        return KEY_BIT | identity->key;
+        return AUTH_OWNER_KEY | identity->key;
     if (identity->has_user)
         return identity->user;
-    return (address_network(peer) & ~KEY_BIT) | NETWORK_BIT;
+    return (address_network(peer) & ~AUTH_OWNER_KEY) | NETWORK_BIT;
 }
 
 bool auth_needs_key(const struct address *own, const struct address *peer, const struct auth_keys *keys)

@@ -51,7 +51,10 @@ bool auth_identify(struct auth_identity *identity, int fd, const struct address 
                    struct error *error);
 /* The client has proved that it holds the key of that index, which is its identity from now on. */
 void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index);
-/* Whose client this is: a number of the user, the key, or the network of a client that nobody knows. */
+/* Set in the numbers of keys. */
+#define AUTH_OWNER_KEY (UINT64_C(1) << 63)
+/* Whose client this is: a number of the user, the key, or the network of a client that nobody
+ * knows. `peer` may be NULL for users and keys. */
 uint64_t auth_owner_number(const struct auth_identity *identity, const struct address *peer);
 /* Whether a connection between the daemon's own address and the peer's needs a key: TCP that leaves this host, or
  * could; and all TCP where the daemon has keys, as every user of this host reaches loopback. */

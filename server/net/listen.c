@@ -214,3 +214,15 @@ int listener_accept(const struct listener *listener, struct address *peer, bool 
     }
     return fd;
 }
+
+bool listen_take_connected(int fd, struct address *peer, struct error *error)
+{
+    char field[32];
+    snprintf(field, sizeof(field), "--fd %d", fd);
+    *peer = (struct address){.storage_bytes = sizeof(peer->storage)};
+    if (getpeername(fd, (struct sockaddr *)&peer->storage, &peer->storage_bytes) < 0)
+        return error_set(error, ERROR_INVALID, field, "not a connected socket: %s", strerror(errno));
+    const int flags = fcntl(fd, F_GETFL);
+    return (flags >= 0 && fcntl(fd, F_SETFL, flags | O_NONBLOCK) == 0 && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0) ||
+           error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
+}

@@ -29,4 +29,8 @@ void listener_close(struct listener *listener); /* removes the socket file */
  * descriptors, so the listener stays readable and accepts no client. */
 int listener_accept(const struct listener *listener, struct address *peer, bool *retry_later);
 
+/* Takes a connected socket that another program has opened, as --fd names it: who is at its other end. It does not
+ * block from then on, and programs that are started do not have it. */
+bool listen_take_connected(int fd, struct address *peer, struct error *error);
+
 #endif

@@ -4,13 +4,12 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "net/handover.h"
+#include "net/listen.h"
 #include "session/others.h"
 #include "session/session.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <signal.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
@@ -109,13 +108,18 @@ static void on_counted(void *context)
     send_counts(context, 0);
 }
 
+static void start_unused_timer(struct daemon *daemon)
+{
+    loop_timer_start(daemon->loop, &daemon->unused_timer, daemon->unused_s * UINT64_C(1000000000));
+}
+
 static void on_emptied(void *context)
 {
     struct daemon *daemon = context;
     if (daemon->hub.stopping)
         loop_stop(daemon->loop);
     else
-        loop_timer_start(daemon->loop, &daemon->unused_timer, daemon->unused_s * UINT64_C(1000000000));
+        start_unused_timer(daemon);
 }
 
 /* A client that has come since then starts the timer again when it goes. */
@@ -155,6 +159,7 @@ static void take_owner(struct daemon *daemon, const void *payload)
     memcpy(&owner, payload, sizeof(owner));
     daemon->hub.worker_of = owner;
     daemon->owned(daemon->front_context, owner);
+    start_unused_timer(daemon); /* a client of restored scenes may never come */
     send_ready(daemon, true);
 }
 
@@ -179,6 +184,8 @@ static void on_received(void *context, enum channel_kind kind, const void *paylo
     switch (kind) {
     case CHANNEL_CONFIG:
         daemon->configured(daemon->front_context, payload, bytes);
+        if (daemon->unused_timer.running)
+            start_unused_timer(daemon); /* scenes may linger for longer now */
         channel_send(&daemon->front, CHANNEL_CONFIG, NULL, 0, NULL);
         return;
     case CHANNEL_CLIENT:
@@ -261,16 +268,9 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
 
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error)
 {
-    struct handover handover = {.peer.storage_bytes = sizeof(handover.peer.storage), .is_owner = true};
-    struct address *peer = &handover.peer;
-    char field[32];
-    snprintf(field, sizeof(field), "--fd %d", fd);
-    if (getpeername(fd, (struct sockaddr *)&peer->storage, &peer->storage_bytes) < 0)
-        return error_set(error, ERROR_INVALID, field, "not a connected socket: %s", strerror(errno));
-    int flags = fcntl(fd, F_GETFL);
-    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
-        return error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
-    return auth_identify(&handover.identity, fd, peer, true, error) &&
+    struct handover handover = {.is_owner = true};
+    return listen_take_connected(fd, &handover.peer, error) &&
+           auth_identify(&handover.identity, fd, &handover.peer, true, error) &&
            hub_add_client(&daemon->hub, fd, &handover, error);
 }
 

@@ -70,8 +70,8 @@ static void on_timer(void *context)
     finish(context);
 }
 
-/* Who asks for figures all the time makes others work no more than who waits for each answer. Scenes are asked for
- * anew: one may have been opened since. */
+/* Questions for figures join one that is under way, so that many of them are no more work for other users.
+ * Questions for scenes do not: one may have been opened since. */
 static struct question *find_alike(const struct others *others, enum channel_what what, uint32_t is_read_only)
 {
     size_t cursor = 0;

@@ -3,20 +3,17 @@
 
 #include <stdlib.h>
 
-/* Users are 32-bit numbers, keys have the top bit set; those between are of clients that nobody knows. */
-#define KEY_BIT (UINT64_C(1) << 63)
+/* Behind the numbers of users, as of auth_owner_number(): clients that nobody knows. */
 #define SESSION_BIT (UINT64_C(1) << 32)
 
 blob_principal principal_number(const struct auth_identity *identity, uint64_t session)
 {
-    if (identity->has_key)
-        return KEY_BIT | identity->key;
-    return identity->has_user ? identity->user : SESSION_BIT + session;
+    return identity->has_key || identity->has_user ? auth_owner_number(identity, NULL) : SESSION_BIT + session;
 }
 
 blob_principal principal_for_next_process(blob_principal principal)
 {
-    return principal & KEY_BIT || principal < SESSION_BIT ? principal : PRINCIPAL_NOBODY;
+    return principal & AUTH_OWNER_KEY || principal < SESSION_BIT ? principal : PRINCIPAL_NOBODY;
 }
 
 struct owner *owner_find(struct owners *owners, uint64_t number)

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* For which a worker that does not answer is waited for: a list goes without it, an attach may need it. */
+/* Times after which a worker that does not answer is left out: a list can do without it, an attach may need it. */
 #define LIST_NS UINT64_C(500000000)
 #define ATTACH_NS UINT64_C(10000000000)
 

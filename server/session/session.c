@@ -21,9 +21,6 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-/* Places beyond limits.clients for the daemon's own user and for root. */
-#define PLACES_AT_HOME 4u
-
 /* ---- sending ----------------------------------------------------------------------------------------- */
 
 bool session_send(struct session *session, uint32_t request, uint32_t channel, const struct message *message)
@@ -290,13 +287,7 @@ static bool has_place(const struct session *session, char text[HANDSHAKE_TEXT_MA
 {
     const struct session_limits *limits = &session->hub->options.limits;
     const size_t text_bytes = HANDSHAKE_TEXT_MAX_BYTES + 1;
-    size_t all = session->hub->introduced;
-    bool at_home = is_at_home(session);
-    if (all >= limits->clients + (at_home ? PLACES_AT_HOME : 0u)) {
-        snprintf(text, text_bytes, "%u clients are connected, the limit; try again later", limits->clients);
-        return false;
-    }
-    if (at_home || session->owner->clients < owner_share(limits->clients, limits->share_percent))
+    if (is_at_home(session) || session->owner->clients < owner_share(limits->clients, limits->share_percent))
         return true;
     snprintf(
         text, text_bytes,

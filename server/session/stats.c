@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* For which a worker that does not answer is waited for: its figures are left out. */
+/* Time after which the figures of a worker that does not answer are left out. */
 #define OTHERS_NS UINT64_C(500000000)
 
 #define CLIENTS_MAX 256

@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import signal
+import socket
 import struct
 import subprocess
 import time
@@ -116,6 +117,50 @@ class Workers(Case):
             wait_until(lambda: is_gone(stopped), "it is there still")
             self.renders(self.client(daemon.path))
             self.assertIn("it does not answer", daemon.messages())
+
+    def refusal(self, where):
+        """What a client is told that is not let in."""
+        with self.assertRaises(tiny_client.Failed) as refused:
+            self.addCleanup(tiny_client.Client(where).socket.close)
+        return str(refused.exception)
+
+    def test_one_client_too_many_is_refused_and_may_come_later_and_the_daemons_user_finds_a_place(self):
+        with self.daemon(environment={**os.environ, "FARLIGHT_LIMITS_CLIENTS": "2", "FARLIGHT_LIMITS_SHARE": "100"}) as daemon:
+            one, other = self.client(daemon.tcp), self.client(daemon.tcp)
+            self.assertIn("2 clients are connected", self.refusal(daemon.tcp))
+            at_home = [self.client(daemon.path) for _ in range(4)]
+            self.assertIn("2 clients are connected", self.refusal(daemon.path))
+            for client in (one, other, *at_home):
+                self.renders(client)
+            for client in (other, *at_home):
+                client.socket.close()
+            wait_until(lambda: len(json.loads(farlight("stats", "--json", "--server", daemon.address).stdout or "{}").get("clients", "")) == 2,
+                       "they are there still")
+            self.renders(self.client(daemon.tcp))
+
+    def test_silent_connections_keep_no_one_out(self):
+        """They give way to the next, whosever they are: only a client of their own may have to come again."""
+        limits = {"FARLIGHT_LIMITS_UNAUTHENTICATED": "8", "FARLIGHT_LIMITS_UNAUTHENTICATED_PER_ADDRESS": "64",
+                  "FARLIGHT_NETWORK_HANDSHAKE": "600000"}
+        with self.daemon(environment={**os.environ, **limits}) as daemon:
+            client = self.client(daemon.path)
+            silent = [socket.create_connection(daemon.tcp) for _ in range(32)]
+            self.renders(client)
+            self.renders(self.client(daemon.path))  # comes last, and has a place
+            told = 0
+            for one in silent:
+                one.settimeout(0.1)
+                with contextlib.suppress(TimeoutError):
+                    told += b"have not introduced themselves" in one.recv(4096)
+                one.close()
+            self.assertGreaterEqual(told, 32 - 4)  # half of the limit may stay
+
+    def test_the_daemon_ends_with_the_client_that_has_started_it_though_that_says_nothing(self):
+        ours, theirs = socket.socketpair()
+        with theirs, ours, Daemon("--fd", theirs.fileno(), pass_fds=[theirs.fileno()]) as daemon:
+            theirs.close()
+            ours.close()
+            self.assertEqual(daemon.process.wait(60), 0)
 
     def test_workers_end_with_the_front_however_that_ends(self):
         with self.daemon() as daemon:

@@ -172,31 +172,6 @@ static void expect_refused(struct client *client, const char *why)
     expect_end(client);
 }
 
-TEST(one_client_too_many_is_refused_and_may_connect_later)
-{
-    options.limits.clients = 2;
-    start_daemon();
-    struct client *one = come(true), *other = come(true);
-    expect_refused(knock(true), "2 clients are connected");
-    expect_alive(one, 900);
-    expect_alive(other, 900);
-    cut(other, one);
-    other = come(true);
-    expect_alive(other, 900);
-}
-
-TEST(the_daemons_own_user_finds_a_place_where_others_do_not)
-{
-    options.limits.clients = 1;
-    start_daemon();
-    struct client *stranger = come(true);
-    for (int i = 0; i < 4; i++)
-        come(false); /* by the Unix socket, which tells the user */
-    expect_refused(knock(true), "1 clients are connected");
-    expect_refused(knock(false), "1 clients are connected");
-    expect_alive(stranger, 900);
-}
-
 TEST(one_user_leaves_places_for_others)
 {
     options.limits.clients = 8;
