@@ -2,6 +2,7 @@
 """What the integration tests share: the programs, a daemon, the bundled scenes, and readers of PNG and EXR."""
 import atexit
 import json
+import contextlib
 import os
 import pathlib
 import shutil
@@ -111,16 +112,17 @@ class Daemon:
     def signal_all(self, number):
         """Sends a signal to it and to its workers."""
         for process in (self.process.pid, *self.workers()):
-            os.kill(process, number)
+            with contextlib.suppress(ProcessLookupError):  # a worker that has ended meanwhile
+                os.kill(process, number)
 
     @property
     def path(self):
         return self.address.removeprefix("unix:")
 
     def stop(self, number=signal.SIGTERM, timeout=TIMEOUT_S):
-        """Ends it with a signal and returns its exit status."""
+        """Ends it with a signal and returns its exit status. SIGKILL is for its workers, too, at the same time."""
         if self.process.poll() is None:
-            self.process.send_signal(number)
+            (self.signal_all if number == signal.SIGKILL else self.process.send_signal)(number)
         return self.process.wait(timeout)
 
     def __exit__(self, *_):

@@ -315,7 +315,7 @@ class Lost(Animations):
             with self.subTest(options=options), Daemon() as daemon:
                 child = self.start(name, "--server", daemon.address, *options)
                 self.wait_for_files(name, 2, child)
-                daemon.process.kill()
+                daemon.stop(signal.SIGKILL)
                 begin = time.monotonic()
                 errors = self.finish(child, 75)
                 if tries is None:
@@ -381,7 +381,7 @@ class Lost(Animations):
         with Daemon() as daemon:
             child = self.start("interrupted", "--server", daemon.address, "--retries", "100")
             self.wait_for_files("interrupted", 2, child)
-            daemon.process.kill()
+            daemon.stop(signal.SIGKILL)
             for line in child.stderr:
                 if "trying again" in line:
                     break

@@ -371,8 +371,7 @@ class Listening(Case):
             self.assertIn(first.path, second.stderr)
             Peer(first).close()
             path = first.path
-            first.process.send_signal(signal.SIGKILL)
-            first.process.wait()
+            first.stop(signal.SIGKILL)
             self.assertTrue(pathlib.Path(path).exists(), "a killed daemon leaves its socket file")
             with Daemon(listen=first.address) as third:
                 Peer(third).close()
@@ -522,7 +521,7 @@ class Jobs(Case):
             self.addCleanup(watched.stdout.close)
             while watched.stdout.readline() != "\n":  # the end of a block
                 self.assertIsNone(watched.poll())
-            daemon.process.kill()
+            daemon.stop(signal.SIGKILL)
             self.assertEqual(watched.wait(farlight_test.TIMEOUT_S), 75)
         for wrong in ("0", "x", "1e9"):
             self.expect(farlight("stats", "--server", "unix:/nonexistent", f"--watch={wrong}"), 2)

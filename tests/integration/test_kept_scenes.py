@@ -36,8 +36,7 @@ class KeptScenes(Case):
         return read_png(path)
 
     def kill(self, daemon):
-        daemon.process.kill()
-        daemon.process.wait()
+        daemon.stop(signal.SIGKILL)
 
     def test_scenes_of_a_killed_daemon_come_back(self):
         models = {name: bundled_scenes() / name for name in ("teapot.glb", "cornell.glb", "sphereflake-2.nff")}

@@ -4,6 +4,7 @@ none of the same picture, is refused with the reason."""
 import json
 import os
 import random
+import signal
 import struct
 import subprocess
 import unittest
@@ -174,8 +175,7 @@ class LikeGpu(PartsCase):
             with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
                 while "squares of the part" not in process.stderr.readline():
                     self.assertIsNone(process.poll())
-                daemon.process.kill()
-                daemon.process.wait()
+                daemon.stop(signal.SIGKILL)
                 daemon.process.stdout.close()
                 with Daemon(listen=daemon.address):
                     frames = [json.loads(line) for line in process.communicate()[0].splitlines()]
