@@ -205,7 +205,7 @@ class Parts(OneDaemon, Animations):
 class Lost(Animations):
     """The daemon goes away in the middle."""
 
-    FRAMES = ["--frames", "1-24", "--samples", "2"]
+    FRAMES = ["--frames", "1-24", "--samples", "16"]  # with few samples all are there before a busy machine lets the test act
     reference = {}  # digests of the frames, made once
 
     def whole(self):
