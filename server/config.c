@@ -100,9 +100,8 @@ static const struct option options[] = {
 
     {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "share", ANYTIME, OPTION_U32, AT(limits.share_percent), "75", 1, 100, "%",
-     "What one user or key may have of what all have together: of limits.clients, memory.frames, memory.transactions "
-     "and, while others render, memory.device. The rest is kept for others. The daemon's own user and root always find "
-     "a place"},
+     "What one user or key may have of limits.clients; the rest is kept for others. The daemon's own user and root "
+     "always find a place"},
     {"limits", "unauthenticated", ANYTIME, OPTION_U32, AT(limits.unauthenticated), "64", 2, 65536, "",
      "Connections whose handshake is not complete. Beyond half of them, a newcomer takes the place of one of the user "
      "or network that has most, chosen at random"},
@@ -117,12 +116,8 @@ static const struct option options[] = {
     {"limits", "scene_linger", ANYTIME, OPTION_U32, AT(scene_linger_s), "120", 0, 86400, "s",
      "How long a kept or shared scene lingers after its last client has left; 0: not at all"},
     {"limits", "scenes_lingering", ANYTIME, OPTION_U32, AT(lingering_scenes), "16", 1, 65536, "",
-     "Lingering scenes of all clients; beyond it, the user with most of them loses the oldest. They are evicted "
-     "when memory is full, first those of the user whose scene needs it"},
+     "Lingering scenes of one user or key; beyond it, the oldest one ends. They are evicted when memory is full"},
     {"limits", "jobs", ANYTIME, OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
-    {"limits", "view_weight", ANYTIME, OPTION_U32, AT(limits.view_weight), "4", 1, 16, "",
-     "Maximum weight of a view against the jobs of other users and keys; a client's own weights divide its own share"},
-    {"limits", "batch_weight", ANYTIME, OPTION_U32, AT(limits.batch_weight), "1", 1, 16, "", "The same of a batch"},
     {"limits", "blobs", ANYTIME, OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
      "Blobs that one connection may name"},
     {"limits", "transaction_edits", ANYTIME, OPTION_U32, AT(limits.transaction_edits), "1048576", 1, 16777216, "",
@@ -392,7 +387,6 @@ static struct engine_limits engine_limits(const struct config *config)
         .scene = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes, .depth = config->limits.depth},
         .scene_linger_ms = config->scene_linger_s * UINT64_C(1000),
         .lingering_scenes = config->lingering_scenes,
-        .device_share_percent = config->limits.share_percent,
     };
 }
 
@@ -432,10 +426,18 @@ void config_hub(const struct config *config, struct hub_options *hub)
     hub->limits.frames_in_flight = ENGINE_FRAMES_IN_FLIGHT;
 }
 
+/* At least 1. */
+static uint32_t clients_of_one(const struct session_limits *limits)
+{
+    const uint64_t share = (uint64_t)limits->clients * limits->share_percent / 100;
+    return share ? (uint32_t)share : 1;
+}
+
 bool config_front(const struct config *config, struct front_options *front, struct error *error)
 {
     *front = (struct front_options){
         .limits = {.clients = config->limits.clients,
+                   .clients_of_one = clients_of_one(&config->limits),
                    .unauthenticated = config->limits.unauthenticated,
                    .unauthenticated_per_address = config->limits.unauthenticated_per_address,
                    .handshakes_a_second = config->limits.handshakes_a_second},

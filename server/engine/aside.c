@@ -24,7 +24,7 @@ struct aside {
     bool closed;
     unsigned numbered; /* threads that know their place in `running` */
     pthread_t threads[THREADS];
-    unsigned started; /* the owner's */
+    unsigned started; /* threads; the creator's */
 };
 
 static void append(struct list *list, struct aside_commit *commit)
@@ -46,20 +46,20 @@ static struct aside_commit *take(struct list *list, struct aside_commit **place)
     return commit;
 }
 
-static bool is_busy(const struct aside *aside, uint64_t owner)
+static bool is_busy(const struct aside *aside, uint64_t client)
 {
     for (unsigned i = 0; i < THREADS; i++) {
-        if (aside->running[i] && aside->running[i]->owner == owner)
+        if (aside->running[i] && aside->running[i]->command->client == client)
             return true;
     }
     return false;
 }
 
-/* The first of an owner that has none running; NULL: none. */
+/* The first of a client that has none running; NULL: none. */
 static struct aside_commit *next_locked(struct aside *aside)
 {
     struct aside_commit **place = &aside->waiting.first;
-    while (*place && is_busy(aside, (*place)->owner))
+    while (*place && is_busy(aside, (*place)->command->client))
         place = &(*place)->next;
     return take(&aside->waiting, place);
 }
@@ -95,7 +95,7 @@ static void *run_thread(void *context)
         pthread_mutex_lock(&aside->lock);
         aside->running[self] = NULL;
         append(&aside->done, commit);
-        pthread_cond_broadcast(&aside->changed); /* its owner may have another one */
+        pthread_cond_broadcast(&aside->changed); /* its client may have another one */
         pthread_mutex_unlock(&aside->lock);
         aside->on_done(aside->context);
         pthread_mutex_lock(&aside->lock);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Transactions that take long, carried out beside the thread that owns GL: a few threads, of which one owner has
+/* Transactions that take long, carried out beside the thread that owns GL: a few threads, of which one client has
  * at most one at a time, so that others find one free. The caller keeps everything else away from a scene until
  * its transaction comes back. */
 #ifndef FARLIGHT_ENGINE_ASIDE_H
@@ -16,8 +16,6 @@ struct aside_commit {
     struct aside_commit *next; /* for the pool */
     struct scene *scene;
     struct engine_command *command; /* owned; its edits are gone afterwards */
-    uint64_t owner;                 /* one of whose at most one is carried out at a time */
-    uint64_t principal;
     atomic_bool abandoned;
     bool applied;
     struct error error; /* why not */

@@ -97,7 +97,6 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
         .events = engine->events,
         .client = command->client,
         .request = command->request,
-        .owner = reference->client->owner->number,
         .window = window_of(engine, &command->job.frame),
         .credit = command->job.kind == JOB_VIEW ? UINT64_MAX : command->job.credit,
     });
@@ -264,7 +263,7 @@ static bool may_begin(const struct engine *engine, const struct job *job)
     const struct engine_scene *scene = job->scene;
     if (scene->commit || !engine_memory_lets_begin(engine, job))
         return false;
-    if (engine->needs_all == job)
+    if (engine->needs_memory == job)
         return !scene->waiting_count;
     if (!scene->waiting_count && scene->put_off == job)
         return !scene->frames;
@@ -321,7 +320,7 @@ static void frame_failed(struct engine *engine, struct job *job, struct error *e
         device_lost(engine, job);
         return;
     }
-    const bool has_room = error->kind == ERROR_OUT_OF_MEMORY && engine_make_room(engine, job, error);
+    const bool has_room = error->kind == ERROR_OUT_OF_MEMORY && engine_make_room(engine, job);
     if (!has_room && !(job->spec.kind == JOB_VIEW && view_goes_without(job, error)))
         job_finish(job, error);
 }
@@ -440,7 +439,6 @@ static void frame_go_on(struct engine *engine, struct job *job)
 
 void job_step(struct engine *engine, struct job *job)
 {
-    engine_limit_memory(engine, job);
     if (job->rendering && job->spec.kind == JOB_VIEW && view_is_stale(job)) {
         job_abandon_frame(engine, job);
     } else if (job->rendering) {

@@ -65,7 +65,7 @@ static void committed(struct engine *engine, struct engine_scene *scene, const s
         return;
     }
     if (scene->known.table_bytes > before_bytes)
-        engine_trim_tables(engine, commit->principal);
+        engine_trim_tables(engine);
     if (!scene->apply_ns)
         scene->apply_start_ns = commit->start_ns;
     scene->apply_ns += commit->duration_ns;
@@ -78,7 +78,7 @@ static void commit_here(struct engine *engine, const struct engine_reference *re
                         struct engine_command *command)
 {
     struct engine_scene *scene = reference->scene;
-    struct aside_commit commit = {.command = command, .principal = reference->client->principal};
+    struct aside_commit commit = {.command = command};
     commit.start_ns = clock_now_ns();
     commit.applied = scene_commit(scene->scene, command->edits, command->edit_count, &commit.error);
     commit.duration_ns = clock_now_ns() - commit.start_ns;
@@ -104,8 +104,6 @@ static bool commit(struct engine *engine, const struct engine_reference *referen
     }
     commit->scene = scene->scene;
     commit->command = command;
-    commit->owner = reference->client->owner->number;
-    commit->principal = reference->client->principal;
     commit->promised_bytes = scene_edits_table_bytes(command->edits, command->edit_count);
     engine->promised_bytes += commit->promised_bytes;
     scene->commit = commit;
@@ -329,10 +327,6 @@ static void client_gone(struct engine *engine, const struct engine_command *comm
 static void report_stats(struct engine *engine, const struct engine_command *command)
 {
     struct engine_event *event = event_create(ENGINE_STATS_READY, command->client, command->request);
-    if (event) {
-        event->answers_stats = true;
-        event->owner = command->owner;
-    }
     if (event)
         event->stats = engine_stats_collect(engine, command->principal);
     if (event && !event->stats) {
@@ -364,7 +358,7 @@ void engine_handle(struct engine *engine, struct engine_command *command)
         engine_scene_list(engine, command);
         break;
     case ENGINE_SCENES_TRIM:
-        engine_trim_blobs(engine, command->principal, command->trim_bytes);
+        engine_trim_blobs(engine, command->trim_bytes);
         break;
     case ENGINE_JOB_CREDIT:
         give_credit(engine, command);

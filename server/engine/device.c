@@ -173,17 +173,15 @@ bool engine_need_device(struct engine *engine, struct error *error)
     return false;
 }
 
-bool engine_evict_idle(struct engine *engine, const struct job *keep, const struct engine_owner *owner)
+bool engine_evict_idle(struct engine *engine, const struct job *keep)
 {
     bool found = false;
     for (size_t i = 0; i < engine->job_count; i++) {
         struct job *job = engine->jobs[i];
-        if (job != keep && !job->rendering && (!owner || job->reference->client->owner == owner))
+        if (job != keep && !job->rendering)
             found |= drop_renderer(engine, job);
     }
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        if (owner && scene->owner != owner->number)
-            continue;
         found |= drop_all_idle(engine, scene);
         if (scene == keep->scene || scene->frames || !scene->shared)
             continue;

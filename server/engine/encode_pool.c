@@ -237,21 +237,21 @@ static void run_task(struct encode_task *task)
     job_output_put(task->output, task->position, event);
 }
 
-static unsigned running_of(const struct encode_pool *pool, uint64_t owner)
+static unsigned running_of(const struct encode_pool *pool, uint64_t client)
 {
     unsigned count = 0;
     for (unsigned i = 0; i < pool->thread_count; i++)
-        count += pool->running[i] && job_output_owner(pool->running[i]->output) == owner;
+        count += pool->running[i] && job_output_client(pool->running[i]->output) == client;
     return count;
 }
 
-/* The first of the owner that has the fewest threads; NULL: none waits, or one thread is to be left to others. */
+/* The first of the client that has the fewest threads; NULL: none waits, or one thread is to be left to others. */
 static struct encode_task *next_locked(struct encode_pool *pool)
 {
     struct encode_task **best = NULL;
     unsigned fewest = pool->thread_count > 1 ? pool->thread_count - 1 : 1;
     for (struct encode_task **place = &pool->first; *place && fewest; place = &(*place)->next) {
-        unsigned count = running_of(pool, job_output_owner((*place)->output));
+        unsigned count = running_of(pool, job_output_client((*place)->output));
         if (count >= fewest)
             continue;
         fewest = count;
@@ -295,7 +295,7 @@ static void *run_thread(void *context)
             pool->options.on_done(pool->options.context);
         }
         pthread_mutex_lock(&pool->lock);
-        pthread_cond_signal(&pool->changed); /* a task of that owner may have been left waiting */
+        pthread_cond_signal(&pool->changed); /* a task of that client may have been left waiting */
     }
     pthread_mutex_unlock(&pool->lock);
     return NULL;

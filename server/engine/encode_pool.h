@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Threads that turn rendered pixels into the bytes that travel. An owner's frames have all threads but one at
- * most; a frame that is not wanted any more is given up. */
+/* Threads that turn rendered pixels into the bytes that travel. A client's frames have all threads but one at
+ * most, so that another client's need not wait; a frame that is not wanted any more is given up. */
 #ifndef FARLIGHT_ENGINE_ENCODE_POOL_H
 #define FARLIGHT_ENGINE_ENCODE_POOL_H
 

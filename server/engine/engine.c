@@ -14,8 +14,7 @@
 #define QUEUE_CAPACITY_DEFAULT 1024
 /* Time for commands between two slices, so that a flood of commands does not stop the frames. */
 #define COMMANDS_NS UINT64_C(1500000)
-/* Maximum of commands that wait: the network side lets owners take turns at the places, so the fewer there are,
- * the sooner another owner's command is carried out. */
+/* Maximum of commands that wait here; more of them wait with the network thread, which then reads no further. */
 #define COMMANDS_WAITING_MAX 64
 
 /* Wakes the thread without being a command. */
@@ -88,9 +87,7 @@ static bool waits_for_device(const struct engine *engine, const struct job *job)
 
 static struct schedule_entry entry_of(struct job *job)
 {
-    struct engine_client *client = job->reference->client;
-    return (struct schedule_entry){
-        .owner = &client->owner->schedule, .client = &client->schedule, .job = &job->schedule};
+    return (struct schedule_entry){.client = &job->reference->client->schedule, .job = &job->schedule};
 }
 
 /* The job whose turn it is; NULL: none is ready. A job that would only wait for the device yields to others, which
@@ -122,9 +119,8 @@ static bool serve(struct engine *engine)
     uint64_t start_ns = clock_now_ns();
     job_step(engine, job);
     const struct schedule_entry entry = entry_of(job);
-    uint32_t weight = job->spec.weight ? job->spec.weight : 1;
-    schedule_charge(&engine->scheduler, &entry, clock_now_ns() - start_ns, weight,
-                    job->spec.granted_weight ? job->spec.granted_weight : weight);
+    schedule_charge(&engine->scheduler, &entry, clock_now_ns() - start_ns,
+                    job->spec.weight ? job->spec.weight : 1);
     run_all_waiting(engine);
     return true;
 }
@@ -311,7 +307,6 @@ void engine_destroy(struct engine *engine)
     queue_destroy(engine->commands, drop_command);
     queue_destroy(engine->events, drop_event);
     hashmap_finish(&engine->clients);
-    hashmap_finish(&engine->owners);
     free(engine->jobs);
     free(engine->entries);
     pthread_cond_destroy(&engine->start_changed);

@@ -33,7 +33,6 @@ struct engine_limits {
     uint64_t scene_linger_ms;  /* how long an attachable scene lingers without a holder; 0: it ends at once */
     uint32_t lingering_scenes; /* maximum of lingering scenes; beyond it, the client with most of them loses its
                                   oldest; 0: default */
-    uint32_t device_share_percent; /* of the device's memory: what an owner may have while others render; 0: all */
 };
 
 /* Who keeps attachable scenes for the next process. */
@@ -109,8 +108,7 @@ struct engine_job {
     uint32_t upsample;     /* of a batch: layers are rendered of every how manyth frame, from time 0 on; 0: 1 */
     uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
     enum encoding still_encoding;
-    unsigned weight; /* its share of the device's time among the jobs of its client, and of its owner; 0: 1 */
-    unsigned granted_weight; /* the same among all owners; 0: weight */
+    unsigned weight;         /* its share of the device's time among the jobs of all clients; 0: 1 */
     bool adapt;              /* view: quality and size follow the link */
     bool keeps_rate;         /* view: what is rendered follows what it takes */
     struct view_depth depth; /* view: of what is attached */
@@ -142,7 +140,7 @@ enum engine_command_kind {
 };
 
 struct engine_command {
-    struct engine_command *next; /* for its owner: the engine does not read it */
+    struct engine_command *next; /* for the caller: the engine does not read it */
     enum engine_command_kind kind;
     uint64_t client;
     uint32_t request;
@@ -151,7 +149,6 @@ struct engine_command {
     enum sharing sharing;          /* scene_open */
     uint64_t kept_revision;        /* scene_open: the next transaction has this revision, and the keeper has it; 0:
                                       the scene is new */
-    uint64_t owner;                /* of the client: with whom its connections share the device's time */
     uint64_t principal;  /* scene_open, _attach, _list, _trim, stats: the asking client's owner; kept scenes belong
                             to owners */
     uint64_t trim_bytes; /* scenes_trim */
@@ -291,8 +288,6 @@ struct engine_event {
     uint32_t request;
     uint64_t revision;  /* done, for a commit or an attach; scene_changed; object_is */
     uint32_t scene;     /* scene_changed */
-    bool answers_stats; /* of `owner`, whatever the answer is */
-    uint64_t owner;
     struct error error; /* failed */
     struct engine_frame *frame;
     struct engine_stats *stats;

@@ -25,17 +25,8 @@
 #define DEVICE_REBUILDS_MAX 3
 #define DEVICE_REBUILDS_WINDOW_NS (300 * 1000000000ull)
 
-struct engine_owner {
-    uint64_t number;
-    size_t clients;
-    struct schedule_owner schedule;
-    /* Its job that lacked memory beside its other frames: none of those begins before. NULL: none. */
-    struct job *needs_own;
-};
-
 struct engine_client {
     uint64_t client, principal;
-    struct engine_owner *owner;
     struct hashmap references; /* struct engine_reference *, by the client's number */
     struct schedule_client schedule;
 };
@@ -64,7 +55,6 @@ struct engine_scene {
     bool is_restored;                    /* and has had none since: the last process had that many */
     enum sharing sharing;
     uint64_t principal; /* that opened it */
-    uint64_t owner;     /* to whom that client belonged: whose share of the device's memory it takes */
     struct scene *scene;
     struct aside_commit
         *commit;                /* that changes `scene` beside this thread, which keeps away from it; NULL: none */
@@ -160,7 +150,6 @@ struct engine {
     uint64_t rebuilds_ns[DEVICE_REBUILDS_MAX]; /* times of its reopenings, a ring */
     unsigned rebuilds;
     struct hashmap clients;          /* struct engine_client *, by number */
-    struct hashmap owners;           /* struct engine_owner *, by number */
     struct engine_scene *scenes;     /* owned */
     struct engine_scene *read_scene; /* that the keeper reads; no transaction changes it. NULL: none */
     bool read_scene_ended;           /* it is in no list, and owned here */
@@ -171,9 +160,8 @@ struct engine {
     /* The job that lacked memory for its frame beside those in progress: no other frame begins before its. NULL:
      * none.
      */
-    struct job *needs_all;
-    uint64_t memory_shared_until_ns; /* until when no owner has more than its share */
-    struct job *turn_of;             /* the job of the last slice; NULL: it has ended, or none was ready */
+    struct job *needs_memory;
+    struct job *turn_of; /* the job of the last slice; NULL: it has ended, or none was ready */
     uint64_t frames, rays;
     uint64_t table_bytes;    /* of all scenes */
     uint64_t promised_bytes; /* for those that change beside this thread */
@@ -220,11 +208,10 @@ uint64_t engine_reap_scenes(struct engine *engine);
 void engine_end_left_scenes(struct engine *engine);
 /* Bytes of the tables of scenes without a holder. */
 uint64_t engine_left_table_bytes(const struct engine *engine);
-/* Evicts scenes without a holder for an owner, until the tables of all scenes are within their limit, or that many
- * bytes of blobs are unused; evicts none if all of them would not suffice. The owner's own go first, then those of
- * the owner with most of them. */
-void engine_trim_tables(struct engine *engine, uint64_t principal);
-void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes);
+/* Evicts scenes without a holder, the oldest first, until the tables of all scenes are within their limit, or that
+ * many bytes of blobs are unused; evicts none if all of them would not suffice. */
+void engine_trim_tables(struct engine *engine);
+void engine_trim_blobs(struct engine *engine, uint64_t bytes);
 
 /* Whether it may change now: no frame of it is in progress, nothing else changes it, and nobody reads it. */
 bool engine_scene_may_change(const struct engine *engine, const struct engine_scene *scene);
@@ -251,7 +238,7 @@ void engine_objects_list(struct engine *engine, const struct engine_scene *from,
                          const struct engine_command *command);
 void engine_object_read(struct engine *engine, const struct engine_scene *from,
                         const struct engine_command *command);
-/* Whether the owner may attach to it. */
+/* Whether the principal may attach to it. */
 bool engine_scene_is_open_to(const struct engine_scene *scene, uint64_t principal);
 
 /* batch.c: jobs. */
@@ -303,9 +290,9 @@ bool engine_need_device(struct engine *engine, struct error *error);
 bool engine_job_may_go_on(struct job *job, struct error *error);
 /* Releases everything on the device, and the device. */
 void engine_drop_device(struct engine *engine);
-/* Evicts resources on the device, of one owner or (NULL) of all, that neither a frame in progress nor the next
- * frame of `keep` needs. False: there were none. */
-bool engine_evict_idle(struct engine *engine, const struct job *keep, const struct engine_owner *owner);
+/* Evicts resources on the device that neither a frame in progress nor the next frame of `keep` needs. False: there
+ * were none. */
+bool engine_evict_idle(struct engine *engine, const struct job *keep);
 /* A renderer for a job without one: its reference's, or a new one. */
 bool job_need_renderer(struct engine *engine, struct job *job, struct error *error);
 /* Leaves it to the next job by its reference. */
@@ -319,12 +306,10 @@ uint64_t scene_own_device_bytes(const struct engine *engine, const struct engine
 uint64_t job_device_bytes(const struct engine *engine, const struct job *job);
 uint64_t engine_device_bytes(const struct engine *engine);
 
-/* memory.c: the device's memory among owners. */
-/* Before each slice: what the device may have in use for the job's owner to have no more than its share. */
-void engine_limit_memory(struct engine *engine, const struct job *job);
+/* memory.c: frames that lack memory on the device. */
 /* For a job whose frame, given up by now, lacked memory. Whether it is worth another try, at once or when others
- * have ended; if not, *error says more. */
-bool engine_make_room(struct engine *engine, struct job *job, struct error *error);
+ * have ended. */
+bool engine_make_room(struct engine *engine, struct job *job);
 /* Whether it would take memory that another job waits for. */
 bool engine_memory_lets_begin(const struct engine *engine, const struct job *job);
 void engine_needs_no_memory(struct engine *engine, const struct job *job); /* any more */

@@ -185,9 +185,9 @@ bool job_output_is_closed(const struct job_output *output)
     return atomic_load(&output->closed);
 }
 
-uint64_t job_output_owner(const struct job_output *output)
+uint64_t job_output_client(const struct job_output *output)
 {
-    return output->options.owner;
+    return output->options.client;
 }
 
 void job_output_taken(struct job_output *output)

@@ -16,7 +16,6 @@ struct job_output_options {
     struct queue *events; /* struct engine_event *; a push may wait */
     uint64_t client;
     uint32_t request;
-    uint64_t owner;  /* of the client: with whom its connections share the encoders */
     uint32_t window; /* maximum of frames that were added and not fetched */
     uint64_t credit;
 };
@@ -44,7 +43,7 @@ void job_output_finish(struct job_output *output, struct engine_event *final);
  * dropped. */
 bool job_output_close(struct job_output *output, struct engine_event *final);
 bool job_output_is_closed(const struct job_output *output);
-uint64_t job_output_owner(const struct job_output *output);
+uint64_t job_output_client(const struct job_output *output);
 /* A frame left the event queue. */
 void job_output_taken(struct job_output *output);
 

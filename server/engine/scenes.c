@@ -9,42 +9,16 @@
 
 /* ---- clients ------------------------------------------------------------------------------------ */
 
-static struct engine_owner *need_owner(struct engine *engine, uint64_t number)
-{
-    struct engine_owner *owner = hashmap_get(&engine->owners, number);
-    if (!owner) {
-        owner = calloc(1, sizeof(*owner));
-        if (!owner || !hashmap_put(&engine->owners, number, owner)) {
-            free(owner);
-            return NULL;
-        }
-        owner->number = number;
-    }
-    owner->clients++;
-    return owner;
-}
-
-static void leave_owner(struct engine *engine, struct engine_owner *owner)
-{
-    if (!owner || --owner->clients)
-        return;
-    hashmap_remove(&engine->owners, owner->number);
-    free(owner);
-}
-
 static struct engine_client *need_client(struct engine *engine, const struct engine_command *command)
 {
     struct engine_client *client = hashmap_get(&engine->clients, command->client);
     if (client)
         return client;
-    struct engine_owner *owner = need_owner(engine, command->owner);
-    client = owner ? calloc(1, sizeof(*client)) : NULL;
+    client = calloc(1, sizeof(*client));
     if (!client || !hashmap_put(&engine->clients, command->client, client)) {
         free(client);
-        leave_owner(engine, owner);
         return NULL;
     }
-    client->owner = owner;
     client->client = command->client;
     client->principal = command->principal;
     return client;
@@ -132,7 +106,6 @@ void engine_forget_client(struct engine *engine, struct engine_client *client)
     }
     hashmap_remove(&engine->clients, client->client);
     hashmap_finish(&client->references);
-    leave_owner(engine, client->owner);
     free(client);
 }
 
@@ -187,28 +160,12 @@ static bool is_left(const struct engine_scene *scene)
     return !scene->references && !scene->commit;
 }
 
-static size_t count_left_by(const struct engine *engine, uint64_t principal)
-{
-    size_t count = 0;
-    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
-        count += is_left(scene) && scene->principal == principal;
-    return count;
-}
-
-/* With too many lingering scenes, the owner with most of them loses its oldest. */
-static bool goes_before(const struct engine *engine, const struct engine_scene *a, const struct engine_scene *b)
-{
-    size_t a_count = count_left_by(engine, a->principal), b_count = count_left_by(engine, b->principal);
-    return a_count != b_count ? a_count > b_count : a->left_ns < b->left_ns;
-}
-
-/* NULL: there is none. */
+/* The one that has lingered longest; NULL: there is none. */
 static struct engine_scene *first_to_go(const struct engine *engine, bool restored_too)
 {
     struct engine_scene *first = NULL;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        if (is_left(scene) && (restored_too || !scene->is_restored) &&
-            (!first || goes_before(engine, scene, first)))
+        if (is_left(scene) && (restored_too || !scene->is_restored) && (!first || scene->left_ns < first->left_ns))
             first = scene;
     }
     return first;
@@ -249,17 +206,6 @@ void engine_end_left_scenes(struct engine *engine)
         scene_end(engine, scene);
 }
 
-/* The scene to evict for an owner: its own oldest one; without one, as with too many lingering scenes. */
-static struct engine_scene *first_to_give_way(const struct engine *engine, uint64_t principal)
-{
-    struct engine_scene *own = NULL;
-    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        if (is_left(scene) && scene->principal == principal && (!own || scene->left_ns < own->left_ns))
-            own = scene;
-    }
-    return own ? own : first_to_go(engine, true);
-}
-
 uint64_t engine_left_table_bytes(const struct engine *engine)
 {
     uint64_t bytes = 0;
@@ -268,13 +214,13 @@ uint64_t engine_left_table_bytes(const struct engine *engine)
     return bytes;
 }
 
-void engine_trim_tables(struct engine *engine, uint64_t principal)
+void engine_trim_tables(struct engine *engine)
 {
     uint64_t limit_bytes = engine->options.limits.scene.host_bytes;
     struct engine_scene *scene;
     if (!limit_bytes || engine->table_bytes - engine_left_table_bytes(engine) > limit_bytes)
         return;
-    while (engine->table_bytes > limit_bytes && (scene = first_to_give_way(engine, principal)))
+    while (engine->table_bytes > limit_bytes && (scene = first_to_go(engine, true)))
         scene_end(engine, scene);
 }
 
@@ -284,7 +230,7 @@ static uint64_t blob_bytes_of(const struct engine_scene *scene)
     return scene->known.host_bytes - scene->known.table_bytes;
 }
 
-void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes)
+void engine_trim_blobs(struct engine *engine, uint64_t bytes)
 {
     uint64_t left_bytes = 0;
     for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
@@ -292,7 +238,7 @@ void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes
     struct engine_scene *scene;
     if (left_bytes < bytes)
         return;
-    for (uint64_t freed_bytes = 0; freed_bytes < bytes && (scene = first_to_give_way(engine, principal));) {
+    for (uint64_t freed_bytes = 0; freed_bytes < bytes && (scene = first_to_go(engine, true));) {
         freed_bytes += blob_bytes_of(scene);
         scene_end(engine, scene);
     }
@@ -300,7 +246,7 @@ void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes
 
 /* ---- coming to a scene -------------------------------------------------------------------------- */
 
-/* The scene of that name, the owner's kept one before a shared one; NULL: none. */
+/* The scene of that name, the client's own kept one before a shared one; NULL: none. */
 static struct engine_scene *find_by_name(const struct engine *engine, const struct engine_command *command)
 {
     struct engine_scene *found = NULL;
@@ -312,7 +258,8 @@ static struct engine_scene *find_by_name(const struct engine *engine, const stru
     return found;
 }
 
-/* Whether names collide: two scenes of one owner, or two shared ones. Kept scenes of other owners do not count. */
+/* A scene whose name collides: two scenes of one principal, or two shared ones. Kept scenes of others do not
+ * count. */
 static struct engine_scene *find_namesake(const struct engine *engine, const struct engine_command *command)
 {
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
@@ -324,7 +271,7 @@ static struct engine_scene *find_namesake(const struct engine *engine, const str
     return NULL;
 }
 
-/* An owner's scene without a holder cedes its name to a new one. */
+/* A client's own scene without a holder cedes its name to a new one. */
 static bool name_is_free(struct engine *engine, const struct engine_command *command, struct error *error)
 {
     if (command->sharing == SHARING_PRIVATE)
@@ -366,7 +313,6 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
     scene->frames_ended = 1;
     scene->sharing = command->sharing;
     scene->principal = command->principal;
-    scene->owner = command->owner;
     if (command->kept_revision) {
         scene->scene->revision = command->kept_revision - 1;
         scene->kept_revision = command->kept_revision;

@@ -44,7 +44,7 @@ static void group_advance(struct schedule_group *group)
         group->min_ns = group->next_ns;
 }
 
-/* More than once, if the share is an owner's or a client's. */
+/* Called more than once for a client with several jobs. */
 static void share_settle(struct schedule_share *share, const struct scheduler *scheduler,
                          const struct schedule_group *group)
 {
@@ -63,10 +63,9 @@ static bool goes_before(const struct schedule_share *a, const struct schedule_sh
 
 static void begin(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
 {
-    group_begin(&scheduler->owners);
+    group_begin(&scheduler->clients);
     for (size_t i = 0; i < count; i++) {
-        entries[i].owner->share.ready = entries[i].client->share.ready = false;
-        group_begin(&entries[i].owner->clients);
+        entries[i].client->share.ready = false;
         group_begin(&entries[i].client->jobs);
     }
 }
@@ -74,27 +73,21 @@ static void begin(struct scheduler *scheduler, const struct schedule_entry *entr
 static void look(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
-        struct schedule_owner *owner = entries[i].owner;
         struct schedule_client *client = entries[i].client;
-        scheduler->owners.ready_count += entries[i].ready && !owner->share.ready;
-        owner->clients.ready_count += entries[i].ready && !client->share.ready;
+        scheduler->clients.ready_count += entries[i].ready && !client->share.ready;
         client->jobs.ready_count += entries[i].ready;
-        owner->share.ready |= entries[i].ready;
         client->share.ready |= entries[i].ready;
         entries[i].job->ready = entries[i].ready;
         group_look(&client->jobs, scheduler, entries[i].job);
     }
-    for (size_t i = 0; i < count; i++) {
-        group_look(&scheduler->owners, scheduler, &entries[i].owner->share);
-        group_look(&entries[i].owner->clients, scheduler, &entries[i].client->share);
-    }
+    for (size_t i = 0; i < count; i++)
+        group_look(&scheduler->clients, scheduler, &entries[i].client->share);
 }
 
 static bool entry_goes_before(const struct schedule_entry *a, const struct schedule_entry *b)
 {
-    return a->owner != b->owner     ? goes_before(&a->owner->share, &b->owner->share)
-           : a->client != b->client ? goes_before(&a->client->share, &b->client->share)
-                                    : goes_before(a->job, b->job);
+    return a->client != b->client ? goes_before(&a->client->share, &b->client->share)
+                                  : goes_before(a->job, b->job);
 }
 
 size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
@@ -103,23 +96,17 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
     scheduler->picks++;
     begin(scheduler, entries, count);
     look(scheduler, entries, count);
-    group_advance(&scheduler->owners);
+    group_advance(&scheduler->clients);
     for (size_t i = 0; i < count; i++) {
         const struct schedule_entry *entry = &entries[i];
-        group_advance(&entry->owner->clients);
         group_advance(&entry->client->jobs);
-        share_settle(&entry->owner->share, scheduler, &scheduler->owners);
-        share_settle(&entry->client->share, scheduler, &entry->owner->clients);
+        share_settle(&entry->client->share, scheduler, &scheduler->clients);
         share_settle(entry->job, scheduler, &entry->client->jobs);
         if (entry->ready && (best == SCHEDULE_NONE || entry_goes_before(entry, &entries[best])))
             best = i;
     }
-    /* Beside other owners, an owner's turns are no longer for having many clients. */
-    uint32_t competitors = scheduler->owners.ready_count;
-    if (competitors == 1)
-        competitors = entries[best].owner->clients.ready_count;
     scheduler->turn_ns = 0;
-    scheduler->turn_end_ns = turn_ns(competitors);
+    scheduler->turn_end_ns = turn_ns(scheduler->clients.ready_count);
     return best;
 }
 
@@ -139,13 +126,12 @@ static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t t
 }
 
 void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
-                     uint32_t weight, uint32_t granted_weight)
+                     uint32_t weight)
 {
     uint64_t charged_ns = without_outliers(entry->client, slice_ns);
     uint64_t turn = ++scheduler->turns;
     scheduler->turn_ns += slice_ns;
     /* A slice below the clock's resolution is charged a little, or its job would have every turn. */
-    charge(&entry->owner->share, charged_ns / granted_weight + 1, turn);
     charge(&entry->client->share, charged_ns / weight + 1, turn);
     charge(entry->job, charged_ns / weight + 1, turn);
 }

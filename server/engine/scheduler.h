@@ -2,11 +2,10 @@
 /* Chooses the job of the next slice. Pure: no clock, no GL, no socket.
  *
  * Fair queueing by virtual time: the time that the GL thread has spent on a job, divided by the job's weight. The
- * owner with the minimum is next, of its clients the one with the minimum, and of that client's jobs the same; so
- * each gets its share of time however long its slices are, however many clients and jobs others have, and whatever
- * weight they ask for: between owners, the weight that is granted counts. A client that arrives, or returns after
- * a pause, begins at the minimum of those that are ready: it is among the next, and has no claim on the time that
- * it missed.
+ * client with the minimum is next, and the job of that client with the minimum; so a view has its share of time
+ * beside a batch, however long the batch's slices are. A client that arrives, or returns after a pause, begins at
+ * the minimum of those that are ready: it is among the next, and has no claim on the time that it missed. All
+ * clients of a process are one user's, or share a scene: between users, the operating system divides the time.
  *
  * Some slices are very long: the first ones compile programs, upload the scene and build its structures, for all
  * later users. The job of such a slice waits afterwards, but not much longer than SCHEDULE_WAIT_MAX_NS.
@@ -22,8 +21,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Of an owner, of a client among those of its owner, or of a job among those of its client. All-zero: it has just
- * arrived. */
+/* Time of a client, or of a job among those of its client. All-zero: it has just arrived. */
 struct schedule_share {
     uint64_t virtual_ns;
     uint64_t turn;     /* number of its last slice; among equals the longest waiting is next */
@@ -31,17 +29,12 @@ struct schedule_share {
     bool ready;        /* during a pick */
 };
 
-/* The competitors for a turn: all owners, the clients of one, or the jobs of one client. */
+/* The competitors for a turn: all clients, or the jobs of one client. */
 struct schedule_group {
     uint64_t min_ns; /* the minimum virtual time of those that were ready; never decreases */
     /* During a pick. */
     uint64_t next_ns;
     uint32_t ready_count;
-};
-
-struct schedule_owner {
-    struct schedule_share share;
-    struct schedule_group clients;
 };
 
 struct schedule_client {
@@ -51,14 +44,13 @@ struct schedule_client {
 };
 
 struct scheduler {
-    struct schedule_group owners;
+    struct schedule_group clients;
     uint64_t picks, turns;
     uint64_t turn_ns, turn_end_ns; /* since the pick of the last slice */
 };
 
 struct schedule_entry {
-    struct schedule_owner *owner;   /* of several clients the same one */
-    struct schedule_client *client; /* of several jobs the same one */
+    struct schedule_client *client; /* the same one of several jobs */
     struct schedule_share *job;
     bool ready;
 };
@@ -75,10 +67,9 @@ struct schedule_entry {
 /* The index of the entry whose slice is next, which is to be charged; SCHEDULE_NONE: none is ready. Entries that
  * are not passed are not ready. */
 size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count);
-/* Charges a slice to a job. Weights are at least 1: the one that its client gives it, and what of that counts
- * among owners. */
+/* Charges a slice to a job, whose weight is at least 1. */
 void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
-                     uint32_t weight, uint32_t granted_weight);
+                     uint32_t weight);
 
 /* Whether the job of the last slice may continue without another pick, if its frame is better finished. */
 bool schedule_turn_lasts(const struct scheduler *scheduler);

@@ -145,11 +145,25 @@ static bool is_at_home(const struct auth_identity *identity)
     return identity->has_user && (identity->user == 0 || identity->user == geteuid());
 }
 
-static bool has_place(const struct caller *caller)
+/* False: `text` says why. */
+static bool has_place(const struct caller *caller, uint64_t owner, char text[HANDSHAKE_TEXT_MAX_BYTES + 1])
 {
-    const struct front *front = caller->front;
-    const uint32_t places = front->options.limits.clients + (is_at_home(&caller->identity) ? PLACES_AT_HOME : 0);
-    return workers_clients(front) < places;
+    const struct front_limits *limits = &caller->front->options.limits;
+    const size_t text_bytes = HANDSHAKE_TEXT_MAX_BYTES + 1;
+    const bool at_home = is_at_home(&caller->identity);
+    const uint32_t own = workers_clients_of(caller->front, owner);
+    if (caller->front->stopping)
+        snprintf(text, text_bytes, "the daemon is about to stop");
+    else if (workers_clients(caller->front) >= limits->clients + (at_home ? PLACES_AT_HOME : 0))
+        snprintf(text, text_bytes, "%u clients are connected, the limit; try again later", limits->clients);
+    else if (!at_home && own >= limits->clients_of_one)
+        snprintf(text, text_bytes,
+                 "%u of %u places are taken by the user or key of this client, its share; close one, try again "
+                 "later, or raise limits.share in the daemon's configuration",
+                 own, limits->clients);
+    else
+        return true;
+    return false;
 }
 
 static void refuse(struct caller *caller, const char *why)
@@ -178,6 +192,7 @@ static void on_route(void *context, const struct handshake_hello *hello)
 {
     struct caller *caller = context;
     struct front *front = caller->front;
+    const uint64_t owner = auth_owner_number(&caller->identity, &caller->peer);
     char text[HANDSHAKE_TEXT_MAX_BYTES + 1];
     struct error error = {0};
     struct decode_error unlike = {0};
@@ -190,14 +205,11 @@ static void on_route(void *context, const struct handshake_hello *hello)
         connection_refuse(caller->connection, "the daemon's key was replaced; connect with the new one", 0);
         return;
     }
-    if (front->stopping || !has_place(caller)) {
-        snprintf(text, sizeof(text), "%u clients are connected, the limit; try again later",
-                 front->options.limits.clients);
-        refuse(caller, front->stopping ? "the daemon is about to stop" : text);
+    if (!has_place(caller, owner, text)) {
+        refuse(caller, text);
         return;
     }
-    caller->worker =
-        workers_of(front, auth_owner_number(&caller->identity, &caller->peer), caller->identity.name, &error);
+    caller->worker = workers_of(front, owner, caller->identity.name, &error);
     if (!caller->worker)
         refuse(caller, error.text);
     else if (caller->worker->is_ready)

@@ -22,6 +22,7 @@
 
 struct front_limits {
     uint32_t clients;                     /* that all workers serve */
+    uint32_t clients_of_one;              /* that one of them serves */
     uint32_t unauthenticated;             /* connections whose hello has not come */
     uint32_t unauthenticated_per_address; /* from one TCP peer */
     uint32_t handshakes_a_second;         /* sealed ones, from one network; further ones wait */

@@ -401,11 +401,24 @@ struct worker *workers_of(struct front *front, uint64_t owner, const char *name,
     return worker;
 }
 
+static uint32_t clients_of(const struct worker *worker)
+{
+    return worker->counts.clients + (worker->handed - worker->counts.handed);
+}
+
 uint32_t workers_clients(const struct front *front)
 {
     uint32_t clients = 0;
     for (const struct worker *worker = front->workers; worker; worker = worker->next)
-        clients += worker->counts.clients + (worker->handed - worker->counts.handed);
+        clients += clients_of(worker);
+    return clients;
+}
+
+uint32_t workers_clients_of(const struct front *front, uint64_t owner)
+{
+    uint32_t clients = 0;
+    for (const struct worker *worker = front->workers; worker; worker = worker->next)
+        clients += worker->has_owner && worker->owner == owner ? clients_of(worker) : 0;
     return clients;
 }
 

@@ -36,6 +36,7 @@ void workers_assign(struct worker *worker, uint64_t owner, const char *name);
 /* The owner's, started if there is none. */
 struct worker *workers_of(struct front *front, uint64_t owner, const char *name, struct error *error);
 uint32_t workers_clients(const struct front *front);
+uint32_t workers_clients_of(const struct front *front, uint64_t owner);
 void workers_stop(struct front *front); /* asks them to end */
 void workers_kill(struct front *front);
 /* Asks each that is ready for a sign, and kills those that have given none several times. */

@@ -36,7 +36,7 @@ void edits_count(struct session *session, int64_t edits, int64_t bytes)
 {
     session->transaction_edits += (size_t)edits;
     session->transaction_bytes += (uint64_t)bytes;
-    hub_count_edits(session->hub, session->owner, bytes);
+    session->hub->transaction_bytes += (uint64_t)bytes;
 }
 
 void transaction_destroy(struct session *session, struct transaction *transaction)
@@ -55,13 +55,12 @@ static bool account(struct session *session, struct transaction *transaction, ui
 {
     const struct hub *hub = session->hub;
     const struct session_limits *limits = &hub->options.limits;
-    if (!owner_may_have(session->owner->transaction_bytes, hub->transaction_bytes, bytes,
-                        limits->transaction_bytes, limits->share_percent)) {
+    const uint64_t used_bytes = hub->transaction_bytes, limit_bytes = limits->transaction_bytes;
+    if (bytes > limit_bytes || used_bytes > limit_bytes - bytes) {
         error_set(error, ERROR_LIMIT, "transaction",
-                  "edits that wait to be committed take %" PRIu64 " bytes, %" PRIu64
-                  " of them those of this user or key; the limits are %" PRIu64 " and %" PRIu64,
-                  hub->transaction_bytes, session->owner->transaction_bytes, limits->transaction_bytes,
-                  owner_share(limits->transaction_bytes, limits->share_percent));
+                  "edits that wait to be committed take %" PRIu64 " bytes, and %" PRIu64
+                  " more would be needed; the limit is %" PRIu64,
+                  used_bytes, bytes, limit_bytes);
         return error_remedy(error, "commit fewer edits at a time and wait for the answer, or raise "
                                    "memory.transactions in the daemon's configuration");
     }

@@ -19,7 +19,6 @@ struct pending_frame {
     uint32_t request; /* the job's, or that of a view that it has replaced */
     struct engine_frame *frame;
     struct hub *counted_by; /* its bytes, counted apart from those of jobs; NULL: they count as the job's */
-    struct owner *owner;    /* as whose, a reference; NULL: likewise */
     bool begun;
     bool queued;                     /* all that is to go is with the connection */
     size_t end_bytes;                /* that are to go: all, or less where it is cut */
@@ -37,10 +36,8 @@ static void engine_frame_destroy(struct engine_frame *frame)
 static void release(struct out_chunk *chunk)
 {
     struct pending_frame *pending = (struct pending_frame *)(void *)chunk;
-    if (pending->counted_by) {
-        hub_count_frames(pending->counted_by, pending->owner, -(int64_t)pending->chunk.size_bytes);
-        owner_unref(&pending->counted_by->owners, pending->owner);
-    }
+    if (pending->counted_by)
+        pending->counted_by->frame_bytes -= pending->chunk.size_bytes;
     engine_frame_destroy(pending->frame);
     free(pending);
 }
@@ -119,8 +116,7 @@ bool frames_keep_begun(struct job *job)
     job->end = &begun->next;
     if (!begun->counted_by) {
         begun->counted_by = job->session->hub;
-        begun->owner = owner_ref(job->session->owner);
-        hub_count_frames(begun->counted_by, begun->owner, (int64_t)begun->chunk.size_bytes);
+        begun->counted_by->frame_bytes += begun->chunk.size_bytes;
     }
     return begun->request == job->request;
 }

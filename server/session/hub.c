@@ -12,10 +12,8 @@
 #define RETRY_NS UINT64_C(2000000)
 /* Maximum of engine events that are handled before clients get their turn again. */
 #define EVENTS_A_TURN 64
-/* An owner with so many commands that wait for the engine is not read from until half of them are gone. */
-#define OWNER_COMMANDS_MAX 64
-#define STATS_AT_ONCE 4
-#define OWNER_ITSELF UINT64_MAX
+/* With so many commands that wait for the engine, no client is read from until half of them are gone. */
+#define COMMANDS_MAX 64
 
 /* ---- commands ---------------------------------------------------------------------------------------- */
 
@@ -36,153 +34,67 @@ static bool try_submit(struct hub *hub, struct engine_command *command)
     return hub->options.engine.submit(hub->options.engine.context, command, &error);
 }
 
-/* ---- turns ------------------------------------------------------------------------------------------- */
+/* ---- waiting for the engine -------------------------------------------------------------------------- */
 
-static void hold(struct hub *hub, struct owner *owner, bool held)
+static void hold(struct hub *hub, bool held)
 {
     size_t cursor = 0;
-    void *value;
-    owner->held = held;
-    while (hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
-        struct session *session = value;
-        if (session->owner == owner)
-            session_hold(session, held);
-    }
-}
-
-static void append_turn(struct hub *hub, struct owner *owner)
-{
-    owner->next = NULL;
-    *hub->turn_end = owner;
-    hub->turn_end = &owner->next;
-}
-
-static struct owner *take_turn(struct hub *hub)
-{
-    struct owner *owner = hub->turn_first;
-    hub->turn_first = owner->next;
-    if (!hub->turn_first)
-        hub->turn_end = &hub->turn_first;
-    return owner;
-}
-
-/* Figures are much work for who asks nothing of the engine but them. */
-static bool waits_for_stats(const struct owner *owner)
-{
-    return owner->waiting->kind == ENGINE_STATS && owner->stats_asked >= STATS_AT_ONCE;
-}
-
-/* The first command of the owner whose turn it is. False: the engine's queue is full. */
-static bool feed_one(struct hub *hub)
-{
-    struct owner *owner = hub->turn_first;
-    if (waits_for_stats(owner)) {
-        take_turn(hub)->waits_for_stats = true;
-        return true;
-    }
-    bool is_stats = owner->waiting->kind == ENGINE_STATS;
-    struct engine_command *next = owner->waiting->next; /* the engine may destroy the command */
-    if (!try_submit(hub, owner->waiting))
-        return false;
-    owner->waiting = next;
-    owner->waiting_count--;
-    owner->stats_asked += is_stats;
-    take_turn(hub);
-    if (owner->held && owner->waiting_count <= OWNER_COMMANDS_MAX / 2)
-        hold(hub, owner, false);
-    if (next) {
-        append_turn(hub, owner);
-    } else {
-        owner->waiting_end = &owner->waiting;
-        owner_unref(&hub->owners, owner);
-    }
-    return true;
+    void *session;
+    hub->held = held;
+    while (hashmap_next(&hub->sessions, &cursor, NULL, &session))
+        session_hold(session, held);
 }
 
 static void feed(struct hub *hub)
 {
-    while (hub->turn_first && feed_one(hub))
-        continue;
-    if (hub->turn_first && !hub->retry_timer.running)
+    while (hub->waiting) {
+        struct engine_command *next = hub->waiting->next; /* the engine may destroy the command */
+        if (!try_submit(hub, hub->waiting))
+            break;
+        hub->waiting = next;
+        hub->waiting_count--;
+    }
+    if (!hub->waiting)
+        hub->waiting_end = &hub->waiting;
+    else if (!hub->retry_timer.running)
         loop_timer_start(hub->loop, &hub->retry_timer, RETRY_NS);
+    if (hub->held && hub->waiting_count <= COMMANDS_MAX / 2)
+        hold(hub, false);
 }
 
-void hub_submit(struct hub *hub, struct owner *owner, struct engine_command *command)
+void hub_submit(struct hub *hub, struct engine_command *command)
 {
     command->next = NULL;
-    command->owner = owner->number;
-    *owner->waiting_end = command;
-    owner->waiting_end = &command->next;
-    if (owner->waiting_count++ == 0)
-        append_turn(hub, owner_ref(owner));
+    *hub->waiting_end = command;
+    hub->waiting_end = &command->next;
+    hub->waiting_count++;
     feed(hub);
-    if (owner->waiting_count >= OWNER_COMMANDS_MAX && !owner->held) {
-        log_write(LOG_DEBUG, "session", "the engine's queue is full; clients of one owner wait");
-        hold(hub, owner, true);
+    if (hub->waiting_count >= COMMANDS_MAX && !hub->held) {
+        log_write(LOG_DEBUG, "session", "the engine's queue is full; clients wait");
+        hold(hub, true);
     }
-}
-
-static void stats_answered(struct hub *hub, uint64_t number)
-{
-    struct owner *owner = hashmap_get(&hub->owners.by_number, number);
-    if (!owner || !owner->stats_asked)
-        return; /* that owner was gone in between */
-    owner->stats_asked--;
-    if (!owner->waits_for_stats)
-        return;
-    owner->waits_for_stats = false;
-    append_turn(hub, owner);
-    feed(hub);
 }
 
 /* ---- memory ------------------------------------------------------------------------------------------ */
 
-void hub_count_frames(struct hub *hub, struct owner *owner, int64_t bytes)
+void hub_departed(struct hub *hub, uint64_t client, uint64_t transaction_bytes)
 {
-    hub->frame_bytes += (uint64_t)bytes;
-    owner->frame_bytes += (uint64_t)bytes;
-}
-
-void hub_count_edits(struct hub *hub, struct owner *owner, int64_t bytes)
-{
-    hub->transaction_bytes += (uint64_t)bytes;
-    owner->transaction_bytes += (uint64_t)bytes;
-}
-
-struct departed {
-    struct owner *owner;
-    uint64_t transaction_bytes;
-};
-
-void hub_departed(struct hub *hub, uint64_t client, struct owner *owner, uint64_t transaction_bytes)
-{
-    struct departed *departed = transaction_bytes ? calloc(1, sizeof(*departed)) : NULL;
-    if (!departed || !hashmap_put(&hub->departed, client, departed)) {
-        free(departed);
-        hub_count_edits(hub, owner, -(int64_t)transaction_bytes);
-        return;
-    }
-    *departed = (struct departed){owner_ref(owner), transaction_bytes};
+    if (transaction_bytes && !hashmap_put(&hub->departed, client, (void *)(uintptr_t)transaction_bytes))
+        hub->transaction_bytes -= transaction_bytes;
 }
 
 static void forgotten(struct hub *hub, uint64_t client)
 {
-    struct departed *departed = hashmap_remove(&hub->departed, client);
-    if (!departed)
-        return;
-    hub_count_edits(hub, departed->owner, -(int64_t)departed->transaction_bytes);
-    owner_unref(&hub->owners, departed->owner);
-    free(departed);
+    hub->transaction_bytes -= (uintptr_t)hashmap_remove(&hub->departed, client);
 }
 
-void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes)
+void hub_trim(struct hub *hub, uint64_t bytes)
 {
     struct engine_command *command = hub_command(ENGINE_SCENES_TRIM, 0, 0);
     if (!command)
         return;
-    command->principal = principal;
     command->trim_bytes = bytes;
-    hub_submit(hub, hub->itself, command);
+    hub_submit(hub, command);
 }
 
 static void retry(void *context)
@@ -202,8 +114,6 @@ static void on_engine(void *context, uint32_t epoll_events)
         if (!event)
             return;
         struct session *session = hashmap_get(&hub->sessions, event->client);
-        if (event->answers_stats)
-            stats_answered(hub, event->owner);
         if (event->kind == ENGINE_CLIENT_FORGOTTEN)
             forgotten(hub, event->client);
         if (event->kind == ENGINE_CLIENT_FORGOTTEN || event->kind == ENGINE_SCENE_ENDED)
@@ -224,13 +134,9 @@ bool hub_add_client(struct hub *hub, int fd, const struct handover *handover, st
 {
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
-    struct owner *owner = owner_find(&hub->owners, auth_owner_number(&handover->identity, &handover->peer));
-    if (!owner)
-        return error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
     if (handover->is_owner)
         hub->owner = hub->last_number + 1;
-    struct session *session = session_create(hub, hub->last_number + 1, fd, handover, owner, error);
-    owner_unref(&hub->owners, owner);
+    struct session *session = session_create(hub, hub->last_number + 1, fd, handover, error);
     if (!session)
         return false;
     if (!hashmap_put(&hub->sessions, ++hub->last_number, session)) {
@@ -238,7 +144,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct handover *handover, st
         session_close(session);
         return true;
     }
-    if (session->owner->held)
+    if (hub->held)
         session_hold(session, true);
     return true;
 }
@@ -277,7 +183,7 @@ bool hub_reload(struct hub *hub, const struct hub_options *options, struct error
     if (!command)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     command->limits = options->engine_limits;
-    hub_submit(hub, hub->itself, command);
+    hub_submit(hub, command);
     hub->options.limits = options->limits;
     set_connection_limits(hub, &options->connection_limits);
     hub->options.engine_limits = options->engine_limits;
@@ -298,11 +204,10 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
         .retry_timer = {.call = retry, .context = hub},
     };
     set_connection_limits(hub, &options->connection_limits);
-    hub->turn_end = &hub->turn_first;
-    hub->itself = owner_find(&hub->owners, OWNER_ITSELF);
+    hub->waiting_end = &hub->waiting;
     hub->blobs = blob_store_create(options->limits.blob_bytes, options->limits.blob_cache_bytes);
     hub->others = others_create(hub);
-    if (!hub->blobs || !hub->itself || !hub->others) {
+    if (!hub->blobs || !hub->others) {
         error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
         goto fail;
     }
@@ -315,8 +220,6 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
 fail:
     others_destroy(hub->others);
     blob_store_destroy(hub->blobs);
-    owner_unref(&hub->owners, hub->itself);
-    owners_finish(&hub->owners);
     return false;
 }
 
@@ -324,21 +227,11 @@ void hub_finish(struct hub *hub)
 {
     loop_watch_remove(hub->engine_watch);
     loop_timer_stop(hub->loop, &hub->retry_timer);
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&hub->owners.by_number, &cursor, NULL, &value)) {
-        struct owner *owner = value;
-        for (struct engine_command *command; (command = owner->waiting);) {
-            owner->waiting = command->next;
-            engine_command_destroy(command);
-        }
-        free(owner);
+    for (struct engine_command *command; (command = hub->waiting);) {
+        hub->waiting = command->next;
+        engine_command_destroy(command);
     }
-    cursor = 0;
-    while (hashmap_next(&hub->departed, &cursor, NULL, &value))
-        free(value);
     hashmap_finish(&hub->departed);
-    owners_finish(&hub->owners);
     others_destroy(hub->others);
     hasher_destroy(hub->hasher);
     blob_store_destroy(hub->blobs);

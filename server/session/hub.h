@@ -12,7 +12,7 @@
 #include "session/engine_port.h"
 #include "session/hasher.h"
 #include "session/limits.h"
-#include "session/owners.h"
+#include "session/principals.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -39,12 +39,9 @@ struct hub {
     struct blob_store *blobs;
     struct hasher *hasher;   /* NULL: the network thread hashes itself */
     struct hashmap sessions; /* struct session *, by number */
-    struct owners owners;
-    struct owner *itself; /* of commands that no client has asked for */
-    struct hashmap
-        departed;         /* struct departed *, by number: clients that are gone and that the engine still knows */
-    size_t introduced;    /* sessions whose hello is done */
-    uint64_t frame_bytes; /* maximum of the frames of all jobs */
+    struct hashmap departed; /* bytes of edits, by number: clients that are gone and that the engine still knows */
+    uint32_t introduced;     /* sessions whose hello is done */
+    uint64_t frame_bytes;    /* maximum of the frames of all jobs */
     uint64_t transaction_bytes; /* of edits that are not answered */
     uint64_t last_number;
     bool stopping;
@@ -59,8 +56,10 @@ struct hub {
 
     struct others *others; /* the daemon's other workers */
     struct loop_watch *engine_watch;
-    /* Owners with commands that did not fit the engine's queue, in the order of their turns. */
-    struct owner *turn_first, **turn_end;
+    /* Commands that did not fit the engine's queue, in order. */
+    struct engine_command *waiting, **waiting_end;
+    size_t waiting_count;
+    bool held; /* so many that clients are not read from */
     struct loop_timer retry_timer;
 };
 
@@ -76,15 +75,12 @@ void hub_stop(struct hub *hub);
  * nothing is changed. */
 bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error);
 
-/* Submits a command to the engine, now or as soon as its queue has space; owners take turns. */
-void hub_submit(struct hub *hub, struct owner *owner, struct engine_command *command);
-/* Memory that an owner's frames, and its edits, take from now on (or give back, if negative). */
-void hub_count_frames(struct hub *hub, struct owner *owner, int64_t bytes);
-void hub_count_edits(struct hub *hub, struct owner *owner, int64_t bytes);
+/* Submits a command to the engine, now or as soon as its queue has space. */
+void hub_submit(struct hub *hub, struct engine_command *command);
 /* A client is gone whose edits the engine may hold until it has forgotten the client. */
-void hub_departed(struct hub *hub, uint64_t client, struct owner *owner, uint64_t transaction_bytes);
-/* The principal lacks that many bytes for blobs: evicts scenes without a holder, its own first. */
-void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes);
+void hub_departed(struct hub *hub, uint64_t client, uint64_t transaction_bytes);
+/* That many bytes for blobs are lacking: evicts scenes without a holder. */
+void hub_trim(struct hub *hub, uint64_t bytes);
 /* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */
 struct engine_command *hub_command(enum engine_command_kind kind, uint64_t client, uint32_t request);
 

@@ -278,13 +278,12 @@ static bool check_room(const struct session *session, const struct message_rende
     const struct session_limits *limits = &hub->options.limits;
     uint64_t bytes = job_bytes(session, render), limit_bytes = limits->frame_bytes;
     uint64_t before_bytes = before ? before->frame_bytes + frames_bytes_of_before(before) : 0;
-    uint64_t all_bytes = hub->frame_bytes - before_bytes, own_bytes = session->owner->frame_bytes - before_bytes;
-    if (!all_bytes || owner_may_have(own_bytes, all_bytes, bytes, limit_bytes, limits->share_percent))
+    uint64_t used_bytes = hub->frame_bytes - before_bytes;
+    if (!used_bytes || (bytes <= limit_bytes && used_bytes <= limit_bytes - bytes))
         return true;
     error_set(error, ERROR_BUSY, "render",
-              "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64 " of %" PRIu64
-              ", those of this user or key %" PRIu64 " of %" PRIu64,
-              bytes, all_bytes, limit_bytes, own_bytes, owner_share(limit_bytes, limits->share_percent));
+              "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64 " of %" PRIu64,
+              bytes, used_bytes, limit_bytes);
     return error_remedy(error,
                         "try again when jobs have ended, ask for smaller frames, or raise memory.frames in the "
                         "daemon's configuration");
@@ -443,11 +442,6 @@ static struct tracer_options options_of(const struct session *session, const str
 static void fill_rest(struct engine_job *job, const struct session *session, const struct message_render *render)
 {
     bool is_view = render->kind == PROTOCOL_JOB_VIEW;
-    const struct session_limits *limits = &session->hub->options.limits;
-    uint32_t usual = is_view ? WEIGHT_OF_VIEW : WEIGHT_OF_BATCH;
-    uint32_t weight = render->weight ? render->weight : usual;
-    uint32_t granted = is_view ? limits->view_weight : limits->batch_weight;
-    granted = granted ? granted : usual;
     *job = (struct engine_job){
         .keys = job->keys,
         .key_count = job->key_count,
@@ -520,8 +514,9 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .upsample = render->upsample,
         .pass_samples = render->pass_samples,
         .still_encoding = (enum encoding)render->still_encoding,
-        .weight = weight,
-        .granted_weight = weight < granted ? weight : granted,
+        .weight = render->weight ? render->weight
+                  : is_view      ? WEIGHT_OF_VIEW
+                                 : WEIGHT_OF_BATCH,
         .adapt = render->adapt != 0,
         .keeps_rate = render->moving_rate > 0.0f,
         .depth = {(enum depth_form)render->depth_form, render->depth_pixels, render->depth_radius},

@@ -62,7 +62,7 @@ static struct job *job_create(struct session *session, uint32_t request, const s
     job->engine_credit = allowed_credit(job);
     session->jobs = job;
     session->job_count++;
-    hub_count_frames(session->hub, session->owner, (int64_t)job->frame_bytes);
+    session->hub->frame_bytes += job->frame_bytes;
     job_watch_for_blocks(job);
     return job;
 }
@@ -167,7 +167,7 @@ static void tell_engine_credit(struct job *job)
     command->target_request = job->request;
     command->scene = job->scene;
     command->credit = allowed;
-    hub_submit(session->hub, session->owner, command);
+    hub_submit(session->hub, command);
     job->engine_credit = allowed;
 }
 
@@ -212,7 +212,7 @@ static void destroy(struct session *session, struct job *job)
         place = &(*place)->next;
     *place = job->next;
     session->job_count--;
-    hub_count_frames(session->hub, session->owner, -(int64_t)job->frame_bytes);
+    session->hub->frame_bytes -= job->frame_bytes;
     free(job);
 }
 

@@ -154,7 +154,7 @@ static bool carry_out(struct restoring *restoring, struct engine_command *comman
     uint64_t client = command->client;
     uint32_t request = command->request;
     command->scene = SCENE;
-    command->owner = command->principal = restoring->principal;
+    command->principal = restoring->principal;
     if (engine->submit(engine->context, command, error))
         return wait_for_answer(restoring, client, request, error);
     engine_command_destroy(command);

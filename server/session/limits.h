@@ -9,14 +9,13 @@
 
 struct session_limits {
     uint32_t clients;
-    uint32_t share_percent;   /* of what all clients may have together: what one user or key may have; 0: all */
-    uint32_t unauthenticated; /* connections whose handshake is not done, all together */
+    uint32_t share_percent;               /* of `clients`, what one user or key may have */
+    uint32_t unauthenticated;             /* connections whose handshake is not done, all together */
     uint32_t unauthenticated_per_address; /* from one TCP peer */
     uint32_t handshakes_a_second;         /* sealed ones, from one network; further ones wait */
     uint32_t requests_in_flight;
     uint32_t scenes_per_client;
     uint32_t jobs_per_client;
-    uint32_t view_weight, batch_weight; /* greatest weights among the jobs of all users; 0: default */
     uint32_t blobs_per_client;
     uint32_t transaction_edits; /* of a client, in all transactions that are not answered */
     uint32_t nodes;

@@ -201,7 +201,7 @@ static void take_question(struct others *others, const void *payload, size_t byt
         return;
     }
     command->principal = NOBODY;
-    hub_submit(others->hub, others->hub->itself, command);
+    hub_submit(others->hub, command);
 }
 
 void others_answer(struct others *others, const struct engine_event *event)

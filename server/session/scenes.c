@@ -304,7 +304,7 @@ static void on_searched(void *context, struct session *session, struct request *
     while (other && !find_entry(&other->message.scene_list_reply, search->name))
         other = other->next;
     if (session)
-        session_hold(session, session->owner->held);
+        session_hold(session, session->hub->held);
     if (session && other) {
         move_or_refuse(session, request, other->worker, search);
     } else if (session) {

@@ -67,7 +67,7 @@ void session_send_error(struct session *session, uint32_t request, const struct 
 void session_fail(struct session *session, const struct error *error)
 {
     struct error copy = *error;
-    if (log_is_due(session->owner->number, "disconnected"))
+    if (log_is_due(session->owner, "disconnected"))
         log_write(LOG_INFO, "session", "client %" PRIu64 " (%s, %s) is disconnected: %s: %s", session->number,
                   session->name, session->identity.name, copy.field, copy.text);
     connection_finish(session->connection, (enum protocol_error_code)error->kind, whole_characters(copy.field),
@@ -84,7 +84,7 @@ void session_fail_for_memory(struct session *session)
 void session_submit(struct session *session, struct request *request, struct engine_command *command)
 {
     if (command) {
-        hub_submit(session->hub, session->owner, command);
+        hub_submit(session->hub, command);
         return;
     }
     struct error error = {0};
@@ -244,8 +244,8 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
         .queued_soft_bytes = connection_limits->queued_soft_bytes,
         .device_memory_bytes = options->device_bytes,
         .blob_memory_bytes = limits->blob_bytes,
-        .transaction_memory_bytes = owner_share(limits->transaction_bytes, limits->share_percent),
-        .frame_memory_bytes = owner_share(limits->frame_bytes, limits->share_percent),
+        .transaction_memory_bytes = limits->transaction_bytes,
+        .frame_memory_bytes = limits->frame_bytes,
         .upload_window_bytes = limits->upload_window_bytes,
         .frame_window_bytes = limits->frame_window_bytes,
         .queued_soft_ms = connection_limits->queued_soft_ms,
@@ -276,27 +276,6 @@ static bool is_key_valid(const struct session *session)
     return !session->identity.has_key || auth_numbers_have(&session->hub->options.keys, &session->identity);
 }
 
-/* Whoever runs the daemon can always look at it. */
-static bool is_at_home(const struct session *session)
-{
-    const struct auth_identity *identity = &session->identity;
-    return identity->has_user && (identity->user == 0 || identity->user == geteuid());
-}
-
-static bool has_place(const struct session *session, char text[HANDSHAKE_TEXT_MAX_BYTES + 1])
-{
-    const struct session_limits *limits = &session->hub->options.limits;
-    const size_t text_bytes = HANDSHAKE_TEXT_MAX_BYTES + 1;
-    if (is_at_home(session) || session->owner->clients < owner_share(limits->clients, limits->share_percent))
-        return true;
-    snprintf(
-        text, text_bytes,
-        "%u of %u places are taken by the user or key of this client, its share; close one, try again later, or "
-        "raise limits.share in the daemon's configuration",
-        session->owner->clients, limits->clients);
-    return false;
-}
-
 static bool on_hello(void *context, const struct handshake_hello *hello, struct handshake_reply *reply)
 {
     struct session *session = context;
@@ -308,8 +287,6 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
         snprintf(reply->text, sizeof(reply->text), "%s", error.text);
     else if (hub->stopping)
         snprintf(reply->text, sizeof(reply->text), "the daemon is about to stop");
-    else if (is_key_valid(session))
-        has_place(session, reply->text);
     if (reply->version && reply->text[0])
         reply->capabilities = HANDSHAKE_TRY_AGAIN;
     if (!is_key_valid(session))
@@ -333,7 +310,7 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
 
 static void count_introduced(struct hub *hub, int more)
 {
-    hub->introduced += (size_t)more;
+    hub->introduced += (uint32_t)more;
     if (hub->counted)
         hub->counted(hub->call_context);
 }
@@ -341,7 +318,6 @@ static void count_introduced(struct hub *hub, int more)
 static void introduce(struct session *session)
 {
     session->introduced = true;
-    session->owner->clients++;
     count_introduced(session->hub, 1);
     log_write(LOG_DEBUG, "session", "client %" PRIu64 " is %s, %s", session->number, session->name,
               session->identity.name);
@@ -397,14 +373,12 @@ static void on_closed(void *context)
     upload_finish(session);
     scenes_finish(session);
     if (session->introduced) {
-        session->owner->clients--;
         count_introduced(hub, -1);
-        hub_departed(hub, session->number, session->owner, session->transaction_bytes);
-        hub_submit(hub, session->owner, session->farewell);
+        hub_departed(hub, session->number, session->transaction_bytes);
+        hub_submit(hub, session->farewell);
     } else {
         engine_command_destroy(session->farewell);
     }
-    owner_unref(&hub->owners, session->owner);
     bool was_owner = session->number == hub->owner;
     free(session);
     if (was_owner && hub->owner_gone)
@@ -426,7 +400,7 @@ static const struct connection_handler connection_handler = {
 /* ---- life -------------------------------------------------------------------------------------------- */
 
 struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct handover *handover,
-                               struct owner *owner, struct error *error)
+                               struct error *error)
 {
     struct session *session = calloc(1, sizeof(*session));
     if (!session) {
@@ -440,9 +414,10 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
     session->can_h264 = handover->can_h264;
     session->can_abandon = handover->can_abandon;
     memcpy(session->name, handover->name, sizeof(session->name));
+    session->owner = auth_owner_number(&session->identity, &session->peer);
     session->principal = principal_number(&session->identity, session->number);
     session->farewell = hub_command(ENGINE_CLIENT_GONE, number, 0);
-    const struct connection_entry entry = {.log_source = owner->number, .sharers = &owner->clients};
+    const struct connection_entry entry = {.log_source = session->owner, .sharers = &hub->introduced};
     const struct connection_saved *saved = handover->saved.bytes ? &handover->saved : NULL;
     session->connection = session->farewell ? connection_create(hub->loop, fd, connection_limits_of(session),
                                                                 &entry, &connection_handler, session, saved, error)
@@ -453,7 +428,6 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
         free(session);
         return NULL;
     }
-    session->owner = owner_ref(owner);
     if (handover->is_open) {
         introduce(session);
         upload_begin(session); /* which says again what its client knows */
@@ -466,7 +440,7 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
 static bool may_move(const struct session *session)
 {
     return session->connection->state == CONNECTION_OPEN && !session->connection->out.queued_bytes &&
-           session->owner->number == session->hub->worker_of && session->number != session->hub->owner &&
+           session->owner == session->hub->worker_of && session->number != session->hub->owner &&
            session->requests.in_flight.count == 1 && !session->scenes.count && !session->jobs &&
            !session->blobs.offer_count && !session->transaction_edits;
 }

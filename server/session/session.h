@@ -31,7 +31,7 @@ struct session {
     struct auth_identity identity;
     struct address peer;
     blob_principal principal;
-    struct owner *owner; /* whose share it uses */
+    uint64_t owner; /* auth_owner_number() */
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
     bool introduced;                 /* the hello is done: the engine may know it */
     bool can_h264;                   /* the client decodes it, and an encoder is here */
@@ -50,7 +50,7 @@ struct session {
 
 /* As hub_add_client(). */
 struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct handover *handover,
-                               struct owner *owner, struct error *error);
+                               struct error *error);
 /* Another worker is to serve it, which is to read `message` first. False: it cannot go, as it has more than this
  * one request, or does not read what it is told; nothing is changed. */
 bool session_move(struct session *session, uint32_t worker, uint32_t request, const struct message *message);

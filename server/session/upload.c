@@ -319,7 +319,7 @@ void upload_data(struct session *session, const struct framing_header *header,
         return;
     }
     if (offer && error.kind == ERROR_LIMIT)
-        hub_trim(session->hub, session->principal, blob_store_lacking(session->hub->blobs, offer->size_bytes));
+        hub_trim(session->hub, blob_store_lacking(session->hub->blobs, offer->size_bytes));
     requests_bury(session, request->id);
     request_answer_error(session, request, &error);
 }

@@ -107,7 +107,7 @@ void view_add_change(struct job *job, struct view_change *change)
 {
     *job->view->changes_end = change;
     job->view->changes_end = &change->next;
-    hub_count_frames(job->session->hub, job->session->owner, (int64_t)change->frame_bytes);
+    job->session->hub->frame_bytes += change->frame_bytes;
 }
 
 struct view_change *view_find_change(const struct job *job, uint32_t request)
@@ -132,7 +132,7 @@ static void take_out(struct session_view *view, struct view_change *change)
 void view_drop_change(struct job *job, struct view_change *change)
 {
     take_out(job->view, change);
-    hub_count_frames(job->session->hub, job->session->owner, -(int64_t)change->frame_bytes);
+    job->session->hub->frame_bytes -= change->frame_bytes;
     free(change);
 }
 
@@ -141,7 +141,7 @@ void view_switch(struct job *job)
     struct session_view *view = job->view;
     struct view_change *change = view->changes;
     take_out(view, change);
-    hub_count_frames(job->session->hub, job->session->owner, -(int64_t)job->frame_bytes);
+    job->session->hub->frame_bytes -= job->frame_bytes;
     job->request = change->request;
     job->scene = change->scene;
     job->tracer = change->tracer;
@@ -406,7 +406,7 @@ static void tell_engine(struct job *job)
         return;
     }
     command->scene = job->scene;
-    hub_submit(session->hub, session->owner, command);
+    hub_submit(session->hub, command);
 }
 
 void views_look(struct session *session, const struct message_view_camera *message)

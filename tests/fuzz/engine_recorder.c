@@ -386,8 +386,6 @@ static void say_stats(const struct engine_command *command)
     strcpy(stats->device.name, "recorder");
     struct engine_event *event = say(ENGINE_STATS_READY, command->client, command->request);
     event->stats = stats;
-    event->answers_stats = true;
-    event->owner = command->owner;
 }
 
 static void carry_out_on(struct engine_command *command, struct recorded_reference *reference)

@@ -247,7 +247,7 @@ void serving_check_empty(void)
     FUZZ_REQUIRE(serving_hub.sessions.count == 0);
     FUZZ_REQUIRE(serving_hub.introduced == 0);
     FUZZ_REQUIRE(serving_hub.frame_bytes == 0);
-    FUZZ_REQUIRE(!serving_hub.turn_first);
+    FUZZ_REQUIRE(!serving_hub.waiting);
     FUZZ_REQUIRE(blob_store_bytes(serving_hub.blobs) == 0);
     FUZZ_REQUIRE(recorder_jobs() == 0);
     FUZZ_REQUIRE(recorder_references() == 0);

@@ -138,6 +138,13 @@ class Workers(Case):
                        "they are there still")
             self.renders(self.client(daemon.tcp))
 
+    def test_one_network_leaves_places_for_others_and_the_daemons_user_has_all(self):
+        with self.daemon(environment={**os.environ, "FARLIGHT_LIMITS_CLIENTS": "6", "FARLIGHT_LIMITS_SHARE": "50"}) as daemon:
+            several = [self.client(daemon.tcp) for _ in range(3)]
+            self.assertIn("3 of 6 places", self.refusal(daemon.tcp))
+            for client in (*(self.client(daemon.path) for _ in range(4)), *several):
+                self.renders(client)
+
     def test_silent_connections_keep_no_one_out(self):
         """They give way to the next, whosever they are: only a client of their own may have to come again."""
         limits = {"FARLIGHT_LIMITS_UNAUTHENTICATED": "8", "FARLIGHT_LIMITS_UNAUTHENTICATED_PER_ADDRESS": "64",

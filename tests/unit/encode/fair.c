@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames that take long to encode: they keep no other owner's frames waiting, and are given up with their job. */
+/* Frames that take long to encode: they keep no other client's frames waiting, and are given up with their job. */
 #include "engine/encode_pool.h"
 
 #include "tests/harness/test.h"
@@ -48,7 +48,7 @@ struct fixture {
     struct queue *events;
     struct stage_totals totals;
     struct encode_pool *pool;
-    struct job_output *outputs[2]; /* of two owners */
+    struct job_output *outputs[2]; /* of two clients */
 };
 
 static void begin(struct fixture *fixture, unsigned threads)
@@ -57,17 +57,17 @@ static void begin(struct fixture *fixture, unsigned threads)
     *fixture = (struct fixture){.events = queue_create(64, false)};
     fixture->pool = encode_pool_create(
         &(struct encode_pool_options){.threads = threads, .totals = &fixture->totals, .on_done = on_done}, &error);
-    for (uint64_t owner = 0; owner < 2; owner++)
-        fixture->outputs[owner] = job_output_create(&(struct job_output_options){
-            .events = fixture->events, .client = owner, .owner = owner, .window = 32, .credit = UINT64_MAX});
+    for (uint64_t client = 0; client < 2; client++)
+        fixture->outputs[client] = job_output_create(&(struct job_output_options){
+            .events = fixture->events, .client = client, .window = 32, .credit = UINT64_MAX});
     assert_true(fixture->events && fixture->pool && fixture->outputs[0] && fixture->outputs[1]);
 }
 
-static void submit(struct fixture *fixture, unsigned owner, uint32_t edge, enum encoding encoding)
+static void submit(struct fixture *fixture, unsigned client, uint32_t edge, enum encoding encoding)
 {
-    uint64_t position = job_output_reserve(fixture->outputs[owner]);
+    uint64_t position = job_output_reserve(fixture->outputs[client]);
     assert_true(
-        encode_pool_submit(fixture->pool, fixture->outputs[owner], NULL, position, new_frame(edge, encoding)));
+        encode_pool_submit(fixture->pool, fixture->outputs[client], NULL, position, new_frame(edge, encoding)));
 }
 
 static void drop_event(void *item)
@@ -83,7 +83,7 @@ static void end(struct fixture *fixture)
     queue_destroy(fixture->events, drop_event);
 }
 
-TEST(one_owners_large_frames_leave_a_thread_to_others)
+TEST(one_clients_large_frames_leave_a_thread_to_others)
 {
     for (unsigned threads = 2; threads <= 3; threads++) {
         struct fixture fixture;

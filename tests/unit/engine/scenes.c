@@ -420,29 +420,6 @@ TEST(of_too_many_the_one_that_was_left_first_ends)
     attach(1, 3, "c");
 }
 
-TEST(a_client_with_many_lingering_scenes_loses_its_own)
-{
-    restart((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 3});
-    leave(1, "first", SHARING_SHARED);
-    static const char *const names[] = {"a", "b", "c", "d"};
-    for (uint32_t i = 0; i < 4; i++) {
-        open_as(2, 1 + i, names[i], SHARING_SHARED);
-        submit_commit(2, 10 + i, 1 + i);
-        expect_done(2, 10 + i);
-    }
-    for (uint32_t i = 0; i < 4; i++) {
-        close_scene(2, 20 + i, 1 + i);
-        expect_done(2, 20 + i);
-        if (i >= 2)
-            expect_ended();
-    }
-    attach_fails(3, 1, "a");
-    attach_fails(3, 2, "b");
-    attach(3, 3, "first");
-    attach(3, 4, "c");
-    attach(3, 5, "d");
-}
-
 TEST(a_left_scene_gives_its_name_to_a_new_one_of_the_same_user)
 {
     leave(1, "a", SHARING_SHARED);
@@ -476,46 +453,9 @@ TEST(lingering_scenes_are_evicted_where_memory_is_short)
     attach(1, 4, "c");
 }
 
-/* `nodes` in one commit. */
-static void leave_nodes(uint64_t client, const char *name, uint32_t nodes)
-{
-    open_as(client, 1, name, SHARING_SHARED);
-    submit(commit_of_nodes(client, 2, 1, nodes));
-    expect_done(client, 2);
-    client_goes(client);
-}
-
-TEST(a_client_that_needs_memory_loses_its_own_lingering_scenes_first)
-{
-    uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
-    restart((struct engine_options){.limits.scene_linger_ms = LONG_MS,
-                                    .limits.scene = {.host_bytes = limit_bytes, .nodes = 100}});
-    leave_nodes(1, "theirs", 30); /* the oldest */
-    leave_nodes(2, "mine", 30);
-    open_as(2, 3, "new", SHARING_PRIVATE);
-    submit(commit_of_nodes(2, 4, 3, 60));
-    expect_ended();
-    expect_done(2, 4);
-    attach_fails(2, 5, "mine");
-    attach(3, 1, "theirs"); /* it is held now */
-    open_as(2, 6, "newer", SHARING_PRIVATE);
-    submit(commit_of_nodes(2, 7, 6, 30));
-    expect_failed(2, 7, ERROR_LIMIT, "edits");
-    client_goes(3);
-    submit(commit_of_nodes(2, 8, 6, 60)); /* it would end in vain */
-    expect_failed(2, 8, ERROR_LIMIT, "edits");
-    attach(3, 1, "theirs");
-    client_goes(3);
-    submit(commit_of_nodes(2, 9, 6, 30)); /* the limit of all is reached */
-    expect_ended();
-    expect_done(2, 9);
-    attach_fails(3, 1, "theirs");
-}
-
-static void submit_trim(uint64_t client, uint64_t bytes)
+static void submit_trim(uint64_t bytes)
 {
     struct engine_command *made = command(ENGINE_SCENES_TRIM, 0, 0);
-    made->principal = principal_of(client);
     made->trim_bytes = bytes;
     submit(made);
 }
@@ -543,21 +483,22 @@ static void leave_spheres(uint64_t client, const char *name)
 
 TEST(lingering_scenes_are_evicted_for_the_bytes_of_blobs_that_are_lacking)
 {
-    leave_spheres(1, "theirs");
-    leave_spheres(2, "mine");
-    leave_spheres(2, "mine, too");
-    submit_trim(2, 3 * SPHERES_BYTES + 1); /* nobody can help */
-    submit_trim(2, 0);
-    attach(3, 1, "mine");
+    leave_spheres(1, "first");
+    leave_spheres(2, "second");
+    leave_spheres(2, "third");
+    submit_trim(3 * SPHERES_BYTES + 1); /* all of them would not suffice */
+    submit_trim(0);
+    attach(3, 1, "second");
     client_goes(3);
-    submit_trim(2, SPHERES_BYTES);
+    submit_trim(SPHERES_BYTES);
     expect_ended();
-    attach_fails(3, 1, "mine, too"); /* "mine" was left later */
-    submit_trim(2, SPHERES_BYTES + 1);
+    attach_fails(3, 1, "first");
+    submit_trim(1);
     expect_ended();
+    attach_fails(3, 2, "third"); /* "second" was left later */
+    submit_trim(1);
     expect_ended();
-    attach_fails(3, 2, "mine");
-    attach_fails(3, 3, "theirs");
+    attach_fails(3, 3, "second");
 }
 
 /* ---- what is told ------------------------------------------------------------------------------------ */

@@ -11,11 +11,10 @@
 /* Serves slices as the engine does, and counts the time that each job had. */
 static struct simulation {
     struct scheduler scheduler;
-    struct schedule_owner owners[JOBS_MAX];
     struct schedule_client clients[JOBS_MAX];
     struct schedule_share shares[JOBS_MAX];
     struct schedule_entry entries[JOBS_MAX];
-    uint32_t weights[JOBS_MAX], granted[JOBS_MAX];
+    uint32_t weights[JOBS_MAX];
     uint64_t slice_ns[JOBS_MAX];
     uint64_t had_ns[JOBS_MAX], waited_ns[JOBS_MAX], longest_wait_ns[JOBS_MAX];
     bool keeps_turn[JOBS_MAX]; /* as it has begun something */
@@ -32,23 +31,14 @@ static int begin(void **state)
 
 EACH_TEST(begin, NULL)
 
-static size_t add_of(size_t owner, size_t client, uint32_t weight, uint64_t slice_ns)
-{
-    size_t i = simulation.count++;
-    simulation.entries[i] = (struct schedule_entry){.owner = &simulation.owners[owner],
-                                                    .client = &simulation.clients[client],
-                                                    .job = &simulation.shares[i],
-                                                    .ready = true};
-    simulation.weights[i] = weight;
-    simulation.granted[i] = weight;
-    simulation.slice_ns[i] = slice_ns;
-    return i;
-}
-
-/* All clients are one owner's. */
 static size_t add(size_t client, uint32_t weight, uint64_t slice_ns)
 {
-    return add_of(0, client, weight, slice_ns);
+    size_t i = simulation.count++;
+    simulation.entries[i] = (struct schedule_entry){
+        .client = &simulation.clients[client], .job = &simulation.shares[i], .ready = true};
+    simulation.weights[i] = weight;
+    simulation.slice_ns[i] = slice_ns;
+    return i;
 }
 
 static size_t serve(void)
@@ -59,8 +49,7 @@ static size_t serve(void)
     if (picked == SCHEDULE_NONE)
         return picked;
     uint64_t slice_ns = simulation.slice_ns[picked];
-    schedule_charge(&simulation.scheduler, &simulation.entries[picked], slice_ns, simulation.weights[picked],
-                    simulation.granted[picked]);
+    schedule_charge(&simulation.scheduler, &simulation.entries[picked], slice_ns, simulation.weights[picked]);
     simulation.before = picked;
     simulation.now_ns += slice_ns;
     simulation.had_ns[picked] += slice_ns;
@@ -327,28 +316,4 @@ TEST(short_frames_come_as_often_as_they_are_due_beside_many_long_ones)
     /* A 64th of the time, in frames of 2 ms. */
     assert_true(frames >= 20000 / 64 / 2 * 9 / 10);
     expect_had(light, frames * 2 * MS);
-}
-
-TEST(owners_share_alike_however_many_clients_they_have)
-{
-    for (size_t client = 0; client < 20; client++)
-        add_of(0, client, 1, 3 * MS);
-    add_of(1, 20, 1, MS);
-    serve_for(4000 * MS);
-    expect_had(20, 2000 * MS);
-    for (size_t client = 0; client < 20; client++)
-        expect_had(client, 100 * MS);
-    assert_true(simulation.longest_wait_ns[20] <= 6 * MS); /* two slices of the other owner */
-}
-
-TEST(a_weight_that_is_not_granted_divides_an_owners_own_share_only)
-{
-    add_of(0, 0, 16, MS);
-    add_of(0, 0, 4, MS);
-    add_of(1, 1, 1, MS);
-    simulation.granted[0] = simulation.granted[1] = 1;
-    serve_for(2000 * MS);
-    expect_had(0, 800 * MS);
-    expect_had(1, 200 * MS);
-    expect_had(2, 1000 * MS);
 }

@@ -33,8 +33,6 @@ static inline void event(enum engine_event_kind kind, const struct engine_comman
     if (kind == ENGINE_FAILED)
         error_set(&made->error, ERROR_CANCELLED, NULL, "cancelled");
     if (kind == ENGINE_STATS_READY) {
-        made->answers_stats = true;
-        made->owner = command->owner;
         made->stats = port_allocate(sizeof(*made->stats));
         strcpy(made->stats->device.name, "none");
     }

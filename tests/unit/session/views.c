@@ -825,24 +825,6 @@ SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
     engine_command_destroy(command);
 }
 
-/* A frame of a replaced view holds the owner of its client. */
-TEST_WITH(an_owner_is_forgotten_after_a_frame_of_a_view_that_was_replaced, set_up, tear_down)
-{
-    start_view_with_credit();
-    replace_view(3, 17);
-    say_large_frame(2, 1);
-    expect(MESSAGE_FRAME_BEGIN, 2);
-    say(ENGINE_DONE, 2, ERROR_NONE);
-    while (receive()->type == MESSAGE_FRAME_DATA)
-        continue;
-    assert_int_equal(client.message.type, MESSAGE_FRAME_END);
-    expect(MESSAGE_OK, 2);
-    shutdown(client.fd, SHUT_RDWR);
-    pthread_join(thread, NULL);                             /* the daemon of a single client ends with it */
-    assert_int_equal(served.hub.owners.by_number.count, 1); /* the daemon itself */
-    assert_int_equal(pthread_create(&thread, NULL, run, NULL), 0);
-}
-
 SESSION_TEST(a_refused_view_leaves_the_running_one_unchanged)
 {
     start_view_with_credit();
