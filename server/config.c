@@ -50,6 +50,10 @@ static const struct option options[] = {
      "Read-only users of the Unix socket: names or numbers, separated by blanks. They attach to shared scenes and "
      "render them, but change nothing. This does not apply to TCP on loopback, where users are not identified: a key "
      "closes it"},
+    {"server", "weights", ANYTIME, OPTION_TEXT, AT(weights), "", 0, 0, "",
+     "Shares of processor time: NAME=WEIGHT with weights of 1 to 10000, separated by blanks. A name is that of a user, "
+     "its number, keys for those who come by a key, or networks for clients that nobody knows; the others have 100. It "
+     "counts from the next start of the user's process"},
     {"server", "insecure", START, OPTION_BOOL, AT(insecure), "no", 0, 1, "",
      "Let TCP clients connect without a key, from beyond loopback too: nothing is encrypted, no client is authenticated"},
     {"server", "key_file", ANYTIME, OPTION_TEXT, AT(key_file), "", 0, 0, "",
@@ -57,6 +61,9 @@ static const struct option options[] = {
      "and TCP needs it, on loopback too"},
     {"server", "reader_key_file", ANYTIME, OPTION_TEXT, AT(reader_key_file), "", 0, 0, "",
      "The same for read-only clients"},
+    {"server", "sandbox", START, OPTION_BOOL, AT(sandbox), "yes", 0, 1, "",
+     "Confine the processes that serve: no network but their clients, no other programs, no files but those of the "
+     "system, of drivers, of caches and of scenes.store. no: for a driver that needs more"},
     {"server", "log_level", ANYTIME, OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},
     {"server", "trace_file", START, OPTION_TEXT, AT(trace_file), "", 0, 0, "",
      "File that gets the stages of all frames as trace events, for ui.perfetto.dev or chrome://tracing"},
@@ -67,7 +74,7 @@ static const struct option options[] = {
     {"engine", "device", START, OPTION_TEXT, AT(device), "auto", 0, 0, "",
      "GPU: a number of --list-devices, software, or auto for the first hardware, else software"},
     {"engine", "encode_threads", START, OPTION_U32, AT(encode_threads), "0", 0, 64, "",
-     "Threads that encode frames, of which one user or key has all but one at most; 0: one per core, 2 to 4"},
+     "Threads that encode frames, of which one client has all but one at most; 0: one per core, 2 to 4"},
 
     {"memory", "scene", ANYTIME, OPTION_BYTES, AT(scene_bytes), "10%", MIB, 16 * TIB, "bytes",
      "Host memory of one scene, and of all of a user together without their blobs. A percentage is of what the daemon may have: of "
@@ -447,6 +454,7 @@ bool config_front(const struct config *config, struct front_options *front, stru
         .owner_fd = -1,
     };
     return readers_parse(&front->readers, config->readers, "server.readers", error) &&
+           shares_parse(&front->shares, config->weights, "server.weights", error) &&
            auth_read_keys(&front->keys, config->key_file, config->reader_key_file, error);
 }
 

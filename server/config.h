@@ -20,7 +20,9 @@
 struct config {
     char listen[CONFIG_TEXT_BYTES];  /* addresses, separated by blanks */
     char readers[CONFIG_TEXT_BYTES]; /* users, separated by blanks */
+    char weights[CONFIG_TEXT_BYTES]; /* NAME=WEIGHT, separated by blanks */
     bool insecure;
+    bool sandbox;
     char key_file[CONFIG_TEXT_BYTES], reader_key_file[CONFIG_TEXT_BYTES]; /* empty: none */
     uint32_t log_level;
     char trace_file[CONFIG_TEXT_BYTES]; /* empty: none */

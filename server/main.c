@@ -4,11 +4,14 @@
  * client is gone; 1 when it cannot start or go on; 2 for wrong usage; 75 when the GPU of a daemon of one client is
  * lost for good, which may be different in a new process. With --check-device: 0 when all holds, 1 when something
  * does not, 75 when the GPU was lost on the way. */
+#include "base/allocator.h"
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/timeline.h"
 #include "check/check.h"
 #include "config.h"
+#include "confine.h"
+#include "devices.h"
 #include "gpu/device.h"
 #include "engine/engine.h"
 #include "front/front.h"
@@ -62,7 +65,8 @@ static const struct argp_option option_table[] = {
      "Serve the client at the connected socket N, and exit with it; listen only where --listen says so", 0},
     {"config", KEY_CONFIG, "FILE", 0, "Read options from FILE, after " CONFIG_SYSTEM_FILE, 0},
     {"device", KEY_DEVICE, "N|software|auto", 0, "GPU to use", 0},
-    {"list-devices", KEY_LIST, NULL, 0, "Print the GPUs that can be used, and exit", 0},
+    {"list-devices", KEY_LIST, NULL, 0,
+     "Print the GPUs that can be used, with the workers that use them, and exit", 0},
     {"check-device", KEY_CHECK, NULL, 0,
      "Look the GPU over: limits, memory, programs, every tracer; exit with 0 if all of it holds", 0},
     {"json", KEY_JSON, NULL, 0, "With --check-device: print one JSON object a line", 0},
@@ -82,26 +86,10 @@ static const struct argp_option option_table[] = {
 struct arguments {
     char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
     const char *config_file, *device, *log_level, *insecure, *trace_file, *key_file, *reader_key_file;
-    int fd, worker; /* its number; 0: it is none */
+    char *worker; /* its number; NULL: it is none */
+    int fd;
     bool dump_config, check_device, json;
 };
-
-static int list_devices(void)
-{
-    struct gpu_device_info list[32];
-    size_t count = gpu_device_list(list, sizeof(list) / sizeof(list[0]));
-    for (size_t i = 0; i < count; i++) {
-        struct gpu_measured measured;
-        printf("%d  %s  (%s, OpenGL %s%s)\n", list[i].index, list[i].name, list[i].vendor, list[i].version,
-               list[i].software ? ", software" : "");
-        if (gpu_measured_load(&list[i], &measured))
-            printf("   first hits are traced from %.3g primitives a pixel on, from %.3g with several samples\n",
-                   (double)measured.traced_from[0], (double)measured.traced_from[1]);
-        else
-            printf("   first hits are rasterised, until the first start measures\n");
-    }
-    return count ? EXIT_SUCCESS : (fprintf(stderr, "farlightd: no device gives OpenGL 4.5\n"), EXIT_FAILURE);
-}
 
 static error_t parse_option(int key, char *value, struct argp_state *state)
 {
@@ -118,7 +106,7 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
             argp_error(state, "--fd: \"%s\" is no descriptor", value);
         break;
     case KEY_WORKER:
-        arguments->worker = atoi(value);
+        arguments->worker = value;
         break;
     case KEY_CONFIG:
         arguments->config_file = value;
@@ -142,7 +130,7 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         arguments->insecure = "yes";
         break;
     case KEY_LIST:
-        exit(list_devices());
+        exit(devices_print());
     case KEY_CHECK:
         arguments->check_device = true;
         break;
@@ -219,7 +207,9 @@ struct worker_setup {
 
 struct serving {
     struct worker_setup setup;
+    struct channel_start start;
     uint32_t number; /* of the worker; 0: it is none */
+    char *title;     /* what a list of processes shows behind --worker; NULL: it is no worker */
     struct daemon daemon;
     struct store *store; /* NULL: scenes end with the process */
     struct timeline *timeline;
@@ -254,14 +244,16 @@ static void configured(void *context, const void *bytes, size_t count)
 }
 
 /* Restores scenes that were kept for the owner, before its first client comes. */
-static void owned(void *context, uint64_t owner)
+static void owned(void *context, const struct channel_owner *owner)
 {
     struct serving *serving = context;
     const struct config *config = &serving->setup.config;
     struct error error = {0};
+    if (serving->title)
+        devices_set_title(serving->title, serving->number, owner->name, serving->daemon.device);
     if (!config->store[0])
         return;
-    serving->store = store_open_owner(config->store, owner, config->store_bytes, &error);
+    serving->store = store_open_owner(config->store, owner->number, config->store_bytes, &error);
     if (serving->store)
         keeper_restore(serving->store, &serving->daemon.hub);
     else
@@ -281,27 +273,44 @@ static bool serve_with_engine(struct serving *serving, struct engine *engine, in
     options.owner_may_be_idle = true;
     options.started_ns = serving->setup.started_ns;
     options.first_client = serving->number > 1 ? (serving->number - 1) * WORKER_CLIENTS : 0;
+    daemon->device = engine_device(engine)->index;
     daemon->configured = configured;
     daemon->owned = owned;
     daemon->front_context = serving;
     daemon->watchdog_ns = serving->setup.watchdog_ns;
     daemon->unused_s = unused_s(&serving->setup.config);
-    bool ok = daemon_start(daemon, &options, error) &&
-              (is_worker ? daemon_serve_front(daemon, fd, error) : daemon_serve_fd(daemon, fd, error));
+    bool ok =
+        daemon_start(daemon, &options, error) &&
+        (is_worker ? daemon_serve_front(daemon, fd, serving->start.has_owner ? &serving->start.owner : NULL, error)
+                   : daemon_serve_fd(daemon, fd, error));
     ok = ok && daemon_run(daemon, &serving->device_gone, error);
     daemon_finish(daemon);
     return ok;
 }
 
+#define TRACE_PATH_BYTES (CONFIG_TEXT_BYTES + 16)
+
 /* Each worker writes a file of its own; the first, and a daemon of one client, that of the configuration. */
-static struct timeline *open_timeline(const struct serving *serving, struct error *error)
+static void trace_path(char path[TRACE_PATH_BYTES], const struct serving *serving)
+{
+    const int bytes = snprintf(path, TRACE_PATH_BYTES, "%s", serving->setup.config.trace_file);
+    if (bytes && serving->number > 1)
+        snprintf(path + bytes, TRACE_PATH_BYTES - (size_t)bytes, ".%" PRIu32, serving->number);
+}
+
+/* The sandbox is entered before the first thread starts. */
+static bool begin_confined(struct serving *serving, bool is_worker, struct error *error)
 {
     const struct config *config = &serving->setup.config;
-    char path[CONFIG_TEXT_BYTES + 16];
-    const int bytes = snprintf(path, sizeof(path), "%s", config->trace_file);
-    if (serving->number > 1)
-        snprintf(path + bytes, sizeof(path) - (size_t)bytes, ".%" PRIu32, serving->number);
-    return timeline_create(path, config->trace_file_bytes, error);
+    char trace[TRACE_PATH_BYTES], store[PATH_MAX] = "";
+    trace_path(trace, serving);
+    if (is_worker && config->store[0] &&
+        !store_owner_path(store, config->store, serving->start.owner.number, error))
+        return false;
+    if (!confine(config, trace, store, error))
+        return false;
+    allocator_start_thread();
+    return (!trace[0] || (serving->timeline = timeline_create(trace, config->trace_file_bytes, error)));
 }
 
 static bool serve(struct serving *serving, int fd, bool is_worker, struct error *error)
@@ -309,10 +318,10 @@ static bool serve(struct serving *serving, int fd, bool is_worker, struct error 
     const struct config *config = &serving->setup.config;
     struct engine_options engine_options;
     daemon_init(&serving->daemon);
-    if (!config_engine(config, &engine_options, error))
+    if (!config_engine(config, &engine_options, error) || !begin_confined(serving, is_worker, error))
         return false;
-    if (config->trace_file[0] && !(serving->timeline = open_timeline(serving, error)))
-        return false;
+    _Static_assert(CHANNEL_DEVICES == GPU_DEVICES_MAX, "the front counts as many devices as EGL may have");
+    memcpy(engine_options.gpu.used_by, serving->start.workers_at, sizeof(engine_options.gpu.used_by));
     /* Scenes of a process that serves one client alone end with that client. */
     const struct engine_keeper keeper = keeper_port(&serving->store);
     if (is_worker && config->store[0])
@@ -348,16 +357,20 @@ static void offer_to_end_first(void)
     fclose(file);
 }
 
-static int serve_as_worker(uint32_t number)
+/* `title`: the argument of --worker, its number and many blanks. */
+static int serve_as_worker(char *title)
 {
     const int fd = CHANNEL_WORKER_FD;
     struct serving *serving = calloc(1, sizeof(*serving));
     prctl(PR_SET_PDEATHSIG, SIGKILL); /* the front's end is its own */
     offer_to_end_first();
     bool ok = serving && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
+              channel_wait(fd, CHANNEL_START, &serving->start, sizeof(serving->start)) &&
               channel_wait(fd, CHANNEL_CONFIG, &serving->setup, sizeof(serving->setup));
-    if (ok)
-        serving->number = number;
+    if (ok) {
+        serving->number = (uint32_t)atoi(title);
+        serving->title = title;
+    }
     int status = ok ? serve_to_the_end(serving, fd, true) : EXIT_FAILURE;
     free(serving);
     return status;
@@ -442,6 +455,7 @@ static bool run_front(struct source *source, struct front *front, struct error *
     const bool filled = fill_front(source, source->config, &options, error);
     options.owner_fd = source->arguments->fd;
     options.owners = owners;
+    options.owners_first = source->folder != NULL;
     options.owner_count = source->folder ? store_owners(source->folder, owners, OWNERS_MAX) : 0;
     front->reload = reload;
     front->reload_context = source;
@@ -478,7 +492,7 @@ int main(int argc, char **argv)
     open_standard_descriptors();
     argp_parse(&argp, argc, argv, 0, NULL, &arguments);
     if (arguments.worker)
-        return serve_as_worker((uint32_t)arguments.worker);
+        return serve_as_worker(arguments.worker);
     if (!read_config(&config, &arguments, &error))
         return fail(&error);
     if (arguments.dump_config)

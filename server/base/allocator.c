@@ -2,12 +2,13 @@
 /* Options of jemalloc. Software GL allocates memory for each buffer, and each frame allocates its pixels: large
  * blocks, again and again. Freed memory keeps its pages for ten seconds (jemalloc's default, here for the largest
  * blocks too) for whichever thread allocates next (one arena). New memory comes in huge pages, as small ones cost
- * 3 to 30 times as much. A background thread returns unused pages to the kernel. */
+ * 3 to 30 times as much. */
+#include "base/allocator.h"
+
 #include <jemalloc/jemalloc.h>
 
 /* Read by jemalloc when it starts, by this name, which -fvisibility=hidden would hide. */
-__attribute__((visibility("default"))) const char *malloc_conf =
-    "thp:always,oversize_threshold:0,narenas:1,background_thread:true";
+__attribute__((visibility("default"))) const char *malloc_conf = "thp:always,oversize_threshold:0,narenas:1";
 
 /* NULL where the sanitizers are linked in place of jemalloc. */
 #pragma weak mallctl
@@ -19,4 +20,11 @@ __attribute__((constructor)) static void keep_large_blocks(void)
     size_t never = (size_t)1 << 50;
     if (mallctl)
         mallctl("arena.0.oversize_threshold", NULL, NULL, &never, sizeof(never));
+}
+
+void allocator_start_thread(void)
+{
+    bool yes = true;
+    if (mallctl)
+        mallctl("background_thread", NULL, NULL, &yes, sizeof(yes));
 }

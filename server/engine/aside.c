@@ -80,6 +80,7 @@ static void carry_out(struct aside_commit *commit)
 static void *run_thread(void *context)
 {
     struct aside *aside = context;
+    pthread_setname_np(pthread_self(), "commit");
     host_thread_gives_way();
     pthread_mutex_lock(&aside->lock);
     const unsigned self = aside->numbered++;
@@ -119,7 +120,7 @@ struct aside *aside_create(void (*on_done)(void *context), void *context, struct
     pthread_cond_init(&aside->changed, NULL);
     while (aside->started < THREADS &&
            pthread_create(&aside->threads[aside->started], NULL, run_thread, aside) == 0)
-        pthread_setname_np(aside->threads[aside->started++], "commit");
+        aside->started++;
     if (aside->started == THREADS)
         return aside;
     error_set(error, ERROR_OUT_OF_MEMORY, "engine", "could start only %u of %u threads", aside->started, THREADS);

@@ -277,6 +277,7 @@ static void set_running(struct encode_pool *pool, unsigned self, struct encode_t
 static void *run_thread(void *context)
 {
     struct encode_pool *pool = context;
+    pthread_setname_np(pthread_self(), "encode");
     pthread_mutex_lock(&pool->lock);
     const unsigned self = pool->numbered++;
     while (!atomic_load(&pool->closed)) {
@@ -321,7 +322,7 @@ struct encode_pool *encode_pool_create(const struct encode_pool_options *options
     pthread_mutex_lock(&pool->lock); /* the threads wait until there are all */
     while (pool->thread_count < threads &&
            pthread_create(&pool->threads[pool->thread_count], NULL, run_thread, pool) == 0)
-        pthread_setname_np(pool->threads[pool->thread_count++], "encode");
+        pool->thread_count++;
     pthread_mutex_unlock(&pool->lock);
     if (pool->thread_count == threads)
         return pool;

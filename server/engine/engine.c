@@ -172,6 +172,7 @@ static void tell_start(struct engine *engine, bool opened)
 static void *run_thread(void *context)
 {
     struct engine *engine = context;
+    pthread_setname_np(pthread_self(), "gl");
     bool opened = engine_open_device(engine, &engine->start_error);
     if (opened)
         engine->device_info = engine->device->info;
@@ -234,7 +235,6 @@ static bool start_threads(struct engine *engine, struct error *error)
         return false;
     if (!engine->has_thread)
         return error_set(error, ERROR_OUT_OF_MEMORY, "engine", "could not start a thread");
-    pthread_setname_np(engine->thread, "gl");
     pthread_mutex_lock(&engine->start_lock);
     while (engine->start == START_PENDING)
         pthread_cond_wait(&engine->start_changed, &engine->start_lock);

@@ -64,6 +64,7 @@ static struct order *take_first(struct keep *keep)
 static void *run_thread(void *context)
 {
     struct keep *keep = context;
+    pthread_setname_np(pthread_self(), "keep");
     host_thread_gives_way();
     pthread_mutex_lock(&keep->lock);
     for (struct order *order; (order = take_first(keep)) || !keep->closed;) {
@@ -101,10 +102,8 @@ struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(v
     pthread_mutex_init(&keep->lock, NULL);
     pthread_cond_init(&keep->changed, NULL);
     keep->started = pthread_create(&keep->thread, NULL, run_thread, keep) == 0;
-    if (keep->started) {
-        pthread_setname_np(keep->thread, "keep");
+    if (keep->started)
         return keep;
-    }
     error_set(error, ERROR_OUT_OF_MEMORY, "engine", "could not start a thread");
     keep_destroy(keep, 0);
     return NULL;

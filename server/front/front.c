@@ -330,14 +330,13 @@ static bool start_workers(struct front *front, struct error *error)
 {
     const struct front_options *options = &front->options;
     for (size_t i = 0; i < options->owner_count; i++) {
-        struct worker *worker = workers_start(front, error);
-        if (!worker)
+        const struct channel_owner owner = {.number = options->owners[i], .name = "restores scenes"};
+        if (!workers_start(front, &owner, error))
             return false;
-        workers_assign(worker, options->owners[i], "restores scenes");
     }
     if (options->owner_count)
         on_extend_timer(front);
-    return options->owner_count || workers_start(front, error);
+    return options->owner_count || workers_start_ahead(front, error);
 }
 
 static bool start(struct front *front, const struct front_options *options, struct error *error)
@@ -353,6 +352,7 @@ static bool start(struct front *front, const struct front_options *options, stru
     front->extend_timer = (struct loop_timer){.call = on_extend_timer, .context = front};
     if (!set_options(front, options))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    share_groups_begin(&front->groups, "/proc/self/cgroup", "/sys/fs/cgroup");
     return watch_signals(front, error) && watch_all_listeners(front, error) && start_workers(front, error) &&
            (options->owner_fd < 0 || callers_add_owner(front, options->owner_fd, error));
 }

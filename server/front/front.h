@@ -6,6 +6,7 @@
 #define FARLIGHT_FRONT_FRONT_H
 
 #include "base/hashmap.h"
+#include "front/shares.h"
 #include "net/attempts.h"
 #include "net/auth.h"
 #include "net/connection.h"
@@ -32,12 +33,15 @@ struct front_options {
     struct front_limits limits;
     struct connection_limits connection_limits;
     struct readers readers; /* of the Unix socket */
+    struct shares shares;   /* of processor time; of workers that start from then on */
     struct auth_keys *keys; /* with which clients come in sealed, from everywhere; the front takes a reference */
     bool insecure;          /* peers beyond loopback are accepted without a key too */
     int owner_fd;           /* of the client with which the daemon ends, to be taken over; < 0: there is none */
     uint64_t unused_ns;     /* without a client, after which the daemon ends; 0: it does not */
     const uint64_t *owners; /* who has kept scenes: their workers start with the front */
     size_t owner_count;
+    bool owners_first; /* a worker must know its owner from the start: its sandbox lets it reach that owner's files
+                        */
     const void *setup; /* first packet of every worker; copied */
     size_t setup_bytes;
 };
@@ -68,6 +72,7 @@ struct front {
 
     struct worker *workers;
     uint32_t workers_started;
+    struct share_groups groups;
     bool ready;           /* a worker was: the device can be used */
     struct error failure; /* why the first worker could not start */
 

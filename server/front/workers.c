@@ -19,12 +19,15 @@
 
 /* Processes at once: an attacker may come from many networks, each of which has one. */
 #define WORKERS_MAX 128u
+/* A worker's number goes with so many bytes of blanks, into which the worker writes who it is for, as a list of
+ * processes shows it. */
+#define TITLE_BYTES 128
 /* Pings without an answer, after which a worker hangs. */
 #define PINGS_MAX 3u
 
 /* ---- starting ---- */
 
-/* Who manages services speaks with the front alone. */
+/* The service manager speaks with the front alone. */
 static bool is_for_front(const char *variable)
 {
     static const char *const names[] = {"NOTIFY_SOCKET=", "WATCHDOG_USEC=", "WATCHDOG_PID=", "LISTEN_"};
@@ -50,8 +53,8 @@ static char **worker_environment(void)
 
 static bool spawn(struct worker *worker, int fd, struct error *error)
 {
-    char number[16];
-    snprintf(number, sizeof(number), "%" PRIu32, worker->number);
+    char number[TITLE_BYTES];
+    snprintf(number, sizeof(number), "%-*" PRIu32, TITLE_BYTES - 1, worker->number);
     char *const arguments[] = {"farlightd", "--worker", number, NULL};
     char **variables = worker_environment();
     posix_spawn_file_actions_t actions;
@@ -77,23 +80,24 @@ static void log_end(const struct worker *worker, int status, bool is_asked)
     if (worker->failure.kind && !worker->front->ready)
         return; /* the front says why it does not start */
     if (worker->failure.kind) {
-        log_write(LOG_ERROR, "front", "worker %" PRIu32 " (%s) has ended: %s", worker->number, worker->name,
+        log_write(LOG_ERROR, "front", "worker %" PRIu32 " (%s) has ended: %s", worker->number, worker->owner.name,
                   worker->failure.text);
         return;
     }
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0)
-        log_write(LOG_DEBUG, "front", "worker %" PRIu32 " (%s) has ended", worker->number, worker->name);
+        log_write(LOG_DEBUG, "front", "worker %" PRIu32 " (%s) has ended", worker->number, worker->owner.name);
     else if (WIFSIGNALED(status))
         log_write(is_asked ? LOG_WARNING : LOG_ERROR, "front", "worker %" PRIu32 " (%s) was ended by signal %d",
-                  worker->number, worker->name, WTERMSIG(status));
+                  worker->number, worker->owner.name, WTERMSIG(status));
     else
         log_write(LOG_ERROR, "front", "worker %" PRIu32 " (%s) has ended with status %d", worker->number,
-                  worker->name, WEXITSTATUS(status));
+                  worker->owner.name, WEXITSTATUS(status));
 }
 
 static void remove_worker(struct worker *worker)
 {
     struct front *front = worker->front;
+    share_groups_end(&front->groups, worker->number);
     struct worker **place = &front->workers;
     while (*place != worker)
         place = &(*place)->next;
@@ -107,7 +111,7 @@ static void remove_worker(struct worker *worker)
 static void replace(struct front *front)
 {
     struct error error = {0};
-    if (!workers_start(front, &error))
+    if (!workers_start_ahead(front, &error))
         log_write(LOG_ERROR, "front", "%s", error.text);
 }
 
@@ -162,11 +166,12 @@ static void stop_one(struct worker *worker)
 /* A word that was sent before the worker had its owner says nothing any more. */
 static void take_ready(struct worker *worker, const void *payload, size_t bytes)
 {
-    bool has_owner;
-    if (bytes != sizeof(has_owner))
+    struct channel_ready ready;
+    if (bytes != sizeof(ready))
         return;
-    memcpy(&has_owner, payload, bytes);
-    if (has_owner != worker->has_owner || worker->is_stopping)
+    memcpy(&ready, payload, bytes);
+    worker->device = ready.device;
+    if (ready.has_owner != worker->has_owner || worker->is_stopping)
         return;
     worker->is_ready = worker->was_ready = true;
     front_settled(worker->front, NULL);
@@ -175,7 +180,8 @@ static void take_ready(struct worker *worker, const void *payload, size_t bytes)
 
 static void kill_one(const struct worker *worker, const char *why)
 {
-    log_write(LOG_ERROR, "front", "worker %" PRIu32 " (%s) is killed: %s", worker->number, worker->name, why);
+    log_write(LOG_ERROR, "front", "worker %" PRIu32 " (%s) is killed: %s", worker->number, worker->owner.name,
+              why);
     kill(worker->pid, SIGKILL);
 }
 
@@ -188,7 +194,7 @@ static void take_counts(struct worker *worker, const void *payload, size_t bytes
     /* A client may be on its way to it. */
     if (worker->counts.unused_s && worker->counts.handed == worker->handed && !worker->is_stopping) {
         log_write(LOG_INFO, "front", "worker %" PRIu32 " (%s) ends: it had no client for %" PRIu32 " s",
-                  worker->number, worker->name, worker->counts.unused_s);
+                  worker->number, worker->owner.name, worker->counts.unused_s);
         stop_one(worker);
     }
 }
@@ -241,7 +247,7 @@ static bool may_hand_over(const struct worker *from, struct handover *handover)
     handover->is_owner = false;
     if (identity->has_user && readers_have(&options->readers, identity->user))
         identity->read_only = true;
-    return from->has_owner && auth_owner_number(identity, &handover->peer) == from->owner &&
+    return from->has_owner && auth_owner_number(identity, &handover->peer) == from->owner.number &&
            (!identity->has_key || auth_numbers_have(&keys, identity));
 }
 
@@ -301,6 +307,7 @@ static void on_received(void *context, enum channel_kind kind, const void *paylo
         front_configured(worker->front);
         return;
     case CHANNEL_CLIENT:
+    case CHANNEL_START:
     case CHANNEL_OWNER:
     case CHANNEL_ASKED:
         return;
@@ -314,6 +321,14 @@ static void on_closed(void *context)
 }
 
 /* ---- for the front ---- */
+
+static void apply_share(const struct worker *worker)
+{
+    const struct front *front = worker->front;
+    const uint32_t weight =
+        worker->has_owner ? shares_weight(&front->options.shares, worker->owner.number) : SHARES_DEFAULT_WEIGHT;
+    share_groups_apply(&front->groups, worker->number, worker->pid, weight);
+}
 
 /* False: nothing of it is left. */
 static bool watch(struct worker *worker, int fd, struct error *error)
@@ -337,7 +352,21 @@ static bool watch(struct worker *worker, int fd, struct error *error)
     return false;
 }
 
-struct worker *workers_start(struct front *front, struct error *error)
+static void send_start(struct worker *worker, const struct channel_owner *owner)
+{
+    const struct front *front = worker->front;
+    struct channel_start start = {.has_owner = owner != NULL};
+    if (owner)
+        start.owner = *owner;
+    for (const struct worker *other = front->workers; other; other = other->next) {
+        if (other->device >= 0 && other->device < CHANNEL_DEVICES)
+            start.workers_at[other->device]++;
+    }
+    channel_send(&worker->channel, CHANNEL_START, &start, sizeof(start), NULL);
+    channel_send(&worker->channel, CHANNEL_CONFIG, front->setup, front->options.setup_bytes, NULL);
+}
+
+struct worker *workers_start(struct front *front, const struct channel_owner *owner, struct error *error)
 {
     struct worker *worker = calloc(1, sizeof(*worker));
     int fds[2];
@@ -346,7 +375,11 @@ struct worker *workers_start(struct front *front, struct error *error)
         free(worker);
         return NULL;
     }
-    *worker = (struct worker){.front = front, .number = ++front->workers_started, .name = "of nobody yet"};
+    *worker = (struct worker){.front = front,
+                              .number = ++front->workers_started,
+                              .has_owner = owner != NULL,
+                              .owner = owner ? *owner : (struct channel_owner){.name = "of nobody yet"},
+                              .device = -1};
     bool ok = spawn(worker, fds[1], error);
     close(fds[1]);
     if (!ok) {
@@ -362,17 +395,25 @@ struct worker *workers_start(struct front *front, struct error *error)
     }
     worker->next = front->workers;
     front->workers = worker;
-    channel_send(&worker->channel, CHANNEL_CONFIG, front->setup, front->options.setup_bytes, NULL);
+    apply_share(worker);
+    send_start(worker, owner);
     return worker;
 }
 
-void workers_assign(struct worker *worker, uint64_t owner, const char *name)
+struct worker *workers_start_ahead(struct front *front, struct error *error)
+{
+    const struct auth_identity own = {.has_user = true, .user = geteuid()};
+    const struct channel_owner owner = {.number = auth_owner_number(&own, NULL), .name = "waits"};
+    return workers_start(front, front->options.owners_first ? &owner : NULL, error);
+}
+
+static void assign(struct worker *worker, const struct channel_owner *owner)
 {
     worker->has_owner = true;
-    worker->is_ready = false; /* until it has what it keeps for the owner */
-    worker->owner = owner;
-    snprintf(worker->name, sizeof(worker->name), "%s", name);
-    channel_send(&worker->channel, CHANNEL_OWNER, &owner, sizeof(owner), NULL);
+    worker->is_ready = false; /* until it says that it knows */
+    worker->owner = *owner;
+    apply_share(worker);
+    channel_send(&worker->channel, CHANNEL_OWNER, owner, sizeof(*owner), NULL);
 }
 
 struct worker *workers_of(struct front *front, uint64_t owner, const char *name, struct error *error)
@@ -383,9 +424,9 @@ struct worker *workers_of(struct front *front, uint64_t owner, const char *name,
         count++;
         if (worker->is_stopping || !worker->channel.watch) /* it ends, which may take it a while */
             continue;
-        if (worker->has_owner && worker->owner == owner) {
+        if (worker->has_owner && worker->owner.number == owner) {
             /* One whose scenes were restored has no name yet. */
-            snprintf(worker->name, sizeof(worker->name), "%s", name);
+            snprintf(worker->owner.name, sizeof(worker->owner.name), "%s", name);
             return worker;
         }
         if (!worker->has_owner)
@@ -395,10 +436,12 @@ struct worker *workers_of(struct front *front, uint64_t owner, const char *name,
         error_set(error, ERROR_LIMIT, NULL, "%u users are served, the limit; try again later", WORKERS_MAX);
         return NULL;
     }
-    struct worker *worker = free_one ? free_one : workers_start(front, error);
-    if (worker)
-        workers_assign(worker, owner, name);
-    return worker;
+    struct channel_owner taken = {.number = owner};
+    snprintf(taken.name, sizeof(taken.name), "%s", name);
+    if (!free_one)
+        return workers_start(front, &taken, error);
+    assign(free_one, &taken);
+    return free_one;
 }
 
 static uint32_t clients_of(const struct worker *worker)
@@ -418,7 +461,7 @@ uint32_t workers_clients_of(const struct front *front, uint64_t owner)
 {
     uint32_t clients = 0;
     for (const struct worker *worker = front->workers; worker; worker = worker->next)
-        clients += worker->has_owner && worker->owner == owner ? clients_of(worker) : 0;
+        clients += worker->has_owner && worker->owner.number == owner ? clients_of(worker) : 0;
     return clients;
 }
 

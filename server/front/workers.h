@@ -13,8 +13,8 @@ struct worker {
     struct worker *next;
     uint32_t number;
     bool has_owner;
-    uint64_t owner; /* auth_owner_number() */
-    char name[48];  /* of the owner, for people */
+    struct channel_owner owner;
+    int32_t device; /* its index; -1: not known yet */
     pid_t pid;
     int pid_fd;
     struct loop_watch *pid_watch;
@@ -29,10 +29,11 @@ struct worker {
     struct error failure; /* why it ends, in its own words */
 };
 
-/* Starts a process that belongs to nobody yet. NULL and *error: it cannot be started. */
-struct worker *workers_start(struct front *front, struct error *error);
-/* Whose it is, before the first client. */
-void workers_assign(struct worker *worker, uint64_t owner, const char *name);
+/* Starts a process of that owner, or (NULL) of nobody yet. NULL and *error: it cannot be started. */
+struct worker *workers_start(struct front *front, const struct channel_owner *owner, struct error *error);
+/* Starts the one that waits for the next user: of nobody yet, or of the daemon's own user where workers must know
+ * their owner from the start. */
+struct worker *workers_start_ahead(struct front *front, struct error *error);
 /* The owner's, started if there is none. */
 struct worker *workers_of(struct front *front, uint64_t owner, const char *name, struct error *error);
 uint32_t workers_clients(const struct front *front);

@@ -150,13 +150,16 @@ size_t gpu_device_list(struct gpu_device_info *list, size_t max)
     return count;
 }
 
-/* Opens the first place that fits the options: the one that was named; else hardware before software. */
+/* Opens the first place that fits the options: the one that was named; else hardware before software, and of
+ * several the least used. */
 static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const struct gpu_options *options,
                        bool debug, struct error *error)
 {
     struct gpu_egl_place places[GPU_EGL_PLACES_MAX];
     size_t count = gpu_egl_places(places, GPU_EGL_PLACES_MAX);
     struct error last = {0};
+    _Static_assert(GPU_DEVICES_MAX == GPU_EGL_PLACES_MAX, "each place has a count");
+    gpu_egl_sort_by_use(places, count, options->used_by);
     bool by_index = options->index >= 0 && !options->software;
     for (int software = by_index ? 0 : options->software; software < 2; software++) {
         for (size_t i = 0; i < count; i++) {

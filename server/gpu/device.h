@@ -22,6 +22,7 @@ struct gpu_device_info {
     char drm_path[64]; /* "" if the driver tells none */
 };
 
+#define GPU_DEVICES_MAX 32 /* that are told apart */
 #define GPU_TEXEL_UNITS 32
 
 /* Of the buffer textures that frames bind to units, by unit: GL_RGBA8 .., or 0: four floats or words a texel. A
@@ -111,9 +112,11 @@ struct gpu_device {
 void gpu_facts_choose(struct gpu_facts *facts, bool software);
 
 struct gpu_options {
-    int index;                    /* of gpu_device_list; -1: first hardware, else software */
-    bool software;                /* insist on software */
-    bool debug;                   /* debug context, messages to the log */
+    int index;     /* of gpu_device_list; -1: hardware, else software */
+    bool software; /* insist on software */
+    bool debug;    /* debug context, messages to the log */
+    uint16_t
+        used_by[GPU_DEVICES_MAX]; /* processes that use each device, by index: among hardware, the least used */
     struct gpu_measured measured; /* of this device by an earlier context; not known: of the disk */
     bool compiles;           /* no program is taken from the disk, where all that are compiled go nevertheless */
     uint64_t binaries_bytes; /* the most that programs may take on the disk; 0: no limit */

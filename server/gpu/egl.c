@@ -127,6 +127,17 @@ static bool create_any_context(struct gpu_egl *egl, const char *extensions, bool
     return false;
 }
 
+void gpu_egl_sort_by_use(struct gpu_egl_place *places, size_t count, const uint16_t used_by[GPU_EGL_PLACES_MAX])
+{
+    for (size_t i = 1; i < count; i++) {
+        const struct gpu_egl_place place = places[i];
+        size_t k = i;
+        for (; k > 0 && used_by[places[k - 1].index] > used_by[place.index]; k--)
+            places[k] = places[k - 1];
+        places[k] = place;
+    }
+}
+
 bool gpu_egl_open(struct gpu_egl *egl, const struct gpu_egl_place *place, bool debug, struct error *error)
 {
     EGLint major = 0, minor = 0;

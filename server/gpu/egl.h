@@ -7,6 +7,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #define GPU_EGL_PLACES_MAX 32
 
@@ -25,6 +26,8 @@ struct gpu_egl {
 };
 
 size_t gpu_egl_places(struct gpu_egl_place *places, size_t max);
+/* Sorts places by how many processes use the device of each index, the least used first; equals stay in order. */
+void gpu_egl_sort_by_use(struct gpu_egl_place *places, size_t count, const uint16_t used_by[GPU_EGL_PLACES_MAX]);
 /* Opens a display, makes an OpenGL 4.5 core context and makes it current. On failure nothing is left. */
 bool gpu_egl_open(struct gpu_egl *egl, const struct gpu_egl_place *place, bool debug, struct error *error);
 /* Makes another context on the same display and makes it current on the calling thread. It shares no objects. The

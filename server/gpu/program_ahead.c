@@ -120,6 +120,7 @@ static void *run(void *context)
     struct worker *worker = context;
     struct gpu_ahead *ahead = worker->ahead;
     struct gpu_egl beside;
+    pthread_setname_np(pthread_self(), "compile");
     host_thread_gives_way(); /* to what builds; what waits for this one takes no time */
     const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
     if (opened) {
@@ -194,8 +195,6 @@ static void start(struct worker *worker)
         pthread_join(worker->thread, NULL); /* which does no more than return */
     worker->ended = false;
     worker->started = pthread_create(&worker->thread, NULL, run, worker) == 0;
-    if (worker->started)
-        pthread_setname_np(worker->thread, "compile");
 }
 
 static size_t thread_count(const struct gpu_facts *facts)

@@ -16,8 +16,10 @@
 
 enum channel_kind {
     /* To a worker. */
-    CHANNEL_CONFIG, /* the configuration, first of all and after each change; answered by one without a payload */
-    CHANNEL_OWNER,  /* u64, auth_owner_number(): whose it is, before the first client; answered by CHANNEL_READY */
+    CHANNEL_START,  /* struct channel_start, first of all */
+    CHANNEL_CONFIG, /* the configuration, next and after each change; then answered by one without a payload */
+    CHANNEL_OWNER,  /* struct channel_owner, before the first client, unless the start had it; answered by
+                       CHANNEL_READY */
     CHANNEL_CLIENT, /* struct handover; with its socket and a descriptor of what was read of it. From a worker:
                        another one is to serve it */
     CHANNEL_ASK,    /* struct channel_question, from a worker for all others; to be answered */
@@ -25,11 +27,30 @@ enum channel_kind {
     CHANNEL_ANSWER, /* struct channel_answer and bytes behind it, from a worker to the one that has asked */
     CHANNEL_PING,   /* answered by the same */
     /* To the front. */
-    CHANNEL_READY, /* bool: false, it has a device; true, it has an owner, too, and what was kept for that owner */
-    CHANNEL_HANGS, /* its device does not answer: only an end from outside helps */
+    CHANNEL_READY,  /* struct channel_ready */
+    CHANNEL_HANGS,  /* its device does not answer: only an end from outside helps */
     CHANNEL_ENDING, /* it ends of itself: no client is to come any more */
     CHANNEL_FAILED, /* it ends: the text says why */
     CHANNEL_COUNTS, /* struct channel_counts, whenever they have changed */
+};
+
+#define CHANNEL_NAME_BYTES 48
+#define CHANNEL_DEVICES 32
+
+struct channel_owner {
+    uint64_t number;               /* auth_owner_number() */
+    char name[CHANNEL_NAME_BYTES]; /* for people */
+};
+
+struct channel_start {
+    uint32_t has_owner; /* from the start: 0 or 1 */
+    struct channel_owner owner;
+    uint16_t workers_at[CHANNEL_DEVICES]; /* how many use each device, by its index */
+};
+
+struct channel_ready {
+    uint32_t has_owner; /* 0: it has a device; 1: it has an owner, too, and what was kept for that owner */
+    int32_t device;     /* its index */
 };
 
 struct channel_counts {
@@ -83,7 +104,7 @@ void channel_drain(struct channel *channel);
 /* Sends one packet without a loop, with CHANNEL_FDS descriptors or NULL, which stay the caller's; what happens to
  * it is not known. */
 void channel_say(int fd, enum channel_kind kind, const void *payload, size_t bytes, const int *fds);
-/* Waits for the first packet, of that kind and size, before there is a loop. */
+/* Waits for the next packet, of that kind and size, before there is a loop. */
 bool channel_wait(int fd, enum channel_kind kind, void *payload, size_t bytes);
 
 #endif

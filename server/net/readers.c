@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool parse_user(const char *text, uint32_t *user)
+bool readers_parse_user(const char *text, uint32_t *user)
 {
     char *end;
     errno = 0;
@@ -25,7 +25,7 @@ static bool add(struct readers *readers, const char *text, const char *field, st
 {
     if (readers->count == READERS_MAX)
         return error_set(error, ERROR_INVALID, field, "more than %d users", READERS_MAX);
-    if (!parse_user(text, &readers->users[readers->count]))
+    if (!readers_parse_user(text, &readers->users[readers->count]))
         return error_set(error, ERROR_INVALID, field, "there is no user \"%s\"", text);
     readers->count++;
     return true;

@@ -19,6 +19,8 @@ struct readers {
 /* Reads names and numbers, separated by blanks. False with ERROR_INVALID: one is unknown, or there are too many;
  * `field` is the error's field. */
 bool readers_parse(struct readers *readers, const char *text, const char *field, struct error *error);
+/* Reads a user's name or number; false: there is no such user. */
+bool readers_parse_user(const char *text, uint32_t *user);
 bool readers_have(const struct readers *readers, uint32_t user);
 
 #endif

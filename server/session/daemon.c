@@ -150,14 +150,13 @@ static void take_client(struct daemon *daemon, const void *payload, size_t bytes
 
 static void send_ready(struct daemon *daemon, bool has_owner)
 {
-    channel_send(&daemon->front, CHANNEL_READY, &has_owner, sizeof(has_owner), NULL);
+    const struct channel_ready ready = {.has_owner = has_owner, .device = daemon->device};
+    channel_send(&daemon->front, CHANNEL_READY, &ready, sizeof(ready), NULL);
 }
 
-static void take_owner(struct daemon *daemon, const void *payload)
+static void take_owner(struct daemon *daemon, const struct channel_owner *owner)
 {
-    uint64_t owner;
-    memcpy(&owner, payload, sizeof(owner));
-    daemon->hub.worker_of = owner;
+    daemon->hub.worker_of = owner->number;
     daemon->owned(daemon->front_context, owner);
     start_unused_timer(daemon); /* a client of restored scenes may never come */
     send_ready(daemon, true);
@@ -181,6 +180,7 @@ static void on_received(void *context, enum channel_kind kind, const void *paylo
                         const int fds[CHANNEL_FDS])
 {
     struct daemon *daemon = context;
+    struct channel_owner owner;
     switch (kind) {
     case CHANNEL_CONFIG:
         daemon->configured(daemon->front_context, payload, bytes);
@@ -192,8 +192,10 @@ static void on_received(void *context, enum channel_kind kind, const void *paylo
         take_client(daemon, payload, bytes, fds);
         return;
     case CHANNEL_OWNER:
-        if (bytes == sizeof(uint64_t))
-            take_owner(daemon, payload);
+        if (bytes == sizeof(owner)) {
+            memcpy(&owner, payload, bytes);
+            take_owner(daemon, &owner);
+        }
         return;
     case CHANNEL_ASK:
     case CHANNEL_ASKED:
@@ -203,6 +205,7 @@ static void on_received(void *context, enum channel_kind kind, const void *paylo
     case CHANNEL_PING:
         channel_send(&daemon->front, CHANNEL_PING, NULL, 0, NULL);
         return;
+    case CHANNEL_START:
     case CHANNEL_READY:
     case CHANNEL_ENDING:
     case CHANNEL_FAILED:
@@ -219,7 +222,7 @@ static void on_front_gone(void *context)
     loop_stop(daemon->loop);
 }
 
-bool daemon_serve_front(struct daemon *daemon, int fd, struct error *error)
+bool daemon_serve_front(struct daemon *daemon, int fd, const struct channel_owner *owner, struct error *error)
 {
     daemon->front = (struct channel){.received = on_received, .closed = on_front_gone, .context = daemon};
     daemon->hub.counted = on_counted;
@@ -229,7 +232,10 @@ bool daemon_serve_front(struct daemon *daemon, int fd, struct error *error)
     daemon->alive_ns = clock_now_ns();
     if (daemon->watchdog_ns)
         on_watchdog_timer(daemon);
-    send_ready(daemon, false);
+    if (owner)
+        take_owner(daemon, owner);
+    else
+        send_ready(daemon, false);
     return true;
 }
 

@@ -26,8 +26,9 @@ struct daemon {
     uint64_t alive_ns;
     /* From the front came another configuration, and whose process this is. */
     void (*configured)(void *context, const void *setup, size_t bytes);
-    void (*owned)(void *context, uint64_t owner);
+    void (*owned)(void *context, const struct channel_owner *owner);
     void *front_context;
+    int32_t device; /* index of the engine's, for the front */
 };
 
 /* Blocks SIGTERM and SIGINT in the calling thread, for the loop to handle; call it before any thread starts, so
@@ -41,8 +42,8 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
  * succeeds. */
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
 /* Clients come from the front at that end of a channel, which is told that they can be served; the daemon ends
- * with it. Takes over the descriptor when it succeeds. */
-bool daemon_serve_front(struct daemon *daemon, int fd, struct error *error);
+ * with it. `owner`: whose process it is, NULL: nobody's yet. Takes over the descriptor when it succeeds. */
+bool daemon_serve_front(struct daemon *daemon, int fd, const struct channel_owner *owner, struct error *error);
 /* Until SIGTERM or SIGINT, after a goodbye to the clients. *device_gone: it ended because its GPU is lost for
  * good. */
 bool daemon_run(struct daemon *daemon, bool *device_gone, struct error *error);

@@ -43,6 +43,7 @@ static void hash_next(struct hasher *hasher)
 static void *run(void *context)
 {
     struct hasher *hasher = context;
+    pthread_setname_np(pthread_self(), "hash");
     pthread_mutex_lock(&hasher->lock);
     while (!hasher->ends) {
         if (hasher->count > 0)
@@ -62,10 +63,8 @@ struct hasher *hasher_create(void)
     pthread_mutex_init(&hasher->lock, NULL);
     pthread_cond_init(&hasher->added, NULL);
     pthread_cond_init(&hasher->hashed, NULL);
-    if (pthread_create(&hasher->thread, NULL, run, hasher) == 0) {
-        pthread_setname_np(hasher->thread, "hash");
+    if (pthread_create(&hasher->thread, NULL, run, hasher) == 0)
         return hasher;
-    }
     pthread_cond_destroy(&hasher->hashed);
     pthread_cond_destroy(&hasher->added);
     pthread_mutex_destroy(&hasher->lock);

@@ -7,7 +7,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -91,13 +90,17 @@ size_t store_owners(const struct store_folder *folder, uint64_t *owners, size_t 
 
 /* ---- one of them ---- */
 
-struct store *store_open_owner(const char *path, uint64_t owner, uint64_t limit_bytes, struct error *error)
+bool store_owner_path(char path[PATH_MAX], const char *folder, uint64_t owner, struct error *error)
+{
+    return snprintf(path, PATH_MAX, "%s/%016" PRIx64, folder, owner) < PATH_MAX ||
+           error_set(error, ERROR_INVALID, "scenes.store", "the path is too long");
+}
+
+struct store *store_open_owner(const char *folder, uint64_t owner, uint64_t limit_bytes, struct error *error)
 {
     char own[PATH_MAX];
-    if (snprintf(own, sizeof(own), "%s/%016" PRIx64, path, owner) >= (int)sizeof(own)) {
-        error_set(error, ERROR_INVALID, "scenes.store", "the path is too long");
+    if (!store_owner_path(own, folder, owner, error))
         return NULL;
-    }
     for (unsigned i = 0;; i++) {
         struct error busy = {0};
         struct store *store = store_open(own, limit_bytes, &busy);

@@ -6,6 +6,7 @@
 #include "base/blob.h"
 #include "base/error.h"
 
+#include <limits.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -33,8 +34,10 @@ struct store_folder *store_claim(const char *path, struct error *error);
 void store_release(struct store_folder *folder); /* accepts NULL */
 /* Those who have a record in it, at most `max`. */
 size_t store_owners(const struct store_folder *folder, uint64_t *owners, size_t max);
-/* The owner's in such a folder. One that is about to end may have it: that is waited for. */
-struct store *store_open_owner(const char *path, uint64_t owner, uint64_t limit_bytes, struct error *error);
+/* The path of the owner's store in such a folder. False and *error: it is too long. */
+bool store_owner_path(char path[PATH_MAX], const char *folder, uint64_t owner, struct error *error);
+/* That store. A process that is about to end may have it: its end is waited for. */
+struct store *store_open_owner(const char *folder, uint64_t owner, uint64_t limit_bytes, struct error *error);
 
 /* Opens the folder, and makes it where its parent is there. Records that cannot be used are removed, and the log
  * says so. NULL and *error: it is not the user's own, another process uses it, or it cannot be read. */

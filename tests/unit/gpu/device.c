@@ -49,6 +49,16 @@ TEST(listing_devices_leaves_the_current_context_alone_or_none_behind)
     assert_string_equal(device->info.name, list[0].name);
 }
 
+TEST(the_least_used_device_is_tried_first)
+{
+    struct gpu_egl_place places[4] = {{.index = 0}, {.index = 1}, {.index = 2}, {.index = 3}};
+    const uint16_t used_by[GPU_EGL_PLACES_MAX] = {2, 1, 2, 0};
+    static const int wanted[4] = {3, 1, 0, 2};
+    gpu_egl_sort_by_use(places, 4, used_by);
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(places[i].index, wanted[i]);
+}
+
 TEST(a_missing_device_is_an_error_with_a_remedy)
 {
     struct error error = {0};

@@ -87,7 +87,7 @@ static inline void start_daemon(void)
     daemon_init(&served.daemon);
     served.daemon.unused_s = 3600;
     assert_true(daemon_start(&served.daemon, &options, &error));
-    assert_true(daemon_serve_front(&served.daemon, ends[0], &error));
+    assert_true(daemon_serve_front(&served.daemon, ends[0], NULL, &error));
     others_reach(served.daemon.hub.others, NULL); /* the test answers no question */
     assert_int_equal(pthread_create(&served.thread, NULL, run, NULL), 0);
 }

@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: MIT */
+/* The allocator of the daemon is jemalloc; its options are in allocator.c. */
+#ifndef FARLIGHT_BASE_ALLOCATOR_H
+#define FARLIGHT_BASE_ALLOCATOR_H
+
+/* Starts a thread that returns unused pages to the kernel, also while the process does nothing. Nothing happens
+ * where the sanitizers are linked in place of jemalloc. */
+void allocator_start_thread(void);
+
+#endif
