@@ -5,6 +5,7 @@
 #include "base/log.h"
 #include "gpu/buffer.h"
 #include "gpu/device.h"
+#include "gpu/egl.h"
 #include "gpu/program.h"
 #include "gpu/registry.h"
 #include "gpu/texture.h"
