@@ -486,6 +486,7 @@ format:
 # Include rules, headers alone, layout: without installing, and without clang's compiler.
 check-rules: check-headers
 	@python3 tests/tools/check_includes.py
+	@python3 tests/tools/check_comments.py
 	@printf '%s\n' $(FORMATTED) | xargs -P $(JOBS) -n 40 clang-format --dry-run -Werror
 lint: lint-packages $(PYTHON_PACKAGE)
 	@$(MAKE) -s check-rules compile_commands.json
@@ -649,7 +650,7 @@ help:
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'
 	@echo 'make fuzz       run every fuzzer for a while   [SECONDS=20]'
 	@echo 'make check      the rules of the sources and the unit tests that need no GPU and no daemon; installs nothing'
-	@echo 'make lint       include rules, headers alone, format, shaders, clang with warnings as errors'
+	@echo 'make lint       include rules, headers alone, openings of comments, format, shaders, clang with warnings as errors'
 	@echo 'make analyze    clang-tidy and gcc -fanalyzer'
 	@echo 'make coverage   which lines tests reach, into out/coverage   [TESTS=part-of-a-name]'
 	@echo 'make compile_commands.json   how each source is compiled, for editors'
