@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Programs of waves and surfaces: their defines, bindings and dispatches. */
 #include "trace/program.h"
 
 #include "shared/bindings.h"
@@ -11,7 +12,7 @@
 #define OWN_DEFINES_MAX 12
 #define SURFACE_DEFINES_MAX (TRACE_SURFACE_DEFINES + 1)
 
-/* Rays at the time 0 see the first pose, as does a program without motion. */
+/* At time 0 rays meet the first pose, and so they do in a program without motion. */
 bool trace_has_motion(const struct gpu_scene *scene, const struct wave *wave)
 {
     return scene->has_motion && wave->times;
@@ -24,7 +25,7 @@ void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave)
         gpu_buffer_bind_texels(scene->device, wave->times, UNIT_RAY_TIMES, GL_R32F);
 }
 
-/* Rays first .. end - 1, some to an invocation. */
+/* Dispatches rays first .. end - 1, `rays_an_invocation` to an invocation. */
 static void dispatch_rays(const struct gpu_program *program, const struct gpu_scene *scene,
                           const struct wave *wave, uint32_t first, uint32_t end, uint32_t rays_an_invocation)
 {
@@ -58,7 +59,7 @@ size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
     if (wave->counts)
         defines[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
-    /* For closest hits a translucent surface is like any other: no second program for it. */
+    /* A closest hit on a translucent surface is a hit like any other, and needs no second program. */
     if (scene->has_translucent && wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
     if (scene->has_transmission && wave->kind == WAVE_ANY)
@@ -74,7 +75,7 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
     struct gpu_define defines[TRACE_WAVE_DEFINES + OWN_DEFINES_MAX + 4] = {0};
     char traverse[128], packet_rays[16];
     size_t n = trace_wave_defines(scene, wave, defines);
-    /* In quotes: program.c takes the file to include from it. */
+    /* The quotes stay in the value: program.c reads the file to include from it. */
     snprintf(traverse, sizeof(traverse), "\"%s\"", source->traverse);
     snprintf(packet_rays, sizeof(packet_rays), "%u", source->packet_rays ? source->packet_rays : 1);
     defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
@@ -113,7 +114,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
         if (source->rays_a_dispatch && source->rays_a_dispatch < part && !is_whole)
             part = source->rays_a_dispatch;
         dispatch_rays(program, scene, wave, first, first + part, rays_an_invocation);
-        if (first + part < rays->end) /* a part of its own to the driver too, which may gather commands */
+        if (first + part < rays->end) /* makes the driver submit it: drivers may gather commands into one batch */
             glFlush();
     }
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Rows that describe a structure. */
 #include "trace/structure.h"
 
 #include <stdio.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Wrappers of tracer_impl: options, creation and updates. */
 #include "trace/tracer.h"
 
 #include <stdio.h>
@@ -10,7 +11,7 @@ static const struct tracer_impl *const tracers[TRACER_COUNT] = {
 #include "protocol/tracers.def"
 };
 
-/* The options begin with what struct tracer_settings has. */
+/* The options begin with the members of struct tracer_settings. */
 _Static_assert(offsetof(struct tracer_options, limits) == sizeof(struct tracer_settings), "words alone");
 
 struct tracer_options tracer_options_of(const struct tracer_settings *settings, const struct tracer_limits *limits)
@@ -123,7 +124,7 @@ void tracer_tell(const struct tracer *tracer, struct structure_rows *rows)
         tracer->impl->tell(tracer, rows);
 }
 
-/* What the stats say of the last update. */
+/* Resets the stats of the last update. */
 static void begin_stats(struct tracer_stats *stats)
 {
     stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
@@ -152,8 +153,8 @@ enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene 
     if (!good && progress == TRACER_MORE)
         impl->abandon(tracer);
     tracer->updating = good && progress == TRACER_MORE;
-    /* After a failure the structure is unknown: the next update rebuilds it. In the middle of an update that has
-     * begun with the structure of some revision, this is what the steps go by. */
+    /* After a failure the structure is unknown: the next update rebuilds it. During an update that began with
+     * the structure of some revision, the flag stays set for its steps. */
     tracer->updated = good && (progress == TRACER_DONE || tracer->updated);
     return good ? progress : TRACER_FAILED;
 }

@@ -8,8 +8,8 @@
 
 #include <stdlib.h>
 
-/* How many times as many rays as the last one a step may have, which may have been of rays that leave the scene at
- * once. The first one has the device's range_rays_first. */
+/* Maximum growth of a step's rays over the last one's, which may have left the scene at once. The first step
+ * has the device's range_rays_first. */
 #define STEP_RAYS_GROWTH 2u
 #define STEP_RAYS_MAX (1u << 30)
 
@@ -119,13 +119,13 @@ bool tracer_trace_begin(struct tracer *tracer, struct gpu_scene *scene, const st
     return state->in_progress;
 }
 
-/* In multiples of it ranges begin. */
+/* Rays that ranges are multiples of. */
 static uint32_t minimum_rays(const struct trace_state *state)
 {
     return state->impl->minimum_rays ? state->impl->minimum_rays : 1;
 }
 
-/* The rays of the next step: of equal steps, none of which has more than the family's. */
+/* The rays of the next step: the rest is divided into equal steps, none with more than the family's. */
 static struct ray_range next_range(const struct trace_state *state, uint64_t step_ns)
 {
     const struct wave *wave = &state->wave;
@@ -168,7 +168,7 @@ static uint64_t step_end_of(uint64_t step_ns)
     return step_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : clock_now_ns() + step_ns;
 }
 
-/* Intersections of some rays; *rays: those that are final. */
+/* Intersects some rays; *rays: those whose answers are final. */
 static enum tracer_progress intersect(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                                       uint64_t step_ns, struct ray_range *rays, struct error *error)
 {
@@ -192,7 +192,7 @@ static enum tracer_progress intersect(struct tracer *tracer, struct gpu_scene *s
     return progress;
 }
 
-/* `surfaces`: hits are made of the intersections too. */
+/* Runs a step. `surfaces`: intersections become hits too. */
 static enum tracer_progress do_step(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                                     uint64_t step_ns, bool surfaces, struct error *error)
 {

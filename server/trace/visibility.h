@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The answer of a shadow ray on the host: shared/ray.h. shaders/common/visibility.glsl has it for GLSL. */
+/* Encoding of a shadow ray's answer on the host (shared/ray.h); shaders/common/visibility.glsl is its
+ * counterpart in GLSL. */
 #ifndef FARLIGHT_TRACE_VISIBILITY_H
 #define FARLIGHT_TRACE_VISIBILITY_H
 
@@ -7,7 +8,7 @@
 
 #include <math.h>
 
-/* Of three transmittances, 0 to 1. */
+/* Encodes three transmittances, 0 to 1. */
 static inline uint visibility_of(const float transmittance[3])
 {
     uint light = 0;
@@ -16,7 +17,7 @@ static inline uint visibility_of(const float transmittance[3])
     return light ? light | ~VISIBILITY_LIT : 0;
 }
 
-/* channel 0 to 2: red, green, blue. */
+/* Transmittance of channel 0 to 2: red, green, blue. */
 static inline double visibility_transmittance(uint visibility, unsigned channel)
 {
     const double root = (double)(visibility >> VISIBILITY_BITS * channel & VISIBILITY_MAX) / VISIBILITY_MAX;

@@ -78,7 +78,7 @@ static inline void build_by_daemon(struct sides *sides, bool of_client)
             give_planes(sides, stage / 2);
             daemon->build.stage++;
         }
-        progress = quadtree_nodes_go_on(&daemon->build, store, &daemon->gpu, &error);
+        progress = quadtree_nodes_step(&daemon->build, store, &daemon->gpu, &error);
     }
     expect_ok(progress == TRACER_DONE && gpu_check(device, "nodes", &error), &error);
     free(daemon->nodes);
@@ -249,7 +249,7 @@ static inline struct sides *rendered(const struct scene *scene)
     gpu_scene_bind(&daemon->gpu);
     enum tracer_progress progress;
     do
-        progress = quadtree_layers_go_on(&sides->drawing, &daemon->gpu, true, &error);
+        progress = quadtree_layers_step(&sides->drawing, &daemon->gpu, true, &error);
     while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE, &error);
     assert_true(daemon->store.uniforms.width == WIDTH && daemon->store.uniforms.height == HEIGHT);

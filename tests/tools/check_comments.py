@@ -58,7 +58,7 @@ AT_MOST = {
     "server/scene": (15, 0),
     "server/session": (20, 0),
     "server/store": (7, 0),
-    "server/trace": (20, 5),
+    "server/trace": (4, 0),
     "shaders/abuffer": (10, 0),
     "shaders/bvh": (10, 1),
     "shaders/common": (16, 1),

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Builds of A-buffers: the stages in order, unit by unit, each with its items. */
 #include "trace/abuffer/build.h"
 
 #include "base/clock.h"
@@ -92,7 +93,7 @@ static bool reserve(struct abuffer_task *task, struct error *error)
            abuffer_voxels_reserve(store, error) && abuffer_lists_reserve(task, error);
 }
 
-/* The table that ids are looked up in goes with them. */
+/* Copies the table that ids are looked up in, so that the store outlives the list of draws. */
 static bool copy_drawn(struct abuffer_task *task, struct error *error)
 {
     const struct axes_draw *draw = &task->builder->draw;
@@ -119,7 +120,7 @@ static bool voxels_run(struct abuffer_task *task, uint32_t first, uint32_t end, 
     return abuffer_voxels_pass(task->store, task->stage - ABUFFER_VOXELS_JUDGE, first, end, error);
 }
 
-/* Units are of so many items at first, times step_scale. */
+/* Stages in order. The first unit of a stage has this many items, times step_scale. */
 static const struct stage_functions {
     abuffer_stage_begin *begin;
     abuffer_stage_run *run;
@@ -149,7 +150,7 @@ static uint32_t *unit_of(struct abuffer_task *task)
     return items;
 }
 
-/* Items of the stage, all that are left where nobody waits. */
+/* Runs items of the current stage for about a unit's time, or all that are left where nobody waits. */
 static bool run_unit(struct abuffer_task *task, uint64_t step_end_ns, struct error *error)
 {
     const bool whole = step_end_ns == STEP_WITHOUT_END;
@@ -168,7 +169,7 @@ static bool run_unit(struct abuffer_task *task, uint64_t step_end_ns, struct err
     }
     if (whole)
         return true;
-    gpu_finish(task->builder->device); /* else the last unit would wait for the time of all */
+    gpu_finish(task->builder->device); /* else the last unit would include the time of all before it */
     if (items == *unit)
         *unit = step_batch_items(items, clock_now_ns() - start_ns);
     return true;
@@ -182,8 +183,8 @@ static bool end_stage(struct abuffer_task *task, struct error *error)
     return !stages[ended].end || stages[ended].end(task, error);
 }
 
-/* A unit, and what a stage begins and ends with. */
-static bool go_on(struct abuffer_task *task, uint64_t step_end_ns, struct error *error)
+/* Runs a unit, with the beginning and the end of its stage where it reaches them. */
+static bool run_stage(struct abuffer_task *task, uint64_t step_end_ns, struct error *error)
 {
     if (!task->stage_begun) {
         task->next_item = 0;
@@ -242,7 +243,7 @@ enum tracer_progress abuffer_build_step(struct abuffer_builder *builder, uint64_
     gpu_scene_bind(task->scene);
     gpu_push_group(builder->device, "build A-buffers");
     do {
-        good = task->stage == ABUFFER_STAGES || go_on(task, step_end_ns, error);
+        good = task->stage == ABUFFER_STAGES || run_stage(task, step_end_ns, error);
     } while (good && task->stage != ABUFFER_STAGES && !step_is_over(step_end_ns));
     gpu_pop_group(builder->device);
     good = good && gpu_check(builder->device, "building A-buffers", error);

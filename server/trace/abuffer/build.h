@@ -16,7 +16,7 @@ struct abuffer_builder;
 
 struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct error *error);
 void abuffer_builder_destroy(struct abuffer_builder *builder); /* accepts NULL */
-/* Gives back what it keeps from build to build. None is on. */
+/* Frees what it keeps from build to build. No build may be in progress. */
 void abuffer_builder_clear(struct abuffer_builder *builder);
 uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder);
 
@@ -27,12 +27,12 @@ uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder);
 bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *store, struct gpu_scene *scene,
                          const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
                          struct error *error);
-/* Goes on with what was begun, until about step_end_ns. Waits for the device. Where the lists' buffer is too
- * small it is made larger, and the pass is repeated; where options->limits.abuffer_mebibytes or the device forbid
- * that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY. */
+/* Continues the build until about step_end_ns; waits for the device. Where the lists' buffer is too small it is
+ * enlarged and the pass repeated; where options->limits.abuffer_mebibytes or the device forbid that, it fails
+ * with ERROR_LIMIT or ERROR_OUT_OF_MEMORY. */
 enum tracer_progress abuffer_build_step(struct abuffer_builder *builder, uint64_t step_end_ns,
                                         struct error *error);
-/* Leaves an empty store where one has begun; room for lists stays. */
+/* Leaves an empty store where a build has begun; memory for lists stays reserved. */
 void abuffer_build_abandon(struct abuffer_builder *builder);
 bool abuffer_build_is_on(const struct abuffer_builder *builder);
 

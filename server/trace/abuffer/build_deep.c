@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Texels with so many samples that a loop over them would be cut short on some devices (ABUFFER_LIST_MAX): there
- * are few if any, and the host sorts them. */
+/* Sorts long lists on the host: a loop over more than ABUFFER_LIST_MAX samples would be cut short on some
+ * devices. Few texels, if any, have so many. */
 #include "trace/abuffer/build_state.h"
 
 #include <stdlib.h>
@@ -12,19 +12,19 @@ struct abuffer_node { /* abuffer/layout.h */
 struct abuffer_deep {
     struct abuffer_node *nodes, *sorted;
     uint32_t (*samples)[2], *ids;
-    uint32_t *texels; /* that are deep */
-    uint32_t place;   /* of the next one, among the samples */
+    uint32_t *texels; /* texels with long lists */
+    uint32_t place;   /* where the next list goes in the store's samples */
 };
 
 static int compare(const void *a, const void *b)
 {
     const struct abuffer_node *left = a, *right = b;
-    if (left->depth != right->depth) /* not negative: bits ascend as depths do */
+    if (left->depth != right->depth) /* depths are not negative: their bits ascend as they do */
         return left->depth < right->depth ? -1 : 1;
     return (left->id > right->id) - (left->id < right->id);
 }
 
-/* The twin of sample_bits() in abuffer/run.glsl. */
+/* Twin of sample_bits() in abuffer/run.glsl. */
 static uint32_t sample_bits(uint32_t bits, int64_t winding)
 {
     int64_t stored = winding + ABUFFER_WINDING_ZERO, maximum = ABUFFER_WINDING_MASK;
@@ -33,7 +33,7 @@ static uint32_t sample_bits(uint32_t bits, int64_t winding)
            (bits & ABUFFER_NODE_CLOSED ? ABUFFER_SAMPLE_BODY : 0);
 }
 
-/* The list of a head, in order and with its winding. Returns how many there are. */
+/* Sorts the list that begins at `head` and counts its winding. Returns its length. */
 static uint32_t sort_list(struct abuffer_deep *lists, uint32_t head)
 {
     uint32_t count = 0;

@@ -11,15 +11,15 @@
 #include <math.h>
 #include <string.h>
 
-/* Of a scene that is seen for the first time: nodes for so many of all texels. */
+/* First guess of the nodes of a new scene: one for this many texels. */
 #define TEXELS_A_NODE 4
 #define NODES_MIN 1024u
-/* What a unit of draws fills, at most: some milliseconds on software GL. */
+/* Maximum of texels that a unit of draws covers: some milliseconds on software GL. */
 #define DRAW_TEXELS 65536.0 /* times step_scale */
-/* Cleared together, as one item. */
+/* Bytes cleared as one item. */
 #define CLEAR_BYTES ((size_t)1 << 16)
 
-/* What lists and samples need on the device, with the texels that they hang from. */
+/* Device memory of lists and samples, with the texels that they hang from. */
 static uint64_t bytes_of(const struct abuffer_task *task, uint64_t nodes)
 {
     uint64_t each = ABUFFER_NODE_BYTES + ABUFFER_SAMPLE_BYTES + ABUFFER_ID_BYTES;
@@ -27,7 +27,7 @@ static uint64_t bytes_of(const struct abuffer_task *task, uint64_t nodes)
     return nodes * each + task->texel_count * texel;
 }
 
-/* That the options and the device allow. */
+/* Nodes that the options and the device allow. */
 static uint64_t nodes_allowed(const struct abuffer_task *task)
 {
     uint64_t allowed = (uint64_t)task->options->limits.abuffer_mebibytes << 20, fixed = bytes_of(task, 0);
@@ -62,7 +62,7 @@ bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error
     return error_remedy(error, "take a lower resolution, or raise memory.abuffer");
 }
 
-/* Exactly this size: there is a limit, and growing buffers reserve more than requested. */
+/* Reserves exactly this size: the limit is strict, and growing buffers reserve more than requested. */
 static bool reserve_nodes(struct abuffer_task *task, uint64_t nodes, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
@@ -95,7 +95,7 @@ static void set_lists(const void *context, const struct gpu_program *program)
                       (float)task->store->voxels_along / (float)task->store->resolution);
 }
 
-/* ---- what a pass begins with ---- */
+/* ---- beginning of a pass ---- */
 
 struct part {
     struct gpu_buffer *buffer;
@@ -205,7 +205,7 @@ bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, s
            axes_draw_range(&builder->draw, task->scene, &pass, first, end, error);
 }
 
-/* ---- what it left ---- */
+/* ---- result of the pass ---- */
 
 bool abuffer_occupied_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
 {
@@ -231,7 +231,7 @@ bool abuffer_occupied_run(struct abuffer_task *task, uint32_t first, uint32_t en
     return true;
 }
 
-/* If lists did not fit: reserves memory for all of them, and repeats the pass. */
+/* Repeats the pass with memory for all lists, if they did not fit. */
 bool abuffer_occupied_end(struct abuffer_task *task, struct error *error)
 {
     abuffer_read_counts(task);
@@ -244,7 +244,7 @@ bool abuffer_occupied_end(struct abuffer_task *task, struct error *error)
     uint64_t needed = task->counts.wraps > 0 ? UINT32_MAX : task->counts.nodes, allowed = nodes_allowed(task);
     if (needed > allowed)
         return refuse(task, needed, error);
-    uint64_t wanted = needed + needed / 8; /* a scene that changes has a few more the next time */
+    uint64_t wanted = needed + needed / 8; /* margin: a scene that changes has a few more the next time */
     task->stage = ABUFFER_CLEAR;
     return reserve_nodes(task, wanted < allowed ? wanted : allowed, error);
 }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* The stages of a build that sort the lists of texels: up to four samples, up to eight, and beyond. */
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "trace/abuffer/build_state.h"
 
 #include <epoxy/gl.h>
 
-/* That may have more than ABUFFER_FOUR samples. */
+/* Maximum of texels with more than ABUFFER_FOUR samples. */
 static uint32_t longer_max(const struct abuffer_task *task)
 {
     return task->counts.nodes / (ABUFFER_FOUR + 1) + 1;
@@ -24,7 +25,7 @@ static bool reserve(struct abuffer_task *task, struct error *error)
            gpu_buffer_reserve(device, &builder->deep, deep * sizeof(uint32_t), error);
 }
 
-/* Items first .. end - 1 of a list. Binds what all of them read and write. */
+/* Gets the program and binds what all passes over items first .. end - 1 of a list read and write. */
 static const struct gpu_program *use(struct abuffer_task *task, const struct gpu_program_source *source,
                                      uint32_t first, uint32_t end, struct error *error)
 {
@@ -75,7 +76,7 @@ bool abuffer_resolve_end(struct abuffer_task *task, struct error *error)
     return true;
 }
 
-/* Those of `longer`. */
+/* Runs a pass over items first .. end - 1 of `longer`. */
 static bool resolve_longer(struct abuffer_task *task, const struct gpu_program_source *source, uint32_t first,
                            uint32_t end, struct error *error)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* private to build*.c: what they keep between builds, and what one build is about. */
+/* State of builders and of one build. Private to build*.c. */
 #ifndef FARLIGHT_TRACE_ABUFFER_BUILD_STATE_H
 #define FARLIGHT_TRACE_ABUFFER_BUILD_STATE_H
 
@@ -11,12 +11,12 @@
 enum abuffer_stage {
     ABUFFER_CLEAR,    /* chunks of buffers */
     ABUFFER_DRAW,     /* primitives */
-    ABUFFER_OCCUPIED, /* groups of texels; where there was no room for the lists, it begins again */
-    ABUFFER_RESOLVE,  /* texels with lists, of which longer ones are left to the next three */
+    ABUFFER_OCCUPIED, /* groups of texels; the pass begins again where the lists had too little memory */
+    ABUFFER_RESOLVE,  /* texels with lists; the next three stages handle the longer ones */
     ABUFFER_UP_TO_EIGHT,
     ABUFFER_BEYOND_EIGHT,
     ABUFFER_DEEP,
-    ABUFFER_VOXELS_JUDGE, /* blocks of voxels, as in the three that follow */
+    ABUFFER_VOXELS_JUDGE, /* blocks of voxels, as in the next three */
     ABUFFER_VOXELS_REACH_X,
     ABUFFER_VOXELS_REACH_Y,
     ABUFFER_VOXELS_REACH_Z,
@@ -26,20 +26,21 @@ enum abuffer_stage {
 struct abuffer_builder;
 struct abuffer_deep; /* build_deep.c */
 
-/* A build that has begun; what it works with is the caller's. */
+/* State of one build. The caller owns the objects that it works with. */
 struct abuffer_task {
     struct abuffer_builder *builder;
-    struct abuffer_store *store; /* NULL: none has begun */
+    struct abuffer_store *store; /* NULL: no build is in progress */
     struct gpu_scene *scene;
     const struct tracer_options *options;
-    uint32_t texel_count;     /* with what pads tiles */
-    uint32_t nodes_before;    /* counted where there was no room for them */
-    enum abuffer_stage stage; /* ABUFFER_STAGES: all is done */
+    uint32_t texel_count;     /* includes the texels that pad tiles */
+    uint32_t nodes_before;    /* fragments counted by a pass whose lists did not fit */
+    enum abuffer_stage stage; /* ABUFFER_STAGES: the build is complete */
     bool stage_begun;
-    uint32_t next_item, end_item; /* of the stage */
-    /* A primitive that covers much is drawn to so many bands of rows, one after the other; 0: there is none. */
+    uint32_t next_item, end_item; /* remaining items of the stage */
+    /* A large primitive is drawn in `band_count` bands of rows, one after the other; 0: no primitive is being
+     * drawn so. */
     uint32_t band, band_count;
-    struct abuffer_build_counts counts; /* as last read back */
+    struct abuffer_build_counts counts; /* last values read back */
     struct abuffer_deep *deep;
 };
 
@@ -47,9 +48,9 @@ struct abuffer_builder {
     struct gpu_device *device;
     struct axes_draw draw;
     struct gpu_buffer heads, nodes, occupied, longer, deep, build; /* abuffer/layout.h */
-    uint32_t nodes_max;                                            /* for which there is room in `nodes` */
-    uint32_t passes;                                               /* over the scene, of the last build */
-    uint32_t unit_items[ABUFFER_STAGES];                           /* that are done together; 0: not known yet */
+    uint32_t nodes_max;                                            /* capacity of `nodes` */
+    uint32_t passes;                                               /* passes over the scene in the last build */
+    uint32_t unit_items[ABUFFER_STAGES];                           /* items per unit; 0: unknown yet */
     struct abuffer_task task;
 };
 
@@ -58,36 +59,36 @@ struct abuffer_builder {
 #define ABUFFER_ID_BYTES 4
 #define ABUFFER_NODE_BYTES 16
 #define ABUFFER_SUM_BYTES 16
-#define ABUFFER_SUBVOXELS_BYTES (8 * ABUFFER_SUBVOXELS_TEXELS) /* a voxel */
+#define ABUFFER_SUBVOXELS_BYTES (8 * ABUFFER_SUBVOXELS_TEXELS) /* per voxel */
 
-/* Of a stage: says how many items it has, with room for what it leaves; does some of them, from all bindings on;
- * looks at what there is when all are done. */
+/* Functions of a stage. begin counts its items and reserves its output; run does some items, after it has made
+ * all its bindings; end reads what they gave. */
 typedef bool abuffer_stage_begin(struct abuffer_task *task, uint32_t *items, struct error *error);
 typedef bool abuffer_stage_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error);
-/* How many of the next items make a unit that is no longer than others, at least one. */
+/* Returns how many of the next items make a unit no longer than others, at least one. */
 typedef uint32_t abuffer_stage_fit(struct abuffer_task *task, uint32_t first, uint32_t items);
 typedef bool abuffer_stage_end(struct abuffer_task *task, struct error *error);
 
-/* build_lists.c. Draws the scene into `heads`, `nodes` and the store's sums, and lists the texels that have
- * any. */
+/* build_lists.c: draws the scene into `heads`, `nodes` and the store's sums, and lists the texels that have
+ * fragments. */
 abuffer_stage_begin abuffer_clear_begin, abuffer_draw_begin, abuffer_occupied_begin;
 abuffer_stage_run abuffer_clear_run, abuffer_draw_run, abuffer_occupied_run;
 abuffer_stage_fit abuffer_draw_fit;
 abuffer_stage_end abuffer_occupied_end;
-/* build_lists.c. Whether the options allow as many texels, empty ones too. */
+/* build_lists.c: whether the options allow so many texels, empty ones included. */
 bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error);
-/* build_lists.c. Room for the lists of a first pass. */
+/* build_lists.c: reserves lists for a first pass. */
 bool abuffer_lists_reserve(struct abuffer_task *task, struct error *error);
-/* build_runs.c. From lists to the store's texels, samples and ids. */
+/* build_runs.c: turns lists into the store's texels, samples and ids. */
 abuffer_stage_begin abuffer_resolve_begin, abuffer_up_to_eight_begin, abuffer_beyond_eight_begin;
 abuffer_stage_run abuffer_resolve_run, abuffer_up_to_eight_run, abuffer_beyond_eight_run;
 abuffer_stage_end abuffer_resolve_end;
-/* build_deep.c. Those of texels that have more than the device's passes sort. */
+/* build_deep.c: sorts lists that are too long for the passes on the device. */
 abuffer_stage_begin abuffer_deep_begin;
 abuffer_stage_run abuffer_deep_run;
-void abuffer_deep_end(struct abuffer_task *task); /* also where it has not begun */
+void abuffer_deep_end(struct abuffer_task *task); /* allowed before it has begun */
 
-/* build.c. Reads task->counts back. */
+/* build.c: reads task->counts back. */
 void abuffer_read_counts(struct abuffer_task *task);
 
 #endif

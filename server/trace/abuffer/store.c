@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Buffers of the tracer `abuffer`: their initial state, end and size. */
 #include "trace/abuffer/store.h"
 
 #include "abuffer/layout.h"

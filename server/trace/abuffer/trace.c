@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Passes of the tracer `abuffer` over a wave: intersections, then surfaces. */
 #include "trace/abuffer/trace.h"
 
 #include "gpu/program.h"
@@ -8,7 +9,7 @@
 
 #include <epoxy/gl.h>
 
-/* Bisection to a depth in a column, and the samples before it. */
+/* Rounds to bisect a column to a depth, and to scan the samples before it. */
 #define SCAN_ROUNDS 36
 
 bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
@@ -32,10 +33,10 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
 
 /* With N texels and V voxels along a side, and D samples in the longest list: a ray passes 12 V parts of voxels,
  * and with the voxels and blocks 16 V. In each part and image it begins with the texel where it enters, and passes
- * 2 N texels of each image on its way. Two samples of a column are one round; by parity all of a column are looked
- * at where a surface is passed. Two more of each part are those of what it collects for a shadow ray, and of the
- * search itself (abuffer/exact.glsl). */
-/* The most rounds of the traversal's loops that a ray can take. */
+ * 2 N texels of each image on its way. Two samples of a column are one round; by parity all samples of a column
+ * are visited where a surface is passed. Each part adds two rounds: one for what it collects for a shadow ray, one
+ * for the search itself (abuffer/exact.glsl). */
+/* Maximum of rounds of the traversal's loops that a ray can take. */
 static uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store)
 {
     const uint64_t parts = 12 * (uint64_t)store->voxels_along;

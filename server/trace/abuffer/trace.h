@@ -11,8 +11,8 @@
 
 #include <stdbool.h>
 
-/* What tracer_impl.trace_range and .surfaces do. Buffers of the scene are bound. A hit's distance is where the ray
- * meets the sample's plane, its surface that of the sample's own primitive at the place nearest to there. */
+/* Implement tracer_impl.trace_range and .surfaces; the scene's buffers are bound. A hit's distance is where the
+ * ray meets the sample's plane, its surface the nearest point of the primitive that the sample is of. */
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                        const struct tracer_options *options, struct error *error);
 bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct ray_range *rays,

@@ -17,8 +17,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where no resolution was asked for: the maximum, and the samples that a pixel of the picture is worth: one takes
- * a third of the time that one of ldc takes. */
+/* Defaults where no resolution is requested: the maximum, and the samples that a pixel of the picture is worth.
+ * A sample takes a third of the time that one of ldc takes. */
 #define RESOLUTION_USUAL 1280u
 #define SAMPLES_PER_PIXEL 12.0
 
@@ -30,20 +30,20 @@ struct abuffer {
     struct abuffer_store store;
     struct abuffer_builder *builder;
     struct gpu_timer *timer;
-    struct axes_wish wish;     /* of the resolution */
-    uint32_t voxels_along;     /* as wanted; 0: as many as go with the resolution */
-    uint32_t fitted;           /* what the resolution was lowered to; 0: not counted yet */
-    uint32_t fitted_instances; /* that were counted */
-    bool had_cutout;           /* when it was built last */
+    struct axes_request request; /* requested resolution */
+    uint32_t voxels_along;       /* requested number; 0: chosen for the resolution */
+    uint32_t fitted;             /* resolution lowered to fit memory; 0: not counted yet */
+    uint32_t fitted_instances;   /* instances included in that count */
+    bool had_cutout;             /* at the last build */
 };
 
 /* ---- options ---- */
 
-/* The power of two that is nearest to sqrt(3 N), within bounds: what its authors found best. Paper, section 5. */
+/* The power of two nearest to sqrt(3 N), within bounds: the best one according to the paper, section 5. */
 static uint32_t voxels_for(uint32_t resolution)
 {
     uint32_t voxels = VOXELS_MIN;
-    /* Beyond the middle of this one and the next: 1.5 of this one, squared. */
+    /* Rounds at 1.5 times this number, the middle between it and the next; squared. */
     while (voxels < VOXELS_MAX && 4 * 3 * resolution > 9 * voxels * voxels)
         voxels *= 2;
     return voxels;
@@ -71,7 +71,7 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
         return NULL;
     }
     abuffer_store_init(&abuffer->store, device);
-    abuffer->wish = (struct axes_wish){options->abuffer.resolution, RESOLUTION_USUAL, SAMPLES_PER_PIXEL};
+    abuffer->request = (struct axes_request){options->abuffer.resolution, RESOLUTION_USUAL, SAMPLES_PER_PIXEL};
     abuffer->voxels_along = options->abuffer.voxels;
     abuffer->timer = gpu_timer_create(device);
     if (!abuffer->timer)
@@ -85,14 +85,14 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
 
 /* ---- updates ---- */
 
-/* Counts the layers before anything is built. `box`: as it is at the greatest resolution. */
+/* Counts the scene's layers before anything is built. `box`: the cube at the greatest resolution. */
 static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                 const struct axes_box *box, struct error *error)
 {
-    const struct axes_box whole = axes_box_whole(box, axes_greatest_resolution(&abuffer->wish));
+    const struct axes_box whole = axes_box_whole(box, axes_greatest_resolution(&abuffer->request));
     const float steep = abuffer->base.options.abuffer.form == TRACER_FORM_PAPER ? 0 : ABUFFER_STEEP;
     const struct axes_layers layers = axes_count_layers(scene, instances, count, 0, steep, &whole);
-    uint32_t fitted = axes_choose_resolution(&abuffer->base, layers.mean, &abuffer->wish);
+    uint32_t fitted = axes_choose_resolution(&abuffer->base, layers.mean, &abuffer->request);
     if (!axes_fit_resolution(&abuffer->base, layers.mean, &fitted, error))
         return false;
     abuffer->fitted = fitted;
@@ -100,26 +100,26 @@ static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const ui
     return true;
 }
 
-/* As many as go with a resolution that was not lowered: a lower one makes images cheaper, but with fewer voxels a
- * ray passes more samples (gears of 28 layers, 543 texels: 64 voxels take 0.7 of the time of 32). */
+/* Voxels for the resolution before it was lowered: a lower resolution makes images cheaper, but with fewer
+ * voxels a ray passes more samples (gears of 28 layers, 543 texels: 64 voxels take 0.7 of the time of 32). */
 static uint32_t voxels_of(const struct abuffer *abuffer)
 {
     uint32_t voxels = abuffer->voxels_along;
     if (voxels == 0)
-        voxels = voxels_for(axes_greatest_resolution(&abuffer->wish));
+        voxels = voxels_for(axes_greatest_resolution(&abuffer->request));
     while (voxels > abuffer->fitted && voxels > VOXELS_MIN)
         voxels /= 2;
     return voxels;
 }
 
-/* Round all that is drawn. */
+/* Places the cube round all instances that are drawn. */
 static bool place(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances,
                   uint32_t count, struct error *error)
 {
     struct abuffer_store *store = &abuffer->store;
     struct axes_box box;
     if ((abuffer->fitted == 0 || abuffer->fitted_instances != count) &&
-        (!axes_box_place(&box, scene, instances, count, axes_greatest_resolution(&abuffer->wish), error) ||
+        (!axes_box_place(&box, scene, instances, count, axes_greatest_resolution(&abuffer->request), error) ||
          !fit(abuffer, scene, instances, count, &box, error)))
         return false;
     if (!axes_box_place(&box, scene, instances, count, abuffer->fitted, error))
@@ -127,7 +127,7 @@ static bool place(struct abuffer *abuffer, const struct gpu_scene *scene, const 
     memcpy(store->lower_world, box.lower_world, sizeof(store->lower_world));
     store->cell_world = box.cell_world;
     store->resolution = abuffer->fitted;
-    store->resolution_wanted = axes_wanted_resolution(&abuffer->base, &abuffer->wish);
+    store->resolution_wanted = axes_wanted_resolution(&abuffer->base, &abuffer->request);
     store->voxels_along = voxels_of(abuffer);
     return true;
 }
@@ -162,7 +162,7 @@ static enum tracer_progress do_step(struct abuffer *abuffer, struct gpu_scene *s
     gpu_timer_begin(abuffer->timer, STAGE_BUILD, 0);
     if (abuffer_build_is_on(abuffer->builder) || begin(abuffer, scene, error))
         progress = abuffer_build_step(abuffer->builder, abuffer->base.step_end_ns, error);
-    gpu_finish(abuffer->base.device); /* the time on the CPU's clock includes the wait for it */
+    gpu_finish(abuffer->base.device); /* CPU time of the build includes the device's */
     gpu_timer_end(abuffer->timer);
     gpu_timer_collect(abuffer->timer, times);
     return progress;
@@ -173,7 +173,7 @@ static enum tracer_progress abuffer_update(struct tracer *tracer, struct gpu_sce
 {
     struct abuffer *abuffer = (struct abuffer *)tracer;
     struct tracer_stats *stats = &tracer->stats;
-    /* Of surfaces it matters only where they are cut out. */
+    /* Cutouts are the only part of a surface that the structure depends on. */
     if (!abuffer_build_is_on(abuffer->builder) && update->changed == CHANGED_SURFACES && !scene->has_cutout &&
         !abuffer->had_cutout)
         return TRACER_DONE;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Passes that make the voxels of an A-buffer. */
 #include "trace/abuffer/voxels.h"
 
 #include "gpu/program.h"
@@ -21,7 +22,7 @@ bool abuffer_voxels_reserve(struct abuffer_store *store, struct error *error)
     return gpu_buffer_reserve(store->device, &store->voxels, texels * TEXEL_BYTES, error);
 }
 
-/* What is summed of each voxel's samples, to what a ray has to know of it. */
+/* Turns the sums of each voxel's samples into what a ray needs to know of it. */
 static bool judge(struct abuffer_store *store, uint32_t first, uint32_t end, struct error *error)
 {
     const struct gpu_program_source source = {.compute = "abuffer/voxels.comp"};

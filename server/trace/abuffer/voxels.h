@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From a store's `sums` to its `voxels`: the occupied ones, the images to search in each, and the empty space
- * (shaders/abuffer/voxels.comp, raster/reach.comp). */
+/* Makes a store's `voxels` from its `sums`: which are occupied, the images to search in each, and the empty
+ * space (shaders/abuffer/voxels.comp, raster/reach.comp). */
 #ifndef FARLIGHT_TRACE_ABUFFER_VOXELS_H
 #define FARLIGHT_TRACE_ABUFFER_VOXELS_H
 
@@ -13,10 +13,10 @@
 
 #define ABUFFER_BLOCK_VOXELS 4u /* along a side */
 
-/* Items of each pass. */
+/* Number of items of each pass. */
 uint32_t abuffer_voxel_blocks(const struct abuffer_store *store);
 bool abuffer_voxels_reserve(struct abuffer_store *store, struct error *error);
-/* Blocks first .. end - 1 of a pass, before which all blocks of the passes before it are done. */
+/* Runs a pass over blocks first .. end - 1. All blocks of the passes before it must be complete. */
 bool abuffer_voxels_pass(struct abuffer_store *store, unsigned pass, uint32_t first, uint32_t end,
                          struct error *error);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* How many rays of a wave an invocation traverses, as a packet. The choice depends on the rays and
- * the scene alone, never on the clock, so that a picture is the same every time: it is made once for the whole
+/* Chooses how many rays of a wave an invocation traverses, as a packet. The choice depends on the rays and the
+ * scene alone, never on the clock, so that a picture is the same every time: it is made once for the whole
  * wave, before its first step. */
 #include "trace/bvh/tracer.h"
 
@@ -8,44 +8,44 @@
 
 #include <math.h>
 
-/* Groups that coherence is measured of. */
+/* Size of the groups whose coherence is measured. */
 #define GROUP_RAYS 8u
 #define PACKET_RAYS_PAPER 2u
-/* The traversal of a packet takes as long as four single ones: it pays with more rays than that. */
+/* Minimum of rays in a packet that pays: its traversal takes as long as four single ones. */
 #define RAYS_PER_PACKET_MIN 5u
-/* Rays that are farther apart than so many leaves, where the scene is, have few leaves in common. Measured: with
- * 871K triangles in 70K pixels (4 leaves) packets of eight camera rays are 0.9 of one alone, with 590K in 213K (2
- * leaves) 1.5; eight shadow rays, of which the last decides, 1.3, 1.04 and 0.87 with 147K, 590K and 1M triangles.
- */
+/* Maximum distance between the rays of a packet at the scene, in leaves: beyond it they have few leaves in
+ * common. Measured: with 871K triangles in 70K pixels (4 leaves) packets of eight camera rays take 0.9 of the
+ * time of single ones, with 590K in 213K (2 leaves) 1.5; eight shadow rays, whose last one decides, 1.3, 1.04
+ * and 0.87 with 147K, 590K and 1M triangles. */
 #define PACKET_WIDTH_CLOSEST 2.5f
 #define PACKET_WIDTH_ANY 1.5f
-/* A share of the scene's diagonal. */
+/* Maximum distance between the origins of a packet's rays, as a share of the scene's diagonal. */
 #define PACKET_REACH (1.0f / 512)
-/* A frame with fewer samples is done before programs that trace a little faster would be compiled, where none is
- * kept from an earlier run. Measured with llvmpipe, processor time: packets of eight camera rays take 130 ms more
- * to compile than packets of four, and save 0.07 us a ray; pairs take 50 ms more than rays one by one, and save
- * 0.04 us. */
+/* A frame with fewer samples is finished before programs that trace a little faster would be compiled, unless the
+ * cache has them. Measured with llvmpipe, processor time: packets of eight camera rays take 130 ms more to compile
+ * than packets of four, and save 0.07 us a ray; pairs take 50 ms more than rays one by one, and save 0.04 us. */
 #define SMALL_FRAME_SAMPLES (1u << 19)
 #define PACKET_RAYS_SMALL 4u
-/* Groups of which the coherence of a wave is found, and the rays below which it is not worth it. */
+/* Number of groups sampled for a wave's coherence, and the number of rays below which sampling costs more than
+ * it saves. */
 #define COHERENCE_GROUPS 512u
 #define COHERENCE_RAYS_MIN 1024u
 
 float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave)
 {
     float reach = PACKET_REACH * scene->diagonal;
-    /* Rays of several times have several places in what moves: measured, those of a lens are 0.7 of single ones
-     * then. */
+    /* Rays of different times meet a moving object in different places: measured, packets of a lens's rays then
+     * take 0.7 of the time of single ones. */
     return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
 }
 
-/* ---- the coherence of a wave: what form_packet() of bvh/packet.glsl says, but of rays that stay close ---- */
+/* ---- coherence of a wave: the rule of form_packet() in bvh/packet.glsl, for rays that stay close ---- */
 
-#define PACKET_SQUARED_COSINE 0.998f /* as there */
+#define PACKET_SQUARED_COSINE 0.998f /* value of bvh/packet.glsl */
 
 struct closeness {
-    float reach_squared; /* of the origins' distance */
-    float centre[3];     /* of the scene */
+    float reach_squared; /* maximum squared distance of origins */
+    float centre[3];     /* centre of the scene */
     float width;         /* maximum distance at the scene's centre; 0: any */
 };
 
@@ -85,7 +85,7 @@ static bool would_share(const struct closeness *closeness, const struct ray *a, 
     return closeness->width == 0.0f || apart + far * distance3(unit_a, unit_b) <= closeness->width;
 }
 
-/* Adds the live rays of a group, and the packets that would be best for them. */
+/* Adds the live rays of a group, and the number of packets that fits them best. */
 static void count_group(const struct closeness *closeness, const struct ray *rays, uint32_t counts[2])
 {
     bool waits[GROUP_RAYS];
@@ -102,8 +102,8 @@ static void count_group(const struct closeness *closeness, const struct ray *ray
     }
 }
 
-/* Of a sample of the wave: live rays, and the traversals that they would need. On the host, whose memory software
- * GL's buffers are: a program of its own took 45 ms to compile. */
+/* Counts live rays in a sample of the wave, and the traversals that they would need. The host does it: the
+ * buffers of software GL are in its memory, and a program on the device took 45 ms to compile. */
 static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                               uint32_t counts[2], struct error *error)
 {
@@ -129,7 +129,7 @@ static bool is_of_small_frame(const struct wave *wave)
     return wave->frame_samples > 0 && wave->frame_samples < SMALL_FRAME_SAMPLES;
 }
 
-/* Rays of one origin have the same answers to the bit in packets of any size. */
+/* Rays of one origin get the same answers, to the bit, in packets of any size. */
 static uint32_t packet_rays_of(const struct gpu_device *device, const struct wave *wave)
 {
     return wave->shared_origin && is_of_small_frame(wave) ? PACKET_RAYS_SMALL : device->facts.packet_rays;

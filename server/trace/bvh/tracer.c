@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// The tracer `bvh`: waves through the trees, within the time that a driver allows a dispatch.
 #include "trace/bvh/tracer.h"
 
 #include "bvh/layout.h"
@@ -119,11 +120,11 @@ static void set_uniforms(const struct bvh *bvh, const struct gpu_program *progra
     }
 }
 
-/* How the rays of a wave keep within the time of a dispatch. */
+/* How dispatches of a wave stay within the time that a driver allows. */
 enum budget {
     BUDGET_NONE,   /* software GL traces short ranges, and no driver ends them */
-    BUDGET_STOPS,  /* what is not finished stops the slice */
-    BUDGET_RESUMES /* dispatches follow one another until all is finished */
+    BUDGET_STOPS,  /* rays left unfinished stop the slice */
+    BUDGET_RESUMES /* dispatches follow one another until all rays are finished */
 };
 
 static enum budget budget_of(const struct bvh *bvh, const struct trace_state *state)
@@ -148,7 +149,7 @@ static void run_and_stop(struct bvh *bvh, const struct gpu_program *program, con
     trace_program_run(program, scene, rays, source);
 }
 
-/* One dispatch of some rays, new ones or such as go on, and waits for it. */
+/* Dispatches some rays once, new ones or unfinished ones, and waits. */
 static bool run_once(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
                      struct bvh_state *own, const struct ray_range *rays,
                      const struct trace_program_source *source, struct error *error)
@@ -175,8 +176,8 @@ static bool run_once(struct bvh *bvh, const struct gpu_program *program, const s
     return !device->lost || gpu_check(device, "tracing", error);
 }
 
-/* Dispatch by dispatch until all rays are finished or the step is over: a scene can be made so that there is no
- * end to them that a frame's cancelling, or other frames, could wait for. */
+/* Dispatches until all rays are finished or the step is over: a scene can be built whose rays take so long that
+ * neither a cancel nor other frames could wait for their end. */
 static bool run_patiently(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
                           struct trace_state *state, const struct ray_range *rays,
                           const struct trace_program_source *source, struct error *error)
@@ -212,12 +213,13 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
     if (scene_tree_only_instance(&bvh->tree) != BVH_NONE)
         defines[n++] = (struct gpu_define){"BVH_ONE_INSTANCE", "1"};
-    /* One origin in the world is many in the space of what moves. */
+    /* A common origin in the world becomes many in the object spaces of what moves. */
     if (wave->shared_origin && packet_rays > 1 && !scene->has_motion)
         defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
     if (bvh->tree.store.deforms)
         defines[n++] = (struct gpu_define){"BVH_DEFORMS", "1"};
-    if (bvh->tree.store.deforms_in_shutter && wave->times) /* else all rays see the vertices of the first pose */
+    if (bvh->tree.store.deforms_in_shutter && wave->times) /* otherwise all rays meet the vertices of the first
+                                                              pose */
         defines[n++] = (struct gpu_define){"BVH_DEFORMS_IN_SHUTTER", "1"};
     if (budget != BUDGET_NONE)
         defines[n++] = (struct gpu_define){"BVH_BUDGET", "1"};

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Builds of a layered depth cube: their beginning, their units, and passes that both ways of building share. */
 #include "trace/ldc/build.h"
 
 #include "ldc/layout.h"
@@ -118,7 +119,7 @@ void ldc_read_counts(struct ldc_task *task)
     gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
 }
 
-/* Behind the cubes before it. */
+/* Places a cube behind the cubes before it. */
 static void place_cube(struct ldc_store *store, unsigned which)
 {
     struct ldc_cube *cube = &store->cubes[which];
@@ -136,8 +137,8 @@ static void place_cube(struct ldc_store *store, unsigned which)
         store->cubes[behind].resolution = 0;
 }
 
-/* In one pass, which is the faster way wherever it was measured (software GL: 8.5 times at 8
- * layers, 40 times at 48); by peeling in the paper's form, or where the lists of one pass have no room. */
+/* Begins with one pass, which is faster wherever it was measured (software GL: 8.5 times at 8 layers, 40 times
+ * at 48); with peeling in the paper's form, or where the lists of one pass do not fit. */
 static bool begin(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
@@ -154,7 +155,7 @@ static bool begin(struct ldc_task *task, struct error *error)
            gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error);
 }
 
-/* After a unit. */
+/* Progress after a unit. */
 static enum tracer_progress progress_of(const struct ldc_task *task, bool good)
 {
     if (good)
@@ -186,7 +187,7 @@ enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_sto
     return progress_of(&builder->task, axes_draw_prepare(&builder->draw, scene, instances, instance_count, error));
 }
 
-enum tracer_progress ldc_build_go_on(struct ldc_builder *builder, bool at_once, struct error *error)
+enum tracer_progress ldc_build_step(struct ldc_builder *builder, bool at_once, struct error *error)
 {
     struct ldc_task *task = &builder->task;
     task->at_once = at_once;

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* The passes of a build over the scene. */
+/* Passes of a build over the scene. */
 #include "trace/ldc/build_state.h"
 
 #include <epoxy/gl.h>
 #include <string.h>
 
-/* How many primitives are drawn by the first unit ever. */
+/* Primitives drawn by the very first unit. */
 #define PRIMITIVES_FIRST 2048u
 
-/* Draws the next ones, and learns from how long that takes how many the unit after it is to draw. Not from a pass'
- * first ones, as a program may have been compiled for them. */
+/* Draws the next primitives and learns from their time how many the next unit draws. The first ones of a pass
+ * do not count: a program may have been compiled for them. */
 static bool draw_some(struct ldc_task *task, const struct axes_pass *pass, struct error *error)
 {
     struct ldc_builder *builder = task->builder;

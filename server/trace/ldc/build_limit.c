@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The number of layers that fit into memory: the nearest of each texel are kept. */
+/* Limits the number of layers to what fits into memory: the nearest of each texel are kept. */
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "trace/ldc/build_state.h"
 
 #include <epoxy/gl.h>
 
-/* Buffers that grow take half as much again. */
+/* Bytes of a buffer that grows: half as much again. */
 #define GROWTH(bytes) ((bytes) + (bytes) / 2)
 
 static uint64_t sample_bytes(uint64_t samples, uint64_t quads)
@@ -14,7 +14,7 @@ static uint64_t sample_bytes(uint64_t samples, uint64_t quads)
     return samples * (LDC_GEOMETRY_BYTES + LDC_SURFACE_BYTES + LDC_PRIMITIVE_BYTES) + quads * LDC_QUAD_BYTES;
 }
 
-/* Of the device, with what the passes between need. */
+/* Whether the cube and the buffers of its build fit the device's memory. */
 static bool fits_device(const struct ldc_task *task, uint64_t samples, uint64_t quads)
 {
     const struct gpu_device *device = task->builder->device;
@@ -26,7 +26,7 @@ static bool fits_device(const struct ldc_task *task, uint64_t samples, uint64_t 
     uint64_t bytes = sample_bytes(all_samples, all_quads);
     if (all_samples > texels_max || all_quads > texels_max || all_quads > LDC_QUADS_MAX)
         return false;
-    if (task->slots == 0) /* peeled: they will be in `ordered` and `peeled` */
+    if (task->slots == 0) /* peeled: fragments will be in `ordered` and `peeled` */
         bytes += samples * (LDC_ORDERED_BYTES + LDC_PEELED_BYTES);
     return device->memory_limit_bytes == 0 || bytes <= present ||
            device->memory_used_bytes + GROWTH(bytes) <= device->memory_limit_bytes;

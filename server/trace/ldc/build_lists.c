@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One pass over the scene: every fragment that falls on a texel is noted. The first few of a texel have slots of
- * their own, the others go into a list, in any order, and then to their texels' places. */
+/* Builds a cube in one pass over the scene, which notes every fragment that falls on a texel. The first few of
+ * a texel have slots of their own; the others go into a list, in any order, and then to their texels' places. */
 #include "base/log.h"
 #include "ldc/layout.h"
 #include "shared/bindings.h"
@@ -9,12 +9,13 @@
 #include <epoxy/gl.h>
 
 #define FRAGMENT_BYTES 16
-/* A fragment that has a slot costs half of what one in the list does, but all texels have as many. */
+/* Slots of a texel. A fragment with a slot costs half of one in the list, but slots are reserved for all texels
+ * alike. */
 #define SLOTS_FIRST 4u
 #define SLOTS_BYTES_MAX ((uint64_t)512 << 20)
 /* The accepted share of fragments without a slot. */
 #define UNSLOTTED_SHARE 16
-/* As many as the last build suggests and memory allows. */
+/* The number of slots that the last build suggests, within memory. */
 static uint32_t choose_slots(const struct ldc_task *task)
 {
     const struct ldc_builder *builder = task->builder;
@@ -73,7 +74,7 @@ static bool draw_lists(struct ldc_task *task, struct error *error)
            ldc_draw(task, LDC_PASS_LISTS, set_lists, give_places, error);
 }
 
-/* Texels with many fragments are sorted apart. */
+/* Sorts texels with many fragments on their own. */
 static bool sort_deep(struct ldc_task *task, struct error *error)
 {
     task->next = ldc_pack;
@@ -90,7 +91,7 @@ static ldc_unit *sort_or_pack(const struct ldc_task *task)
     return task->counts.layers_needed > LDC_PACK_SORTS ? sort_deep : ldc_pack;
 }
 
-/* Those without slots, to behind those with. */
+/* Moves fragments without slots behind those with slots. */
 static bool order(struct ldc_task *task, struct error *error)
 {
     task->next = sort_or_pack(task);
@@ -111,7 +112,7 @@ static bool order(struct ldc_task *task, struct error *error)
     return true;
 }
 
-/* Whether there is room, and the sort's loops come to an end; makes it. */
+/* Reserves the lists. False: they do not fit, or loops of the sort would be cut short. */
 static bool can_list(struct ldc_task *task)
 {
     struct ldc_builder *builder = task->builder;
@@ -139,7 +140,7 @@ static bool give_places(struct ldc_task *task, struct error *error)
     bool complete = task->drawn_again || task->counts.places <= task->builder->fragments_max;
     if (!can_list(task))
         return peel_instead(task);
-    if (!complete) { /* once more, with room for all */
+    if (!complete) { /* draw again, with memory for all */
         task->drawn_again = true;
         task->next = draw_lists;
         return true;
@@ -152,7 +153,7 @@ static bool give_places(struct ldc_task *task, struct error *error)
 bool ldc_lists(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
-    (void)error; /* where there is no room it is peeled */
+    (void)error; /* without memory it is peeled */
     task->slots = choose_slots(task);
     task->next = draw_lists;
     size_t ordered_bytes = (size_t)task->slots * task->texel_count * LDC_ORDERED_BYTES;

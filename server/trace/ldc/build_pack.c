@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The last units of a build: sorted fragments become the samples and quads of a cube. */
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "trace/ldc/build_state.h"
@@ -6,7 +7,7 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-/* `samples`, `quads`: at most so many. */
+/* Reserves at most `samples` samples and `quads` quads. */
 static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, struct error *error)
 {
     struct gpu_device *device = task->builder->device;
@@ -22,7 +23,7 @@ static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, str
                           ((uint64_t)cube->first_sample + samples) * LDC_PRIMITIVE_BYTES, error);
 }
 
-/* As if nothing were there. */
+/* Makes all texels empty. */
 static void clear_texels(struct ldc_task *task)
 {
     static const float no_range[2] = {LDC_NO_DEPTH, -LDC_NO_DEPTH};
@@ -77,7 +78,7 @@ static bool sample(struct ldc_task *task, struct error *error)
     return true;
 }
 
-/* How much there is, and what the samples show. */
+/* Reads the counts back, and makes the surfaces of samples unless peeling has made them. */
 static bool settle(struct ldc_task *task, struct error *error)
 {
     struct ldc_cube *cube = task->cube;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Depth peeling, as the paper has it (section 1.2): fragments are counted first, and the most of one texel is the
- * number of passes. Each pass draws the scene into all three images with both targets, rejects what is not behind
- * the layer before, and the depth test keeps the nearest of the rest. Everitt. Interactive Order-Independent
- * Transparency. 2001. */
+/* Depth peeling, as the paper has it (section 1.2): fragments are counted first, and the maximum in one texel is
+ * the number of passes. Each pass draws the scene into all three images with both targets, rejects what is not
+ * behind the layer before, and the depth test keeps the nearest of the rest. Everitt. Interactive
+ * Order-Independent Transparency. 2001. */
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "trace/ldc/build_state.h"
@@ -33,11 +33,11 @@ static bool reserve(struct ldc_task *task, struct error *error)
                gpu_framebuffer_create(device, &builder->layer_framebuffers[i], targets, 2, &builder->depth, error);
     }
     if (!made)
-        gpu_texture_finish(device, &builder->depth); /* the next build makes all anew */
+        gpu_texture_finish(device, &builder->depth); /* the next build makes them again */
     return made;
 }
 
-/* A power of two, by which depths in cells stay exact and below 1. */
+/* The scale of depths is a power of two, so that depths in cells stay exact and below 1. */
 static void set_peel(const void *context, const struct gpu_program *program)
 {
     const struct ldc_task *task = context;
@@ -61,7 +61,7 @@ static bool draw_layer(struct ldc_task *task, struct error *error)
     }
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glEnable(GL_DEPTH_TEST);
-    glDepthFunc(GL_LESS); /* of equal depths the first stays: instances are drawn in their order */
+    glDepthFunc(GL_LESS); /* at equal depths the first stays: instances are drawn in order */
     gpu_texture_bind(&builder->layers[!into], UNIT_LDC_LAYER);
     bool drawn = ldc_draw(task, LDC_PASS_PEEL, set_peel, note_layer, error);
     glDisable(GL_DEPTH_TEST);
@@ -94,7 +94,7 @@ static bool note_layer(struct ldc_task *task, struct error *error)
 
 static bool begin_layers(struct ldc_task *task, struct error *error)
 {
-    /* Before the first layer: every fragment lies behind it. */
+    /* The layer before the first: every fragment lies behind it. */
     static const GLfloat before_all = -1.0f;
     GLuint first[4] = {0};
     memcpy(&first[0], &before_all, sizeof(first[0]));

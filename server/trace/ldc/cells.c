@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Units that make the nodes, blocks and entries of a cube's cells. */
 #include "trace/ldc/cells.h"
 
 #include "gpu/program.h"
@@ -12,8 +13,8 @@
 
 #define CELL_NODE_BYTES (4 * sizeof(uint32_t))
 #define ENTRY_BYTES (4 * sizeof(uint32_t))
-/* A sample has a word, and one more for each cell that its plane passes in which another came first: for all of up
- * to four, as a plane spans up to 2 LDC_SPAN cells. */
+/* Maximum of words per sample: one, and one more for each further cell that its plane passes, up to four, as a
+ * plane spans at most 2 LDC_SPAN cells. */
 #define SAMPLE_WORDS_MAX 5u
 
 static bool cells_pass(struct ldc_cells *cells, const char *stage, uint64_t items, struct error *error)
@@ -50,7 +51,7 @@ static void bind_nodes(struct ldc_cells *cells, uint32_t format)
     gpu_buffer_bind_image(cells->store->device, &cells->store->nodes, IMAGE_LDC_NODES, format);
 }
 
-/* What passes over samples read. */
+/* Binds the inputs of passes over samples. */
 static void bind_samples(struct ldc_cells *cells)
 {
     struct ldc_store *store = cells->store;
@@ -83,7 +84,7 @@ static bool reserve_entries(struct ldc_cells *cells, struct error *error)
 
 /* ---- units, from the last to the first ---- */
 
-/* How far it is empty around empty nodes. */
+/* Finds the empty space around empty nodes. */
 static bool reach(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
@@ -99,7 +100,7 @@ static bool reach(struct ldc_cells *cells, struct error *error)
     return raster_reach_pass(store->device, &nodes, pass, 0, (uint32_t)node_count(cells), error);
 }
 
-/* Entries of cells that have one already. */
+/* Runs a pass that adds entries to cells that have one already. */
 static bool pass_further(struct ldc_cells *cells, const char *stage, struct error *error)
 {
     struct ldc_store *store = cells->store;
@@ -152,7 +153,7 @@ static bool mark_cells(struct ldc_cells *cells, struct error *error)
     return cells_pass(cells, "CELLS_MARK", store->cubes[cells->which].sample_count, error);
 }
 
-/* Room for what nodes found in them, which is known now. */
+/* Reserves blocks, now that the number of occupied nodes is known. */
 static bool reserve_blocks(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
@@ -195,7 +196,8 @@ static bool mark_blocks(struct ldc_cells *cells, struct error *error)
     return cells_pass(cells, "CELLS_BLOCKS", cube->sample_count, error);
 }
 
-/* Which texel per sample is in: then passes have samples, and not texels most of which are empty, for items. */
+/* Lists the texel of each sample, so that passes have samples for items and not texels, most of which are
+ * empty. */
 static bool list_samples(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
@@ -237,7 +239,7 @@ void ldc_cells_begin(struct ldc_cells *cells, struct ldc_store *store, unsigned 
             cube->first_entry = store->cubes[i].first_entry + store->cubes[i].entry_count;
 }
 
-enum tracer_progress ldc_cells_go_on(struct ldc_cells *cells, struct error *error)
+enum tracer_progress ldc_cells_step(struct ldc_cells *cells, struct error *error)
 {
     if (!cells->next(cells, error))
         return TRACER_FAILED;

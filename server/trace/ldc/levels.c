@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Units that make the nodes by which rays skip empty space: cells where they fit, else blocks. */
 #include "trace/ldc/levels.h"
 
 #include "base/log.h"
@@ -31,7 +32,7 @@ bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_c
         if (store->cubes[i].resolution && store->cubes[i].first_node + store->cubes[i].node_count > first)
             first = store->cubes[i].first_node + store->cubes[i].node_count;
     uint64_t nodes = first + node_count;
-    /* Word by word, which is how some write them. */
+    /* The limit counts words, as some passes write a node word by word. */
     if (nodes * (node_bytes / sizeof(uint32_t)) > device->facts.texture_buffer_texels_max || nodes > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution", "%llu nodes are more than the device takes",
                          (unsigned long long)nodes);
@@ -40,7 +41,7 @@ bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_c
     return ldc_store_grow(device, &store->nodes, (first + kept) * node_bytes, nodes * node_bytes, error);
 }
 
-/* Those of the three images of a cube; first room for them. */
+/* Reserves and fills the blocks of a cube's three images. */
 static enum tracer_progress build_blocks(struct ldc_levels *levels, struct error *error)
 {
     struct ldc_store *store = levels->store;
@@ -76,14 +77,14 @@ static void begin_cube(struct ldc_levels *levels, unsigned which)
         ldc_cells_begin(&levels->cells, store, which, levels->layout.grid);
 }
 
-/* A unit of the cube in hand. */
+/* Runs a unit of the current cube. */
 static enum tracer_progress build_levels(struct ldc_levels *levels, struct error *error)
 {
     struct ldc_cube *cube = &levels->store->cubes[levels->at];
     if (cube->resolution == 0)
         return TRACER_DONE;
     enum tracer_progress progress =
-        levels->layout.cells ? ldc_cells_go_on(&levels->cells, error) : build_blocks(levels, error);
+        levels->layout.cells ? ldc_cells_step(&levels->cells, error) : build_blocks(levels, error);
     if (progress == TRACER_FAILED)
         cube->node_count = cube->entry_count = 0;
     if (progress != TRACER_MORE)
@@ -91,7 +92,7 @@ static enum tracer_progress build_levels(struct ldc_levels *levels, struct error
     return progress;
 }
 
-/* There are too many cells. */
+/* Whether blocks may take the place of cells: there are too many of these. */
 static bool may_have_blocks(const struct ldc_levels *levels, const struct error *of_cells)
 {
     return levels->layout.cells && (of_cells->kind == ERROR_LIMIT || of_cells->kind == ERROR_OUT_OF_MEMORY);
@@ -106,7 +107,7 @@ void ldc_levels_begin(struct ldc_levels *levels, struct ldc_store *store, unsign
     begin_cube(levels, which);
 }
 
-enum tracer_progress ldc_levels_go_on(struct ldc_levels *levels, struct error *error)
+enum tracer_progress ldc_levels_step(struct ldc_levels *levels, struct error *error)
 {
     struct ldc_store *store = levels->store;
     struct error own = {0};

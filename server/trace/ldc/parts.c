@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The static and the dynamic instances of a scene, with a record of each node's last place. */
 #include "trace/ldc/parts.h"
 
 #include "trace/ldc/build.h"
@@ -6,12 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Removed nodes are forgotten when they outnumber the existing ones and this number. */
+/* Records of removed nodes are dropped when they outnumber both the existing nodes and this number. */
 #define RECORDS_KEPT 1024
 
-/* What is remembered of a node. */
+/* State of a node at earlier updates. */
 struct ldc_record {
-    struct ldc_member last; /* as it was when it was seen last; the geometry's deformed_revision does not matter */
+    struct ldc_member last; /* at the last update that had it; the geometry's deformed_revision does not matter */
     uint64_t seen, moved;   /* numbers of updates; moved 0: never */
 };
 
@@ -52,7 +53,7 @@ static bool same_place_and_shape(const struct ldc_member *a, const struct ldc_me
            memcmp(a->world_from_object, b->world_from_object, sizeof(a->world_from_object)) == 0;
 }
 
-/* ---- what is remembered ---- */
+/* ---- records ---- */
 
 static bool index_record(struct ldc_parts *parts, uint32_t index)
 {
@@ -82,7 +83,7 @@ static struct ldc_record *add_record(struct ldc_parts *parts, const struct ldc_m
     return &parts->records[parts->record_count++];
 }
 
-/* Forgets nodes that were not there in the last update, and who moved but in the last one. */
+/* Drops records of nodes that the last update lacked, and marks what did not move in it as static. */
 static bool settle(struct ldc_parts *parts)
 {
     uint32_t kept = 0;
@@ -102,7 +103,7 @@ static bool settle(struct ldc_parts *parts)
     return true;
 }
 
-/* Notes what an instance is now; false: no memory. */
+/* Records what an instance is now. False: no memory. */
 static bool note(struct ldc_parts *parts, const struct ldc_member *member, bool *moves)
 {
     struct ldc_record *record = find_record(parts, member->node);
@@ -134,8 +135,9 @@ static void part_add(struct ldc_part *part, uint32_t instance, const struct ldc_
     part->members[part->count++] = *member;
 }
 
-/* Deals the instances out. Those of empty geometries belong nowhere. */
-static bool deal_out(struct ldc_parts *parts, struct ldc_part fresh[LDC_CUBES_MAX], const struct gpu_scene *scene)
+/* Assigns instances to parts. Instances of empty geometries belong to none. */
+static bool assign_instances(struct ldc_parts *parts, struct ldc_part fresh[LDC_CUBES_MAX],
+                             const struct gpu_scene *scene)
 {
     for (int i = 0; i < LDC_CUBES_MAX; i++)
         if (!part_reserve(&fresh[i], scene->instance_count))
@@ -161,7 +163,7 @@ static bool same_part(const struct ldc_part *a, const struct ldc_part *b)
            (a->count == 0 || memcmp(a->members, b->members, a->count * sizeof(*a->members)) == 0);
 }
 
-/* The same bodies, wherever they are: what moves is not counted again. */
+/* Whether both have the same bodies, wherever they are: a body that has only moved is not counted again. */
 static bool same_bodies(const struct ldc_part *a, const struct ldc_part *b)
 {
     bool same = a->count == b->count;
@@ -170,19 +172,19 @@ static bool same_bodies(const struct ldc_part *a, const struct ldc_part *b)
     return same;
 }
 
-/* Places a part's cube, with its layers counted first. */
+/* Places a part's cube, after its layers are counted. */
 static bool place_part(struct ldc_part *fresh, const struct ldc_part *before, const struct gpu_scene *scene,
                        const struct ldc_parts_settings *settings, struct error *error)
 {
     const uint32_t *instances = fresh->instances, count = fresh->count;
     const bool is_counted = before->resolution > 0 && same_bodies(before, fresh);
-    uint32_t resolution = is_counted ? before->resolution : axes_greatest_resolution(&settings->wish);
+    uint32_t resolution = is_counted ? before->resolution : axes_greatest_resolution(&settings->request);
     if (!axes_box_place(&fresh->box, scene, instances, count, resolution, error))
         return false;
     if (count > 0 && !is_counted) {
         const struct axes_box whole = axes_box_whole(&fresh->box, resolution);
         const struct axes_layers layers = axes_count_layers(scene, instances, count, settings->overlap, 0, &whole);
-        resolution = axes_choose_resolution(settings->tracer, layers.mean, &settings->wish);
+        resolution = axes_choose_resolution(settings->tracer, layers.mean, &settings->request);
         if (!axes_fit_depth(settings->tracer, layers.greatest, LDC_LISTED_LAYERS_MAX, error) ||
             !axes_fit_resolution(settings->tracer, layers.mean, &resolution, error) ||
             !axes_box_place(&fresh->box, scene, instances, count, resolution, error))
@@ -200,7 +202,7 @@ bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene,
     bool crowded = parts->record_count > RECORDS_KEPT && parts->record_count / 2 > scene->instance_count;
     bool ok = (!geometry_changed && !crowded) || settle(parts);
     parts->updates++;
-    if (!(ok && deal_out(parts, fresh, scene)))
+    if (!(ok && assign_instances(parts, fresh, scene)))
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the parts of a scene of %u instances",
                        scene->instance_count);
     for (int i = 0; i < LDC_CUBES_MAX; i++) {

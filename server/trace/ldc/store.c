@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Buffers of the layered depth cubes: their growth, size, and description. */
 #include "trace/ldc/store.h"
 
 #include "trace/raster/fit.h"
@@ -43,7 +44,7 @@ static void warn_of_lost_samples(const struct ldc_cube *cube, const char *name, 
                    "--ldc-resolution");
 }
 
-/* Peeling draws what was counted before, with another program. */
+/* The warning is for peeling, whose count and whose layers come from two different programs. */
 static void warn_of_uncounted_samples(const struct ldc_cube *cube, const char *name, struct structure_row *row)
 {
     snprintf(row->warning, sizeof(row->warning),
@@ -83,7 +84,8 @@ bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64
         kept_bytes = buffer->size_bytes;
     if (kept_bytes == 0 || size_bytes <= buffer->capacity_bytes)
         return gpu_buffer_reserve(device, buffer, (size_t)size_bytes, error);
-    /* What moves is built anew with each frame and seldom to the same size. */
+    /* The slack serves cubes of moving instances, which are rebuilt in each frame and seldom have the same
+     * size. */
     struct gpu_buffer grown = {0};
     if (!gpu_buffer_reserve(device, &grown, (size_t)(size_bytes + (size_bytes - kept_bytes) / 4), error) ||
         !gpu_buffer_reserve(device, &grown, (size_t)size_bytes, error)) {

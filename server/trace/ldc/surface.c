@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The pass that turns samples which rays have hit into hits. */
 #include "trace/ldc/surface.h"
 
 #include "gpu/program.h"

@@ -10,8 +10,8 @@
 
 #include <stdbool.h>
 
-/* From intersections as trace.h has them to hits, in place: what trace_surfaces() is to exact tracers. The scene's
- * buffers are bound already. Queues the work. */
+/* Turns intersections of ldc_intersect() into hits, in place: the counterpart of trace_surfaces() for exact
+ * tracers. The scene's buffers are bound already. Queues the work. */
 bool ldc_surfaces(struct ldc_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
                   struct error *error);
 

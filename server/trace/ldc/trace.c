@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The pass of a wave through the cubes. */
 #include "trace/ldc/trace.h"
 
 #include "gpu/program.h"
@@ -47,9 +48,10 @@ static void bind(struct ldc_store *store, bool cells)
     gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_6, GL_RG32UI);
 }
 
-/* Of each cube, with R cells along a side and at most L samples in a texel: a ray passes 3 R cells, 3 R / 4 blocks
- * and 3 R / 16 nodes, each step on to the next; in a cell it tests what its three texels have. Image by image it
- * is less: 2 R texels of each image and the nodes above them, down to each and on from it. */
+/* Maximum of rounds for each cube, with R cells along a side and at most L samples in a texel: a ray passes 3 R
+ * cells, 3 R / 4 blocks and 3 R / 16 nodes, each step leading to the next; in a cell it tests the samples of
+ * three texels. Image by image it is less: 2 R texels of each image and the nodes above them, down to each and
+ * on from it. */
 static uint64_t ldc_rounds_of_a_ray(const struct ldc_store *store)
 {
     uint64_t rounds = 0;

@@ -11,9 +11,9 @@
 
 #include <stdbool.h>
 
-/* Closest hits: intersections, of which `instance` is HIT_NO_PRIMITIVE - 1 for a sample, whose number `primitive`
- * is, and HIT_NO_PRIMITIVE for a disc; ldc_surfaces() makes hits of them. Any hits: transmittances. Cubes with
- * resolution 0 are passed over. */
+/* Finds closest hits: intersections whose `instance` is HIT_NO_PRIMITIVE - 1 for a sample, with its number in
+ * `primitive`, and HIT_NO_PRIMITIVE for a disc; ldc_surfaces() makes hits of them. For any hits:
+ * transmittances. Cubes with resolution 0 are skipped. */
 bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                    const struct tracer_options *options, struct error *error);
 

@@ -19,13 +19,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where no resolution was asked for: the maximum, and the samples that a pixel of the picture is worth. To build
- * one takes about as long as bvh takes for a ray (software GL: 0.35 microseconds of a processor), and a pixel has
- * 16 rays and more. */
+/* Defaults where no resolution is requested: the maximum, and the samples that a pixel of the picture is worth.
+ * Building one sample takes about as long as bvh takes for a ray (software GL: 0.35 microseconds of a
+ * processor), and a pixel has 16 rays and more. */
 #define RESOLUTION_USUAL 1024u
 #define SAMPLES_PER_PIXEL 4.0
 
-/* What the next unit of an update does. */
+/* Phases of an update: what its next unit does. */
 enum ldc_phase {
     LDC_IDLE,
     LDC_CUBE, /* begins a cube */
@@ -36,14 +36,14 @@ enum ldc_phase {
 struct ldc {
     struct tracer base;
     enum ldc_phase phase;
-    unsigned which;            /* the cube in hand */
-    bool stale[LDC_CUBES_MAX]; /* to be built by this update */
-    struct ldc_levels levels;  /* in hand */
+    unsigned which;            /* the current cube */
+    bool stale[LDC_CUBES_MAX]; /* cubes that this update builds */
+    struct ldc_levels levels;  /* levels in the making */
     struct ldc_store store;
     struct ldc_builder *builder;
     struct ldc_parts parts;
     struct gpu_timer *timer;
-    struct axes_wish wish;
+    struct axes_request request;
 };
 
 /* ---- options ---- */
@@ -82,7 +82,7 @@ static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_
         return NULL;
     }
     ldc_store_init(&ldc->store, device);
-    ldc->wish = (struct axes_wish){options->ldc.resolution, RESOLUTION_USUAL, SAMPLES_PER_PIXEL};
+    ldc->request = (struct axes_request){options->ldc.resolution, RESOLUTION_USUAL, SAMPLES_PER_PIXEL};
     ldc->timer = gpu_timer_create(device);
     if (!ldc->timer)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");
@@ -93,7 +93,7 @@ static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_
     return NULL;
 }
 
-/* After a failure: drops everything; the next update rebuilds it. */
+/* Drops everything after a failure; the next update rebuilds it. */
 static void reset(struct ldc *ldc)
 {
     struct gpu_device *device = ldc->store.device;
@@ -107,7 +107,7 @@ static void reset(struct ldc *ldc)
 
 /* ---- updates ---- */
 
-/* Goes on to the next of the cubes that are to be built and have something in them, from ldc->which on. */
+/* Advances ldc->which to the next cube that must be built and has instances. */
 static enum tracer_progress find_cube(struct ldc *ldc)
 {
     for (; ldc->which < LDC_CUBES_MAX; ldc->which++) {
@@ -120,7 +120,7 @@ static enum tracer_progress find_cube(struct ldc *ldc)
         if (part->count == 0)
             continue;
         cube->resolution = part->resolution;
-        cube->resolution_wanted = axes_wanted_resolution(&ldc->base, &ldc->wish);
+        cube->resolution_wanted = axes_wanted_resolution(&ldc->base, &ldc->request);
         ldc->phase = LDC_CUBE;
         return TRACER_MORE;
     }
@@ -150,8 +150,8 @@ static enum tracer_progress do_unit(struct ldc *ldc, struct gpu_scene *scene, st
     if (ldc->phase == LDC_CUBE)
         return begin_cube(ldc, scene, error);
     const bool at_once = ldc->base.step_end_ns == STEP_WITHOUT_END;
-    enum tracer_progress progress = ldc->phase == LDC_SAMPLES ? ldc_build_go_on(ldc->builder, at_once, error)
-                                                              : ldc_levels_go_on(&ldc->levels, error);
+    enum tracer_progress progress = ldc->phase == LDC_SAMPLES ? ldc_build_step(ldc->builder, at_once, error)
+                                                              : ldc_levels_step(&ldc->levels, error);
     if (progress != TRACER_DONE)
         return progress;
     if (ldc->phase == LDC_LEVELS)
@@ -161,8 +161,8 @@ static enum tracer_progress do_unit(struct ldc *ldc, struct gpu_scene *scene, st
     return TRACER_MORE;
 }
 
-/* Units of one cube. The CPU's clock is to tell when the device is through with them. */
-static enum tracer_progress go_on_with_cube(struct ldc *ldc, struct gpu_scene *scene, struct error *error)
+/* Runs units of one cube, and waits for the device so that the CPU's clock measures them. */
+static enum tracer_progress run_cube(struct ldc *ldc, struct gpu_scene *scene, struct error *error)
 {
     const uint64_t step_end_ns = ldc->base.step_end_ns;
     const unsigned which = ldc->which;
@@ -177,13 +177,13 @@ static enum tracer_progress go_on_with_cube(struct ldc *ldc, struct gpu_scene *s
     return progress;
 }
 
-static enum tracer_progress go_on(struct ldc *ldc, struct gpu_scene *scene, struct stage_times *times,
-                                  struct error *error)
+static enum tracer_progress run_cubes(struct ldc *ldc, struct gpu_scene *scene, struct stage_times *times,
+                                      struct error *error)
 {
     enum tracer_progress progress = TRACER_MORE;
     gpu_scene_bind(scene);
     do
-        progress = go_on_with_cube(ldc, scene, error);
+        progress = run_cube(ldc, scene, error);
     while (progress == TRACER_MORE && !step_is_over(ldc->base.step_end_ns));
     gpu_timer_collect(ldc->timer, times);
     return progress;
@@ -201,20 +201,20 @@ static void fill_stats(struct ldc *ldc)
         ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder) + ldc_levels_bytes(&ldc->levels);
 }
 
-/* The cubes to be built. Changed materials are known, but not the instances that use them. */
+/* Determines the cubes to build. A change of materials does not say which instances use them. */
 static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene *scene, unsigned changed,
                                          struct error *error)
 {
     const struct ldc_parts_settings settings = {
         .tracer = &ldc->base,
-        .wish = ldc->wish,
+        .request = ldc->request,
         .overlap = ldc->base.options.ldc.form == TRACER_FORM_PAPER ? 1.0f : AXES_OVERLAP,
     };
     bool any = changed & CHANGED_SURFACES;
     if (!ldc_parts_update(&ldc->parts, scene, &settings, changed & CHANGED_GEOMETRY, ldc->stale, error))
         return TRACER_FAILED;
     for (unsigned i = 0; i < LDC_CUBES_MAX; i++) {
-        any = any || ldc->stale[i]; /* what lies behind a cube goes with it */
+        any = any || ldc->stale[i]; /* building a cube overwrites what lies behind it */
         ldc->stale[i] = any;
     }
     ldc->which = 0;
@@ -229,7 +229,7 @@ static enum tracer_progress ldc_update(struct tracer *tracer, struct gpu_scene *
     if (ldc->phase == LDC_IDLE)
         progress = begin_update(ldc, scene, update->changed, error);
     if (progress == TRACER_MORE)
-        progress = go_on(ldc, scene, update->times, error);
+        progress = run_cubes(ldc, scene, update->times, error);
     if (progress == TRACER_FAILED)
         reset(ldc);
     if (progress == TRACER_DONE)

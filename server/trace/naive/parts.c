@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
+// Parts of the scene's primitives with a limited number of tests.
 #include "trace/naive/parts.h"
 
 #define GROUP_RAYS 64u
 
-/* Moves on by at most `tests`; returns how many it took. */
-static uint32_t go_on(const struct gpu_scene *scene, uint32_t tests, uint32_t *instance, uint32_t *primitive)
+/* Advances by at most `tests`; returns the number of tests used. */
+static uint32_t advance(const struct gpu_scene *scene, uint32_t tests, uint32_t *instance, uint32_t *primitive)
 {
     uint32_t left = tests;
     while (left > 0 && *instance < scene->instance_count) {
         const uint32_t count = scene->geometries[scene->instances[*instance].geometry].device.primitive_count;
-        if (left == 1 && count > *primitive && left < tests) /* it would enter, and test nothing */
+        if (left == 1 && count > *primitive && left < tests) /* the last test would only enter the instance */
             break;
         const uint32_t rest = count - *primitive, taken = rest < left - 1 ? rest : left - 1;
         left -= 1 + taken;
@@ -24,9 +25,9 @@ static uint32_t go_on(const struct gpu_scene *scene, uint32_t tests, uint32_t *i
 
 bool naive_next_part(const struct gpu_scene *scene, uint32_t tests_max, struct naive_part *part)
 {
-    go_on(scene, part->tests, &part->first_instance, &part->first_primitive);
+    advance(scene, part->tests, &part->first_instance, &part->first_primitive);
     uint32_t instance = part->first_instance, primitive = part->first_primitive;
-    part->tests = go_on(scene, tests_max, &instance, &primitive);
+    part->tests = advance(scene, tests_max, &instance, &primitive);
     return part->tests > 0;
 }
 

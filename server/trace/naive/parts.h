@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The primitives of all instances in parts, as no dispatch may take long: a GPU's driver ends one after a second
- * or two, and with it everything else that the device has in hand. */
+/* Splits the primitives of all instances into parts, so that no dispatch takes long: a GPU's driver ends one
+ * after a second or two, and with it all other work on the device. */
 #ifndef FARLIGHT_TRACE_NAIVE_PARTS_H
 #define FARLIGHT_TRACE_NAIVE_PARTS_H
 
@@ -9,17 +9,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Tests of a ray: primitives, and one for each instance that is entered. */
+/* A part, in tests of a ray: one for each primitive and for each instance that is entered. */
 struct naive_part {
     uint32_t first_instance, first_primitive; /* where it begins; the primitive within the instance */
     uint32_t tests;
 };
 
-/* The next part of at most that many tests (at least 2), behind `part`; the first one is behind {0}. False: there
- * is none. Parts that follow one another have each primitive of each instance once, in order. */
+/* Advances to the next part of at most `tests_max` tests (at least 2); the first one follows {0}. False: there
+ * is none. Together the parts have each primitive of each instance once, in order. */
 bool naive_next_part(const struct gpu_scene *scene, uint32_t tests_max, struct naive_part *part);
 
-/* How many rays a dispatch of a part has, for about `tests` tests in all; a multiple of 64. */
+/* Number of rays for a dispatch of this part, for about `tests` tests in all; a multiple of 64. */
 uint32_t naive_rays_of(const struct naive_part *part, uint64_t tests);
 
 #endif

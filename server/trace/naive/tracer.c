@@ -9,19 +9,19 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* Of one dispatch: rays times primitives, which the slowest of GPUs takes a second for, and those of one ray, one
- * after the other. */
+/* Maximum of tests (rays times primitives) in a dispatch, which the slowest GPUs take a second for, and of
+ * tests of one ray, which run one after the other. */
 #define DISPATCH_TESTS_MAX ((uint64_t)1 << 30)
-/* Software GL (llvmpipe) leaves the loops of an invocation after 65535 rounds in all, without a word; what lies
- * behind would be missed. Materials that are evaluated at an intersection have loops of their own, whose rounds
+/* Software GL (llvmpipe) leaves the loops of an invocation after 65535 rounds in all, silently; primitives beyond
+ * that would be missed. Materials that are evaluated at an intersection have loops of their own, whose rounds
  * count for each primitive, hit or not: five were measured. */
 #define ROUNDS_WITH_MATERIALS 8u
 
 struct naive {
     struct tracer base;
-    uint32_t ray_tests_max;   /* of one dispatch */
-    bool has_parts;           /* there are more */
-    struct gpu_buffer depths; /* optical: of the rays of a dispatch, between two parts */
+    uint32_t ray_tests_max;   /* maximum in one dispatch */
+    bool has_parts;           /* primitives need more than one part */
+    struct gpu_buffer depths; /* optical depths of a dispatch's rays, kept between two parts */
 };
 
 static struct tracer *naive_create(struct gpu_device *device, const struct tracer_options *options,
@@ -64,13 +64,13 @@ static enum tracer_progress naive_update(struct tracer *tracer, struct gpu_scene
     return TRACER_DONE;
 }
 
-/* Some rays, from the first part of the primitives to the last. */
+/* Traces a range of rays through all parts of the primitives. */
 static void trace_parts(const struct naive *naive, const struct gpu_program *program,
                         const struct gpu_scene *scene, const struct ray_range *rays,
                         const struct trace_program_source *source)
 {
     struct naive_part part = {0};
-    naive_next_part(scene, naive->ray_tests_max, &part); /* discs are tested also where there is nothing else */
+    naive_next_part(scene, naive->ray_tests_max, &part); /* a scene of discs alone has a part too */
     gpu_uniform_uint(program, "is_first_part", 1);
     do {
         gpu_uniform_uint(program, "part_first_instance", part.first_instance);
@@ -79,7 +79,7 @@ static void trace_parts(const struct naive *naive, const struct gpu_program *pro
         trace_program_run(program, scene, rays, source);
         gpu_uniform_uint(program, "is_first_part", 0);
         if (naive->has_parts)
-            glFlush(); /* a part of its own to the driver too, which may gather commands */
+            glFlush(); /* makes the driver submit it: drivers may gather commands into one batch */
     } while (naive_next_part(scene, naive->ray_tests_max, &part));
 }
 
@@ -93,7 +93,7 @@ static bool naive_trace_range(struct tracer *tracer, struct gpu_scene *scene, st
     struct naive_part part = {0};
     if (!program)
         return false;
-    naive_next_part(scene, naive->ray_tests_max, &part); /* none is larger, but for a test */
+    naive_next_part(scene, naive->ray_tests_max, &part); /* parts get no larger, except in a test */
     const uint32_t each = naive_rays_of(&part, DISPATCH_TESTS_MAX);
     for (uint32_t first = rays->first, count; first < rays->end; first += count) {
         count = rays->end - first < each ? rays->end - first : each;
@@ -111,7 +111,7 @@ static bool naive_trace_range(struct tracer *tracer, struct gpu_scene *scene, st
 
 const struct tracer_impl tracer_naive_impl = {
     .name = "naive",
-    .depends_on = CHANGED_GEOMETRY | CHANGED_INSTANCES | CHANGED_SHADING, /* what limits it */
+    .depends_on = CHANGED_GEOMETRY | CHANGED_INSTANCES | CHANGED_SHADING, /* materials limit a dispatch */
     .minimum_rays = TRACE_RAYS_MULTIPLE,
     .create = naive_create,
     .destroy = naive_destroy,

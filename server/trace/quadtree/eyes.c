@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Passes that trace the rays of pinhole eyes near the view's own, with their checks. */
 #include "trace/quadtree/eyes.h"
 
 #include "shared/bindings.h"
@@ -7,13 +8,13 @@
 #include <epoxy/gl.h>
 #include <math.h>
 
-/* The cosine of the angle between an eye's ray and the direction of the view, at the least: numbers of what goes
- * nearly across it grow beyond what floats tell apart. */
+/* Minimum cosine between an eye's ray and the direction of the view: for a ray nearly across it, numbers grow
+ * beyond the precision of floats. */
 #define COSINE_MIN 0.1f
 
 /* ---- an eye in the face ---- */
 
-/* Rows of quadtree_uniforms.face_from_world times columns of the frame's axes. */
+/* Rotates from view to face: rows of quadtree_uniforms.face_from_world times columns of the frame's axes. */
 static void face_from_view(const struct quadtree_uniforms *u, const struct frame_uniforms *frame,
                            const float view[3], float face[3])
 {
@@ -55,7 +56,7 @@ static float length_of(const float v[3])
     return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* All directions lie between those of the corners. */
+/* Whether all rays go ahead in the face. The rays through the picture's corners bound all others. */
 static bool goes_ahead(const struct quadtree_uniforms *u, const struct frame_uniforms *frame)
 {
     for (int corner = 0; corner < 4; corner++) {
@@ -132,7 +133,7 @@ struct programs {
     const struct gpu_program *beams, *eyes;
 };
 
-/* Both may be announced. */
+/* Gets the programs. Either may have been announced. */
 static bool get_programs(const struct quadtree_store *store, bool spread, struct programs *programs,
                          struct error *error)
 {
@@ -146,7 +147,7 @@ static bool get_programs(const struct quadtree_store *store, bool spread, struct
     return programs->eyes && programs->beams;
 }
 
-/* Where the rays of each tile begin. */
+/* Finds where the rays of each tile begin. */
 static bool make_beams(const struct quadtree_store *store, struct quadtree_state *state,
                        const struct eye_rays *rays, const struct gpu_program *program, struct error *error)
 {
@@ -167,7 +168,7 @@ static bool make_beams(const struct quadtree_store *store, struct quadtree_state
     return true;
 }
 
-/* A GPU's driver ends what takes long (trace/program.h). */
+/* Dispatches in parts: a GPU's driver ends a dispatch that takes long (trace/program.h). */
 static void dispatch(const struct quadtree_store *store, const struct gpu_program *program, uint32_t samples)
 {
     const uint32_t together = trace_rays_a_dispatch(store->device, quadtree_rounds_of_a_ray(store));

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
+/* Faces of a view: one of its own, or the cube round its eye; and which of them instances reach. */
 #include "trace/quadtree/faces.h"
 
 #include <math.h>
 #include <string.h>
 
-/* ---- where they lie ---- */
+/* ---- placement ---- */
 
-/* Right, down and forward of a view. */
+/* The axes of a view: right, down and forward. */
 static void axes_of(const struct trace_view *view, vec4 axes[3])
 {
     const float *m = view->world_from_view;
@@ -28,8 +29,8 @@ void quadtree_place_view(struct quadtree_uniforms *uniforms, const struct trace_
     uniforms->scale_centre[0] = uniforms->scale_centre[1] = (float)texels->height / 2.0f / half_height;
 }
 
-/* Face 2 a looks along axis a of the view, face 2 a + 1 against it; right, down and forward are right-handed. What
- * the picture shows lies in one face where its angle allows it: a ray that stays there looks at no other. */
+/* Face 2 a looks along axis a of the view, face 2 a + 1 against it; right, down and forward are right-handed. The
+ * picture lies in one face where its angle allows it: a ray that stays there reads no other. */
 void quadtree_place_cube(struct quadtree_uniforms *uniforms, const struct trace_view *view, uint32_t texels)
 {
     vec4 axes[3] = {{0}};
@@ -48,7 +49,7 @@ void quadtree_place_cube(struct quadtree_uniforms *uniforms, const struct trace_
     uniforms->scale_centre[0] = uniforms->scale_centre[1] = (float)texels / 2.0f;
 }
 
-/* ---- what they see ---- */
+/* ---- visibility ---- */
 
 struct raster_camera quadtree_face_camera(const struct quadtree_uniforms *uniforms, uint32_t face)
 {
@@ -78,12 +79,12 @@ static void view_of(float view[3], const struct raster_camera *camera, const flo
         view[k] = (world[0] - m[3]) * m[k] + (world[1] - m[7]) * m[4 + k] + (world[2] - m[11]) * m[8 + k];
 }
 
-/* Sides of the frustum, as bits, that a ball lies beyond. */
+/* The sides of the frustum that a ball lies beyond, as bits. */
 static unsigned beyond(const struct raster_camera *camera, const float world[3], float radius)
 {
     float v[3];
     view_of(v, camera, world);
-    /* A little wider, for rounding. */
+    /* slightly wider, for rounding */
     const float reach = (camera->orthographic ? 1.0f : -v[2]) * 1.0001f;
     unsigned sides = 0;
     for (int k = 0; k < 2; k++) {
@@ -131,11 +132,11 @@ bool quadtree_is_run_beside(const struct raster_camera *camera, const struct qua
     return all != 0;
 }
 
-/* Sides of a face's frustum; what is left of a triangle has one corner more for each at most. */
+/* Sides of a face's frustum. Each can add one corner to a clipped triangle. */
 #define SIDES 5
 #define CORNERS_MAX (3 + SIDES)
 
-/* How far within a side a point of the view lies, right, up and backward: a little more, for rounding. */
+/* Distance of a point of the view (right, up, backward) within a side; slightly more, for rounding. */
 static float within(const struct raster_camera *camera, const float v[3], int side)
 {
     const float reach = (camera->orthographic ? 1.0f : -v[2]) + 1e-4f * fabsf(v[2]);
@@ -145,7 +146,7 @@ static float within(const struct raster_camera *camera, const float v[3], int si
     return camera->extent[k] * reach + (side % 2 ? -v[k] : v[k]);
 }
 
-/* Leaves of a polygon what is within a side; the number of its corners. */
+/* Clips a polygon to a side; returns its number of corners. */
 static int cut(const struct raster_camera *camera, float corners[CORNERS_MAX][3], int count, int side)
 {
     float kept[CORNERS_MAX][3];
@@ -166,7 +167,8 @@ static int cut(const struct raster_camera *camera, float corners[CORNERS_MAX][3]
     return n;
 }
 
-/* A large triangle, of a floor, may pass by though no side alone has all of it beyond. */
+/* Whether a triangle misses the frustum. A large one, of a floor for example, may miss it although no single
+ * side has all of it beyond. */
 static bool is_triangle_beside(const struct raster_camera *camera, const struct instance *instance,
                                const struct scene_mesh *mesh, uint32_t triangle)
 {
@@ -196,13 +198,14 @@ static bool is_sphere_beside(const struct raster_camera *camera, const struct in
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)
             squares += instance->world_from_object[r][c] * instance->world_from_object[r][c];
-    return beyond(camera, world, at[3] * sqrtf(squares)) != 0; /* no axis grows by more than all of them */
+    return beyond(camera, world, at[3] * sqrtf(squares)) != 0; /* their sum bounds the growth along each axis */
 }
 
-/* Primitives that are looked at for a face: about a millisecond's worth. With more it counts as not empty. */
-#define PRIMITIVES_LOOKED_AT (1u << 16)
+/* Primitives tested for a face: about a millisecond's worth. A face with more counts as not empty. */
+#define PRIMITIVES_TESTED (1u << 16)
 
-/* What deforms is not where its mesh is. *left: of PRIMITIVES_LOOKED_AT. */
+/* Whether all primitives of a span lie beside the face. A mesh that deforms leaves its original place, so it
+ * never does. *left: what remains of PRIMITIVES_TESTED. */
 static bool are_all_beside(const struct raster_camera *camera, const struct gpu_scene *scene,
                            struct raster_span span, uint32_t *left)
 {
@@ -232,12 +235,12 @@ static bool is_empty(const struct quadtree_uniforms *uniforms, const struct gpu_
                      const struct quadtree_runs *runs, uint32_t face)
 {
     const struct raster_camera camera = quadtree_face_camera(uniforms, face);
-    uint32_t left = PRIMITIVES_LOOKED_AT;
+    uint32_t left = PRIMITIVES_TESTED;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         if (!is_instance_beside(&camera, runs, scene, i, &left))
             return false;
     for (uint32_t i = 0; i < scene->disc_count; i++) {
-        const float *ball = scene->discs[i].centre_radius; /* which its disc lies in */
+        const float *ball = scene->discs[i].centre_radius; /* encloses the disc */
         if (beyond(&camera, ball, ball[3]) == 0)
             return false;
     }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Draws the layers of each face, part by part. */
 #include "trace/quadtree/layers.h"
 
 #include "base/clock.h"
@@ -9,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* By the layers of a pass. */
+/* Formats by the number of layers in a pass. */
 static const GLenum formats_of_depths[] = {0, GL_DEPTH_COMPONENT32F, GL_RG32F, GL_RGBA32F};
 
 bool quadtree_layers_begin(struct quadtree_layers *layers, struct quadtree_store *store, struct error *error)
@@ -46,7 +47,7 @@ static bool add_span(struct quadtree_layers *layers, struct raster_span span, st
     return true;
 }
 
-/* What of an instance is not beside the face. */
+/* Adds the runs of an instance that the face may see. */
 static bool add_spans(struct quadtree_layers *layers, const struct gpu_scene *scene,
                       const struct raster_camera *camera, uint32_t instance, struct error *error)
 {
@@ -75,7 +76,7 @@ static void clear(const struct quadtree_layers *layers)
     static const GLuint nothing[4] = {VISIBLE_NOTHING};
     static const GLfloat farthest[4] = {0.0f};
     const GLint count = (GLint)layers->pass_layers;
-    glDisable(GL_SCISSOR_TEST); /* clearing heeds both */
+    glDisable(GL_SCISSOR_TEST); /* glClear() would heed scissor and mask */
     glDepthMask(GL_TRUE);
     for (GLint i = 0; i < count; i++)
         glClearNamedFramebufferuiv(layers->framebuffer.name, GL_COLOR, i, nothing);
@@ -127,14 +128,14 @@ static bool draw_part(struct quadtree_layers *layers, struct gpu_scene *scene, b
     return drawn;
 }
 
-static bool go_on(struct quadtree_layers *layers, struct gpu_scene *scene, struct error *error)
+static bool continue_pass(struct quadtree_layers *layers, struct gpu_scene *scene, struct error *error)
 {
     const uint64_t start_ns = clock_now_ns();
     bool whole = false;
     if ((!layers->begun && !begin_pass(layers, scene, error)) || !draw_part(layers, scene, &whole, error))
         return false;
     if (!whole) {
-        gpu_finish(layers->store->device); /* else all parts would be waited for at the end, at once */
+        gpu_finish(layers->store->device); /* otherwise the end would wait for all parts at once */
         raster_view_learn(&layers->drawing, clock_now_ns() - start_ns, STEP_NS);
         return true;
     }
@@ -147,15 +148,15 @@ static bool go_on(struct quadtree_layers *layers, struct gpu_scene *scene, struc
     return true;
 }
 
-enum tracer_progress quadtree_layers_go_on(struct quadtree_layers *layers, struct gpu_scene *scene, bool at_once,
-                                           struct error *error)
+enum tracer_progress quadtree_layers_step(struct quadtree_layers *layers, struct gpu_scene *scene, bool at_once,
+                                          struct error *error)
 {
     struct gpu_device *device = layers->store->device;
     const uint64_t end_ns = at_once ? STEP_WITHOUT_END : clock_now_ns() + STEP_BATCH_NS;
     bool good = true;
     gpu_push_group(device, "layers of the view");
     while (good && layers->face < layers->store->uniforms.faces) {
-        good = go_on(layers, scene, error);
+        good = continue_pass(layers, scene, error);
         if (step_is_over(end_ns))
             break;
     }

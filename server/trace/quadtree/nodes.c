@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Units that build the nodes of the quadtrees, level by level. */
 #include "trace/quadtree/nodes.h"
 
 #include "gpu/program.h"
@@ -10,7 +11,7 @@
 
 #define NODE_BYTES 8u
 #define ERROR_BYTES 4u
-/* Nodes of a unit: some milliseconds. */
+/* Nodes per unit: some milliseconds. */
 #define UNIT_ITEMS (1u << 17) /* times step_scale */
 
 static uint32_t slice_count(const struct quadtree_uniforms *uniforms)
@@ -33,8 +34,8 @@ static bool has_levels(const struct quadtree_uniforms *uniforms)
     return uniforms->slice_nodes > slice_texels(uniforms);
 }
 
-/* Stages are the leaves and level 1 of each slice, then each level above of all slices, then what is nearest; or
- * the leaves of each slice alone. */
+/* Stages of a slice. The order of all stages: leaves and level 1 of each slice, then each level above of all
+ * slices together, then the nearest depths; or only the leaves of each slice. */
 static uint32_t stages_a_slice(const struct quadtree_uniforms *uniforms)
 {
     return has_levels(uniforms) ? 2 : 1;
@@ -56,14 +57,15 @@ static uint32_t stage_level(const struct quadtree_uniforms *uniforms, uint32_t s
     return stage < slices ? stage % stages_a_slice(uniforms) : stage - slices + 2;
 }
 
-/* Invocations; the last stage has a few. */
+/* Invocations of a stage; the last one has a few. */
 static uint64_t stage_items(const struct quadtree_uniforms *uniforms, uint32_t stage)
 {
     const uint32_t slices = stage < slice_stages(uniforms) ? 1 : slice_count(uniforms);
     const uint32_t level = stage_level(uniforms, stage);
     return has_levels(uniforms) && stage + 1 == stage_count(uniforms)
                ? uniforms->faces
-               : (uint64_t)(slice_texels(uniforms) >> 2 * (level > 0 ? level : 1)) * slices; /* four leaves each */
+               /* four leaves per invocation */
+               : (uint64_t)(slice_texels(uniforms) >> 2 * (level > 0 ? level : 1)) * slices;
 }
 
 /* ---- stages ---- */
@@ -115,7 +117,7 @@ static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store
     gpu_scene_bind(scene);
     gpu_texture_bind(&store->visible, UNIT_QUADTREE_VISIBLE);
     gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_QUADTREE_NODES, GL_RG32UI);
-    const bool apart = has_levels(&store->uniforms); /* the next stage writes them to the tree */
+    const bool apart = has_levels(&store->uniforms); /* a later stage copies them to the tree */
     struct gpu_buffer *leaves = apart ? &build->planes : &store->nodes;
     const uint32_t first_leaf = apart ? 0 : slice * store->uniforms.slice_nodes;
     gpu_buffer_bind_image(store->device, leaves, IMAGE_QUADTREE_PLANES, GL_RG32UI);
@@ -128,7 +130,7 @@ static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store
     return true;
 }
 
-/* Level 1: of one slice, with its leaves. */
+/* Makes a level: level 1 from the leaves of one slice. */
 static bool make_level(struct quadtree_node_build *build, struct quadtree_store *store, uint32_t slice,
                        uint32_t level, uint64_t count, struct error *error)
 {
@@ -149,7 +151,7 @@ static bool make_level(struct quadtree_node_build *build, struct quadtree_store 
     return true;
 }
 
-/* How near the surfaces of each face come. */
+/* Finds the depth of the nearest surface of each face. */
 static bool find_nearest(struct quadtree_store *store, struct error *error)
 {
     const struct gpu_program *program = program_get(store, "quadtree/nearest.comp", NULL, error);
@@ -161,8 +163,8 @@ static bool find_nearest(struct quadtree_store *store, struct error *error)
     return true;
 }
 
-enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, struct quadtree_store *store,
-                                          struct gpu_scene *scene, struct error *error)
+enum tracer_progress quadtree_nodes_step(struct quadtree_node_build *build, struct quadtree_store *store,
+                                         struct gpu_scene *scene, struct error *error)
 {
     const struct quadtree_uniforms *uniforms = &store->uniforms;
     const uint32_t slices = slice_stages(uniforms),

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Boxes round runs of primitives, kept from scene to scene. */
 #include "trace/quadtree/runs.h"
 
 #include <float.h>
@@ -108,7 +109,7 @@ bool quadtree_runs_update(struct quadtree_runs *runs, const struct gpu_scene *sc
     return true;
 }
 
-/* NULL: no boxes of it are known. */
+/* The owner of an instance's boxes; NULL: it has no known boxes. */
 static const struct quadtree_run_owner *known_owner(const struct quadtree_runs *runs,
                                                     const struct gpu_scene *scene, uint32_t instance)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Buffers of the quadtrees, and the settings of a view as its uniforms. */
 #include "trace/quadtree/store.h"
 
 #include "protocol/words.h"
@@ -8,13 +9,15 @@
 #include <math.h>
 #include <string.h>
 
-#define UNIT_OF_DIAGONAL 0.05f /* where w is 1: slopes of w then have all bits of half floats */
-#define DOUBLED_AT 0.25f       /* diagonals: where bounds that grow with distance are twice as large */
+#define UNIT_OF_DIAGONAL                                                                                          \
+    0.05f                /* distance at which w is 1: slopes of w then use the full precision of half             \
+                            floats */
+#define DOUBLED_AT 0.25f /* distance in diagonals at which bounds that grow with distance have doubled */
 #define CUBE_TEXELS_MAX 1024u
 #define CUBE_TEXELS_MIN 256u
 #define CUBE_TEXELS_STEP 128u
 
-#define PAPER_COSINE 0.99862953f /* of 3 degrees: its gamma_norm */
+#define PAPER_COSINE 0.99862953f /* cosine of 3 degrees: gamma_norm of the paper */
 
 static bool is_paper(const struct quadtree_settings *settings)
 {
@@ -46,7 +49,7 @@ uint64_t quadtree_store_bytes(const struct quadtree_store *store)
     return store->uniform_buffer.capacity_bytes + store->nodes.capacity_bytes + store->visible.size_bytes;
 }
 
-/* ---- where the faces lie ---- */
+/* ---- placement of faces ---- */
 
 static uint32_t scaled(uint32_t pixels, double scale)
 {
@@ -80,7 +83,7 @@ static float distance_from(const float eye[3], const float lower[3], const float
     return sqrtf(squared);
 }
 
-/* Beyond it there is nothing but discs, which are no part of what bounds a scene. */
+/* Distance of the far plane. Beyond it there is nothing but discs, which do not count in a scene's bounds. */
 static float far_distance(const struct gpu_scene *scene, const float eye[3], bool orthographic)
 {
     float far = scene->instance_count > 0 ? distance_from(eye, scene->lower_world, scene->upper_world) : 0.0f;
@@ -91,12 +94,12 @@ static float far_distance(const struct gpu_scene *scene, const float eye[3], boo
     return far * 1.001f + 1e-6f;
 }
 
-/* Two texels for three of the picture's pixels along its middle: what is hit is the primitive itself, so that only
- * what is thinner than a texel, or hidden within one, is missed. Of the scenes of the SPD set as fine as the
- * pixels it took 1.5 to 2 times as long, for 0.2 to 0.8 dB. */
+/* Two texels cover three of the picture's pixels along its middle. A hit is on the primitive itself, so only
+ * details thinner than a texel, or hidden within one, are missed. On the SPD scenes, one texel per pixel took
+ * 1.5 to 2 times as long, for 0.2 to 0.8 dB. */
 #define CUBE_PIXELS_A_TEXEL 1.5f
 
-/* The texels along a side of a cube's face. */
+/* Texels along a side of a cube's face. */
 static uint32_t cube_texels(const struct trace_view *view, const struct quadtree_settings *settings)
 {
     if (settings->resolution)
@@ -107,13 +110,12 @@ static uint32_t cube_texels(const struct trace_view *view, const struct quadtree
     return whole > CUBE_TEXELS_MIN ? whole : CUBE_TEXELS_MIN;
 }
 
-/* A plane that is not the hit leads to the primitive that is: where it is off, rays that graze it meet another
- * texel.
- */
+/* Factor on the error bound where planes lead to primitives: a plane that is off makes grazing rays meet another
+ * texel. */
 #define ERROR_TO_PRIMITIVES (1.0f / 64.0f)
 
-/* An error of w of so much moves what an eye within the radius sees by the pixels that are allowed: e / (f R) in
- * 1 / Z. An orthographic view has no parallax; there it is a depth of so many pixels. */
+/* The error of w that moves what an eye within the radius sees by the allowed number of pixels: e / (f R), as a
+ * difference of 1 / Z. An orthographic view has no parallax; there the error is a depth of so many pixels. */
 static float error_of_w(const struct quadtree_uniforms *u, const struct trace_view *view,
                         const struct quadtree_settings *settings)
 {
@@ -131,7 +133,7 @@ static float diagonal_of(const struct gpu_scene *scene)
 static void place_depths(struct quadtree_uniforms *u, const struct gpu_scene *scene, const struct trace_view *view)
 {
     const bool orthographic = view->fov_y == 0.0f && u->faces == 1;
-    /* What the picture cuts off may be seen in a mirror. */
+    /* A mirror may show what the picture's near plane cuts off. */
     const float near = raster_near(scene, u->faces == 1 ? view->near : 0.0f, orthographic);
     u->depths[0] = orthographic ? near : fmaxf(diagonal_of(scene) * UNIT_OF_DIAGONAL, 1e-6f);
     u->depths[1] = fmaxf(far_distance(scene, u->eye_world, orthographic), 2.0f * near);
@@ -173,7 +175,7 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
         u->slice_nodes += (u->padded_width >> level) * (u->padded_height >> level);
 }
 
-/* ---- room ---- */
+/* ---- memory ---- */
 
 bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene,
                           const struct trace_view *view, const struct quadtree_settings *settings,

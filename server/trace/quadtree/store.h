@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The structure on the device: shaders/quadtree/layout.h says what is in it. GL thread. */
+/* Quadtrees on the device; shaders/quadtree/layout.h describes their buffers. GL thread. */
 #ifndef FARLIGHT_TRACE_QUADTREE_STORE_H
 #define FARLIGHT_TRACE_QUADTREE_STORE_H
 
@@ -16,32 +16,32 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* All-zero, but for the device, is empty. */
+/* All-zero with a device is empty. */
 struct quadtree_store {
     struct gpu_device *device;
-    bool only_leaves; /* no nodes above them: for those who look at layers, and trace no rays */
+    bool only_leaves; /* no nodes above the leaves: enough to read layers, not to trace rays */
     struct quadtree_uniforms uniforms;
     struct gpu_buffer uniform_buffer;
-    struct gpu_texture visible; /* GL_RG32UI array: a layer a slice, padded size */
+    struct gpu_texture visible; /* GL_RG32UI array, one layer per slice, padded size */
     struct gpu_buffer nodes;
-    struct quadtree_runs runs; /* of the scene that it was placed for */
+    struct quadtree_runs runs; /* runs of the scene that the faces were placed for */
 };
 
-/* How many are asked for. */
+/* Number of layers that the settings ask for. */
 uint32_t quadtree_layer_count(const struct quadtree_settings *settings);
 bool quadtree_hits_planes(const struct quadtree_settings *settings);
 void quadtree_store_finish(struct quadtree_store *store); /* leaves it empty */
 uint64_t quadtree_store_bytes(const struct quadtree_store *store);
-/* The view whose pixels are the texels of a view's face: `view` with its margin, at the resolution that is asked
- * for. The same eye and direction; larger, and with a wider angle. */
+/* Gets the view whose pixels are the texels of a view's face: `view` with its margin at the requested
+ * resolution. Eye and direction are the same; it is larger, with a wider angle. */
 void quadtree_texel_view(struct trace_view *texels, const struct trace_view *view,
                          const struct quadtree_settings *settings);
-/* Where the faces of such a view lie, and how large they are: fills store->uniforms, uploads them, and makes room
- * for the slices, with store->only_leaves as it is. */
+/* Places the faces of a view: fills store->uniforms, uploads them, and reserves the slices, with
+ * store->only_leaves as it is. */
 bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene,
                           const struct trace_view *view, const struct quadtree_settings *settings,
                           struct error *error);
-/* Binds uniforms, `visible` and `nodes` at their places. */
+/* Binds uniforms, `visible` and `nodes` at their binding points. */
 void quadtree_store_bind(struct quadtree_store *store);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* State of waves through the quadtrees, their passes, and the counts of their rays. */
 #include "trace/quadtree/trace.h"
 
 #include "protocol/words.h"
@@ -9,7 +10,7 @@
 
 #define SOURCE_DEFINES 3
 
-/* The buffer of counts. */
+/* Contents of the buffer of counts. */
 struct counts {
     struct quadtree_counts kinds[QUADTREE_KINDS];
     uint32_t outcomes[QUADTREE_OUTCOMES];
@@ -65,7 +66,7 @@ static void tell_kind(const struct quadtree_counts *counts, enum ray_kind kind, 
     structure_per_ray(rows, "unknown_outside", (float)counts->outside / rays);
 }
 
-/* What is counted of the rays of eyes by their number, as of those of a kind. */
+/* Adds the rays of eyes to the counts of their kind. */
 static void add_eyes(struct counts *counts, uint64_t samples)
 {
     struct quadtree_counts *sums = &counts->kinds[RAY_PRIMARY];
@@ -115,7 +116,7 @@ static struct trace_program_source source_of(const struct tracer_options *option
         defines[n++] = (struct gpu_define){"QUADTREE_PLANES", "1"};
     if (options->quadtree.faces == QUADTREE_FACES_VIEW)
         defines[n++] = (struct gpu_define){"QUADTREE_VIEW", "1"};
-    else /* NVIDIA's compiler (driver 580) came to no end in minutes over the loops in one another, faces, layers,
+    else /* NVIDIA's compiler (driver 580) did not finish within minutes on nested loops over faces, layers and
             nodes */
         defines[n++] = (struct gpu_define){"PRAGMA", "optionNV(unroll none)"};
     return (struct trace_program_source){.traverse = "quadtree/traverse.glsl", .defines = defines};

@@ -14,7 +14,7 @@
 
 #include <stdlib.h>
 
-/* Of a build: what the next unit does, and parts of STAGE_BUILD. */
+/* Phases of a build, which are also parts of STAGE_BUILD: what the next unit does. */
 enum quadtree_phase { QUADTREE_IDLE, QUADTREE_DRAW, QUADTREE_BUILD };
 
 struct quadtree {
@@ -23,7 +23,7 @@ struct quadtree {
     struct quadtree_store store;
     struct quadtree_layers layers;
     struct quadtree_node_build nodes;
-    struct trace_view texels; /* of the structure, where it is of a view */
+    struct trace_view texels; /* pixels are texels of the structure, if that is of one view */
     struct gpu_timer *timer;
 };
 
@@ -94,17 +94,16 @@ static enum tracer_progress do_unit(struct quadtree *quadtree, struct gpu_scene 
 {
     const bool at_once = quadtree->base.step_end_ns == STEP_WITHOUT_END;
     if (quadtree->phase == QUADTREE_BUILD)
-        return quadtree_nodes_go_on(&quadtree->nodes, &quadtree->store, scene, error);
-    const enum tracer_progress progress = quadtree_layers_go_on(&quadtree->layers, scene, at_once, error);
+        return quadtree_nodes_step(&quadtree->nodes, &quadtree->store, scene, error);
+    const enum tracer_progress progress = quadtree_layers_step(&quadtree->layers, scene, at_once, error);
     if (progress != TRACER_DONE)
         return progress;
     quadtree->phase = QUADTREE_BUILD;
     return quadtree_nodes_begin(&quadtree->nodes, &quadtree->store, error) ? TRACER_MORE : TRACER_FAILED;
 }
 
-/* Units of one phase; the CPU's clock is to tell when the device is through with them. */
-static enum tracer_progress go_on_with_phase(struct quadtree *quadtree, struct gpu_scene *scene,
-                                             struct error *error)
+/* Runs units of one phase, and waits for the device so that the CPU's clock measures them. */
+static enum tracer_progress run_phase(struct quadtree *quadtree, struct gpu_scene *scene, struct error *error)
 {
     const uint64_t step_end_ns = quadtree->base.step_end_ns;
     const enum quadtree_phase phase = quadtree->phase;
@@ -128,7 +127,7 @@ static enum tracer_progress quadtree_update(struct tracer *tracer, struct gpu_sc
         progress = TRACER_FAILED;
     gpu_scene_bind(scene);
     while (progress == TRACER_MORE) {
-        progress = go_on_with_phase(quadtree, scene, error);
+        progress = run_phase(quadtree, scene, error);
         if (step_is_over(tracer->step_end_ns))
             break;
     }

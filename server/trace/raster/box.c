@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: MIT */
+/* Places the cube of cells round instances. */
 #include "trace/raster/box.h"
 
 #include <math.h>
 
-/* Squares of the lengths in a larger box would overflow a float, and traversals compute them. */
+/* Maximum coordinate: squares of the lengths in a larger box, which traversals compute, would overflow a float. */
 #define PLACE_MAX 1e18
-/* Of a coordinate: a cell below this could not be told from its neighbours, as positions are floats. */
+/* Minimum of a cell relative to a coordinate: a smaller one could not be told from its neighbours, as positions
+ * are floats. */
 #define CELL_RELATIVE_MIN 0x1p-22
-#define CELL_MIN 1e-12 /* metres; keeps squares of cells far from zero, too */
+#define CELL_MIN 1e-12 /* metres; keeps squares of cells well above zero, too */
 #define MARGIN_CELLS 1
 
 struct bounds {

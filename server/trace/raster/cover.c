@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
+/* Projected areas of primitives, in texels. */
 #include "trace/raster/cover.h"
 
 #include <math.h>
 
 #define PI 3.14159265f
 
-/* The transform of normals whose lengths are areas, by an instance's matrix. */
+/* An instance's transform of normals whose lengths are areas. */
 struct areas {
     float rows[3][3];
-    float per_cell; /* texels in the unit of area */
+    float per_cell; /* texels per unit of area */
 };
 
 static struct areas areas_of(const struct instance *instance, float cell_world)
@@ -23,7 +24,7 @@ static struct areas areas_of(const struct instance *instance, float cell_world)
     return areas;
 }
 
-/* The projected sizes of a flat area with this normal in object space along the three axes. */
+/* Texels along the three axes of a flat area with this normal in object space. */
 static float texels_of_normal(const struct areas *areas, const float normal[3])
 {
     float sum = 0;
@@ -58,7 +59,7 @@ static float texels_of_sphere(const struct areas *areas, const struct scene_sphe
     return sum;
 }
 
-/* Of one instance's primitives, as axes_cover_end(). */
+/* Does the work of axes_cover_end() for the primitives of one instance. */
 static uint32_t end_in_instance(const struct gpu_scene *scene, const struct instance *instance, float cell_world,
                                 uint32_t first, uint32_t end, double maximum, double *texels)
 {

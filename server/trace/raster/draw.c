@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Instances as draws: one call for all of a sort. An instance's number comes to the vertices as an attribute that
- * advances with the instance, so that no uniform has to be set between two of them; a primitive is one vertex. */
+/* Instances as draws: one call per sort. An instance's number reaches the vertices as an attribute that advances
+ * with the instance, so that no uniform changes between two instances; a primitive is one vertex. */
 #include "trace/raster/draw.h"
 
 #include "gpu/barrier.h"
@@ -215,7 +215,7 @@ static void set_state(const struct axes_pass *pass)
         glScissor(0, (GLint)pass->first_row, along, (GLsizei)(pass->end_row - pass->first_row));
     }
     glDisable(GL_CULL_FACE);
-    glFrontFace(GL_CCW); /* gl_FrontFacing: others leave it either way */
+    glFrontFace(GL_CCW); /* gl_FrontFacing depends on it, and other code may change it */
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
 }
 
@@ -237,7 +237,7 @@ static uint32_t end_of(const struct axes_draw *draw, uint32_t command)
     return command + 1 < draw->command_count ? draw->listed[command + 1].first_id : draw->primitive_count;
 }
 
-/* Some of a command's primitives: the rest of an instance, whole ones, the beginning of one. */
+/* Draws a range of a command's primitives: the rest of an instance, whole ones, the beginning of one. */
 static void draw_some(const struct axes_command *command, uint32_t first, uint32_t end)
 {
     const uint32_t each = command->vertex_count;
@@ -251,7 +251,7 @@ static void draw_some(const struct axes_command *command, uint32_t first, uint32
     }
 }
 
-/* The primitives of the run's commands that are in the range; commands that are so altogether in one call. */
+/* Draws the primitives of a run's commands that lie in the range; whole commands go together in one call. */
 static void draw_run(const struct axes_draw *draw, const struct axes_run *run, uint32_t first, uint32_t end)
 {
     const uint32_t run_end = run->first + run->count;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Layers counted from projected areas, and the resolution that follows from them. */
 #include "trace/raster/fit.h"
 
 #include <math.h>
@@ -6,9 +7,9 @@
 #include <stdlib.h>
 
 #define PI 3.14159265358979
-/* Looked at, of all primitives: about a millisecond's worth. Of each instance at least one is. */
-#define PRIMITIVES_LOOKED_AT (1u << 16)
-/* Blocks along a side of an image, of which each has its number of layers; as steps, they end with one more. */
+/* Maximum of primitives measured, about a millisecond's worth; at least one of each instance is. */
+#define PRIMITIVES_MEASURED (1u << 16)
+/* Blocks along a side of an image, each with its number of layers; as steps, they end with one more. */
 #define COUNTED_ALONG 128
 #define COUNTED_ROW (COUNTED_ALONG + 1)
 #define COUNTED_STEPS (COUNTED_ROW * COUNTED_ROW)
@@ -24,13 +25,14 @@ static void areas_of(double rows[3][3], const struct instance *instance)
         }
 }
 
-/* What is counted so far. */
+/* The count so far. */
 struct counting {
-    const struct axes_box *whole; /* of one cell */
+    const struct axes_box *whole; /* the cube as one cell */
     double overlap, steep;
     double each;   /* primitives that the next one stands for */
     double areas;  /* in all three images, square metres */
-    double *steps; /* of the layers' numbers along u and v: COUNTED_STEPS an image; NULL: only areas are counted */
+    double *steps; /* steps of the number of layers along u and v: COUNTED_STEPS per image; NULL: only areas are
+                      counted */
 };
 
 static int block_of(const struct counting *counting, double place_world, int axis)
@@ -40,8 +42,8 @@ static int block_of(const struct counting *counting, double place_world, int axi
     return (int)fmin(fmax(share * COUNTED_ALONG, 0), COUNTED_ALONG - 1);
 }
 
-/* Areas along the axes, spread evenly over the blocks that the bounds touch: none of them gets more than is there,
- * and large primitives take no longer than small ones. */
+/* Adds areas along the axes, spread evenly over the blocks that the bounds touch: no block gets more than there
+ * is, and large primitives take no longer than small ones. */
 static void count_areas(struct counting *counting, const double areas[3], const double lower[3],
                         const double upper[3])
 {
@@ -62,7 +64,7 @@ static void count_areas(struct counting *counting, const double areas[3], const 
     }
 }
 
-/* The sums of the steps; the greatest of them. */
+/* Sums the steps; returns the maximum of the sums. */
 static double greatest_of(double *steps)
 {
     double greatest = 0;
@@ -75,7 +77,7 @@ static double greatest_of(double *steps)
     return greatest;
 }
 
-/* Of a flat area with this normal in object space, what the images that it is in see, square metres. */
+/* Projected areas, square metres, of a flat area with this normal in object space in the images that it is in. */
 static void areas_in_images(double areas[3], const double rows[3][3], const double normal[3], double overlap,
                             double steep)
 {
@@ -131,7 +133,7 @@ static double share_of_sphere(double overlap, double steep)
     return 4 / PI * edge * atan(edge);
 }
 
-/* Both sides; squeezed ones as if the share were theirs too. */
+/* Counts both sides of a sphere; a squeezed one as if the share were the same. */
 static void count_sphere(struct counting *counting, const struct instance *instance, const double rows[3][3],
                          const struct scene_spheres *spheres, uint32_t sphere)
 {
@@ -152,7 +154,7 @@ static void count_sphere(struct counting *counting, const struct instance *insta
     count_areas(counting, areas, lower, upper);
 }
 
-/* Every `stride`th primitive stands for those after it. */
+/* Counts every `stride`th primitive in place of those after it. */
 static void count_instance(struct counting *counting, const struct gpu_scene *scene,
                            const struct instance *instance, uint32_t stride)
 {
@@ -181,8 +183,8 @@ struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32
     counting.steps = calloc(3 * (size_t)COUNTED_STEPS, sizeof(*counting.steps));
     for (uint32_t i = 0; i < count; i++)
         primitives += scene->geometries[scene->instances[instances[i]].geometry].device.primitive_count;
-    /* Odd: the two triangles of a quadrilateral, which often come by turns, are looked at by turns. */
-    const uint32_t stride = (uint32_t)(primitives / PRIMITIVES_LOOKED_AT) | 1u;
+    /* An odd stride measures both triangles of a quadrilateral by turns, as they often alternate. */
+    const uint32_t stride = (uint32_t)(primitives / PRIMITIVES_MEASURED) | 1u;
     for (uint32_t i = 0; i < count; i++)
         count_instance(&counting, scene, &scene->instances[instances[i]], stride);
     layers.mean = counting.areas / (3 * side * side);
@@ -191,9 +193,9 @@ struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32
     return layers;
 }
 
-uint32_t axes_greatest_resolution(const struct axes_wish *wish)
+uint32_t axes_greatest_resolution(const struct axes_request *request)
 {
-    return wish->resolution > 0 ? wish->resolution : wish->usual;
+    return request->resolution > 0 ? request->resolution : request->usual;
 }
 
 double axes_times(const struct gpu_device *device)
@@ -201,21 +203,21 @@ double axes_times(const struct gpu_device *device)
     return (double)device->facts.axes_samples_max / AXES_SAMPLES_USUAL;
 }
 
-uint32_t axes_choose_resolution(const struct tracer *tracer, double layers, const struct axes_wish *wish)
+uint32_t axes_choose_resolution(const struct tracer *tracer, double layers, const struct axes_request *request)
 {
     const uint32_t pixels = tracer->options.picture_pixels;
-    if (wish->resolution > 0 || pixels == 0)
-        return axes_greatest_resolution(wish);
+    if (request->resolution > 0 || pixels == 0)
+        return axes_greatest_resolution(request);
     const double counted = pixels > AXES_PICTURE_PIXELS_MIN ? pixels : AXES_PICTURE_PIXELS_MIN;
-    const double samples = wish->samples_per_pixel * counted * axes_times(tracer->device);
+    const double samples = request->samples_per_pixel * counted * axes_times(tracer->device);
     const double fitting = fmax(sqrt(samples / (3 * (layers + AXES_TEXEL_COST))), AXES_FITTED_MIN);
-    return (uint32_t)fmin(fitting, wish->usual);
+    return (uint32_t)fmin(fitting, request->usual);
 }
 
-uint32_t axes_wanted_resolution(const struct tracer *tracer, const struct axes_wish *wish)
+uint32_t axes_wanted_resolution(const struct tracer *tracer, const struct axes_request *request)
 {
-    const uint32_t pixels = tracer->options.picture_pixels, greatest = axes_greatest_resolution(wish);
-    return wish->resolution > 0 || pixels == 0 ? greatest : (uint32_t)fmin(sqrt(pixels) / 2, greatest);
+    const uint32_t pixels = tracer->options.picture_pixels, greatest = axes_greatest_resolution(request);
+    return request->resolution > 0 || pixels == 0 ? greatest : (uint32_t)fmin(sqrt(pixels) / 2, greatest);
 }
 
 bool axes_fit_resolution(const struct tracer *tracer, double layers, uint32_t *resolution, struct error *error)

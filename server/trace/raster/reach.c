@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Passes that measure the empty space round empty blocks. */
 #include "trace/raster/reach.h"
 
 #include "gpu/program.h"

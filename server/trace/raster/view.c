@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Draws a view's surfaces in parts, sort by sort, each part as long as a step allows. */
 #include "trace/raster/view.h"
 
 #include "gpu/program.h"
@@ -7,15 +8,15 @@
 #include <math.h>
 #include <string.h>
 
-/* Reversed floating-point depth keeps its precision however small the near distance is, so this only has to be
- * small enough never to cut anything: a share of the scene's diagonal. */
+/* Near distance as a share of the scene's diagonal: small enough that it never cuts anything. Reversed
+ * floating-point depth stays precise however small it is. */
 #define NEAR_OF_DIAGONAL 1e-5f
 
-/* Vertices that one part draws, times step_scale: at most what takes some ten milliseconds if triangles are small,
- * and fewer where that takes longer than a step should: larger triangles, other work on the machine. Each part
- * costs something of its own, so only then. */
+/* Vertices per part, times step_scale: at most what takes some ten milliseconds with small triangles, and fewer
+ * where a part takes longer than a step should, with larger triangles or a busy machine. A part has a fixed
+ * cost, so parts are no smaller than needed. */
 #define DRAW_VERTICES_MAX (3u << 16)
-#define DRAW_VERTICES_FIRST (3u << 14) /* nothing is known of the scene yet */
+#define DRAW_VERTICES_FIRST (3u << 14) /* before anything is known of the scene */
 #define DRAW_VERTICES_MIN (3u << 12)
 
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
@@ -63,12 +64,12 @@ static const struct gpu_program *get_program(struct gpu_device *device, enum pri
     return gpu_program_get(device, &source, error);
 }
 
-/* What is drawn one after the other, each under one program. */
+/* Sorts of primitives, drawn one after the other, each with a program of its own. */
 enum primitive_sort { SORT_WHOLE, SORT_WITH_HOLES, SORT_DISCS, SORT_SPHERES, SORT_COUNT };
 static const enum primitive_kind kind_of_sort[SORT_COUNT] = {PRIMITIVE_TRIANGLES, PRIMITIVE_TRIANGLES,
                                                              PRIMITIVE_DISCS, PRIMITIVE_SPHERES};
 
-/* Primitives of an instance (all discs count as one) that are of a sort. */
+/* Number of primitives of a sort in an instance (all discs count as one), and the first of them. */
 static uint32_t primitives_of(const struct gpu_scene *scene, enum primitive_sort sort, uint32_t instance,
                               uint32_t *first)
 {
@@ -88,7 +89,7 @@ static bool has_cutout(const struct gpu_scene *scene, enum primitive_sort sort)
     return sort == SORT_WITH_HOLES || (sort != SORT_WHOLE && scene->has_cutout);
 }
 
-/* What is drawn next of a sort; end 0: nothing of this span. */
+/* The next span to draw of a sort; end 0: this span has none. */
 static struct raster_span span_of(const struct raster_view *view, const struct raster_view_target *target,
                                   uint32_t *first_primitive)
 {
@@ -103,7 +104,7 @@ static struct raster_span span_of(const struct raster_view *view, const struct r
     return span;
 }
 
-/* Goes on with a sort where the last part ended; what is left of `budget` vertices comes back. */
+/* Continues a sort where the last part ended; *budget returns the vertices left. */
 static bool draw_sort(struct raster_view *view, const struct raster_view_target *target, uint32_t *budget,
                       struct error *error)
 {
@@ -123,7 +124,7 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
             !(program = get_program(target->device, kind, has_cutout(scene, sort), target->layers, error)))
             return false;
         uint32_t maximum = *budget / vertices_per_primitive[kind], part = count < maximum ? count : maximum;
-        if (sort == SORT_SPHERES) /* the picture's y runs down, which turns every winding round */
+        if (sort == SORT_SPHERES) /* the picture's y points down, which reverses every winding */
             glFrontFace(scene->instances[span.instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
         gpu_uniform_uint(program, "instance_index", span.instance);
         gpu_uniform_uint(program, "first_primitive", first);
@@ -151,8 +152,8 @@ static bool draw_sorts(struct raster_view *view, const struct raster_view_target
 {
     bool drawn = true;
     while (drawn && *budget > 0 && view->sort < SORT_COUNT) {
-        if (view->sort == SORT_SPHERES) { /* of a sphere's box the inner sides: they are there also when the eye
-                                           * is in the box */
+        if (view->sort == SORT_SPHERES) { /* the inner sides of a sphere's box exist also when the eye is in the
+                                             box */
             glEnable(GL_CULL_FACE);
             glCullFace(GL_FRONT);
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What the waves of a frame have cost. The device adds it up, so that no frame waits for the counts of a wave. */
+/* Counts the cost of a frame's waves. The device adds them up, so that no frame waits for the counts of a wave. */
 #include "trace/rayspace/tracer.h"
 
 #include "protocol/words.h"
@@ -33,7 +33,7 @@ static double sum_of(uint32_t low, uint32_t high)
     return (double)((uint64_t)high << 32 | low);
 }
 
-/* A kind is a part of its own, behind the trees over the scene. */
+/* Adds the rows of a kind of rays, as a part of its own behind the trees over the scene. */
 static void tell_kind(const struct rayspace_counts *counts, enum ray_kind kind, struct structure_rows *rows)
 {
     const double rays = sum_of(counts->rays_low, counts->rays_high);

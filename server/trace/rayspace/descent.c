@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* Pairs of nodes and parts of the scene descend: the nodes alone (section 3.3), or both hierarchies together (the
- * outlook of section 6). */
+/* Descent of pairs of a node over rays and a part of the scene: the nodes alone descend (section 3.3), or both
+ * hierarchies together (the outlook of section 6). */
 #include "trace/rayspace/tracer.h"
 
 #include "gpu/program.h"
@@ -13,27 +13,27 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Pairs of a stack: so many a ray, within bounds. */
+/* Pairs in a stack: this many per ray, within bounds. */
 #define PAIRS_A_RAY 8u
 #define PAIRS_MIN (1u << 16)
 #define PAIRS_MAX (1u << 22)
-#define PAIRS_LEAST (1u << 12) /* where memory is short */
-/* See shaders/rayspace/control.comp: a pass of one pair leaves four more behind, at each of some hundred levels.
- */
+#define PAIRS_LEAST (1u << 12) /* minimum where memory is short */
+/* Reserve for passes of one pair, which leave four more behind at each of some hundred levels
+ * (shaders/rayspace/control.comp). */
 #define PAIRS_RESERVED (1u << 12)
-/* The descent begins with so many nodes at most, or all rays of a small wave: a pass of few pairs takes as long as
- * one of hundreds, and so does a level of few nodes. */
+/* Maximum of nodes that a descent begins with; a small wave begins with its rays. A pass of few pairs takes as
+ * long as one of hundreds, and so does a level of few nodes. */
 #define SEEDS_MAX 256u
-#define ITEMS_MAX (1u << 20) /* of a batch */
-/* Where the host does not wait: passes that are queued for the joint descent, whose two hierarchies have some
- * forty levels; of a batch of the flat one beyond those of the rays; and of how many passes leaves are tested
- * together. */
+#define ITEMS_MAX (1u << 20) /* per batch */
+/* Passes queued where the host does not wait: for the joint descent, whose two hierarchies have some forty
+ * levels together; for a batch of the flat one, beyond the levels of the rays; and the number of passes whose
+ * leaves are tested together. */
 #define PASSES_JOINT 64u
 #define PASSES_FLAT 16u
 #define PASSES_A_TEST 8u
-/* From all pairs of a stack to one it takes fewer halvings. */
+/* Maximum of failed passes in a row: halving from all pairs of a stack to one takes fewer. */
 #define FAILED_IN_TURN_MAX 64u
-/* A node is divided while it is wider than a fraction of the element. The factor of the fewest tests. */
+/* A node is divided while it is wider than this fraction of the element: the factor that gave the fewest tests. */
 #define SPLIT_FACTOR 4.0f
 #define LEAVES_ALL 0u
 #define LEAVES_NONE UINT32_MAX
@@ -58,7 +58,7 @@ static bool is_flat(const struct rayspace_state *state)
     return rayspace_is_flat(&state->base.options);
 }
 
-/* Passes of their own reduce the stream. */
+/* Whether separate passes reduce the stream. */
 static bool leaves_slots(const struct rayspace_state *state)
 {
     return is_paper(&state->base.options);
@@ -104,21 +104,21 @@ void rayspace_bind_wave(const struct gpu_scene *scene, struct rayspace_state *st
     gpu_uniform_uint(program, "ray_count", wave->ray_count);
 }
 
-/* Of rays that primitives are tested against. */
+/* Binds the times of rays for tests against primitives. */
 static void bind_times(const struct gpu_scene *scene, const struct wave *wave)
 {
     if (trace_has_motion(scene, wave))
         gpu_buffer_bind_storage(wave->times, BIND_RAYSPACE_TIMES);
 }
 
-/* ---- the beginning ---- */
+/* ---- preparation ---- */
 
 static uint32_t at_most(uint32_t number, uint32_t maximum)
 {
     return number < maximum ? number : maximum;
 }
 
-/* Pairs that each stack has room for, if memory allows. */
+/* Pairs to reserve for each stack, if memory allows. */
 static uint32_t capacity_of(const struct rayspace_state *state)
 {
     const uint32_t rays = state->base.wave.ray_count;
@@ -127,13 +127,13 @@ static uint32_t capacity_of(const struct rayspace_state *state)
     return at_most(wanted, state->capacity_fits ? state->capacity_fits : UINT32_MAX);
 }
 
-/* Of them, for passes of one pair. */
+/* Pairs of the capacity that are kept for passes of one pair. */
 static uint32_t reserved_of(const struct rayspace_state *state)
 {
     return at_most(PAIRS_RESERVED, state->capacity / 4);
 }
 
-/* Pairs of a pass, and items of a batch. What was halved for the last waves of the family is taken halved. */
+/* Pairs of a pass, or items of a batch: the last waves of the family needed so many halvings. */
 static uint32_t batch_of(const struct rayspace_state *state, uint32_t maximum)
 {
     const uint32_t batch = maximum >> state->halved[state->base.wave.family];
@@ -146,7 +146,7 @@ static uint32_t pass_max(const struct rayspace_state *state, const struct gpu_de
     return leaves_slots(state) ? rayspace_reduction_pairs(device, pairs) : pairs;
 }
 
-/* What each ray needs comes first: it cannot be less. */
+/* Reserves the buffers, those per ray first, whose size is fixed. */
 static bool try_to_reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error)
 {
     const uint32_t rays = state->base.wave.ray_count;
@@ -173,14 +173,14 @@ static void release_stacks(struct rayspace_state *state, struct gpu_device *devi
     rayspace_reduction_finish(device, &state->reduction);
 }
 
-/* Stacks that memory has no room for are halved, and stay so: passes then take fewer pairs. */
+/* Reserves; halves stacks that do not fit into memory, for good: passes then process fewer pairs. */
 static bool reserve(const struct rayspace *rayspace, struct rayspace_state *state, struct gpu_device *device,
                     struct error *error)
 {
     for (;;) {
         struct error own = {0};
         state->capacity = capacity_of(state);
-        /* All items of a batch are put onto one stack, as by a pass. */
+        /* Each batch goes onto one stack in a single pass, whole. */
         const uint32_t room = state->capacity - reserved_of(state);
         state->batch_max = at_most(batch_of(state, at_most(room, ITEMS_MAX)), rayspace->rank_count);
         if (try_to_reserve(state, device, &own))
@@ -194,7 +194,7 @@ static bool reserve(const struct rayspace *rayspace, struct rayspace_state *stat
     }
 }
 
-/* Rays end at the discs that they hit. */
+/* Tests all discs. A ray ends at the first one that it hits. */
 static bool test_discs(struct gpu_scene *scene, struct rayspace_state *state, struct error *error)
 {
     struct gpu_define defines[TRACE_WAVE_DEFINES + 1] = {0};
@@ -210,8 +210,8 @@ static bool test_discs(struct gpu_scene *scene, struct rayspace_state *state, st
     return true;
 }
 
-/* Nodes that all rays are in, each with all of the scene. Levels above theirs are not made. Where waves are queued
- * ahead, how many rays there are is not known, and it is the one node of all. */
+/* Pushes the nodes that together hold all rays, each with the whole scene. Levels above them are not made.
+ * Where waves are queued ahead, the number of rays is unknown on the host, and the seed is the root. */
 static void put_seeds(struct rayspace_state *state, struct gpu_device *device, bool has_scene)
 {
     struct rayspace_levels *levels = &state->levels;
@@ -255,9 +255,10 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
 
 /* ---- passes ---- */
 
-/* Pairs of a flat batch have nearly as many children as there can be, near the root: a pass that takes all of them
- * is done in vain, and one of half of them again. Where waves are queued ahead, passes are few and take what they
- * can: batches that do not fit are halved for the next wave. In the joint descent hardly any pass fails. */
+/* Children that must fit on the stack. Near the root the pairs of a flat batch have nearly as many children as
+ * possible: a pass over all of them would fail and be repeated with half of them. Where waves are queued ahead,
+ * there are few passes and each takes what it can: batches that do not fit are halved for the next wave. In the
+ * joint descent hardly any pass fails. */
 static uint32_t children_with_room(const struct rayspace_state *state)
 {
     return is_flat(state) && !rayspace_is_ahead(state) ? RAYSPACE_CHILDREN : 0;
@@ -291,7 +292,7 @@ static bool dispatch_control(struct rayspace_state *state, const struct gpu_scen
     return true;
 }
 
-/* What passes and tests of leaves read. */
+/* Binds the inputs of passes and of leaf tests. */
 static void bind_descent(struct gpu_scene *scene, struct rayspace *rayspace, struct rayspace_state *state,
                          const struct gpu_program *program)
 {
@@ -304,7 +305,7 @@ static void bind_descent(struct gpu_scene *scene, struct rayspace *rayspace, str
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
 }
 
-/* The test of rays against primitives, which materials may have a part in. */
+/* Gets the test of rays against primitives, for the materials of the scene. */
 static const struct gpu_program *leaf_test_get(const struct rayspace *rayspace, const struct gpu_scene *scene,
                                                const struct rayspace_state *state, struct error *error)
 {
@@ -409,7 +410,7 @@ static void next_pass(struct rayspace_state *state)
     state->turn = !state->turn;
 }
 
-/* The next primitives against the root. */
+/* Begins the next batch of primitives at the root. */
 static bool next_batch(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                        struct error *error)
 {
@@ -438,9 +439,9 @@ static bool has_more_batches(const struct rayspace *rayspace, const struct raysp
     return is_flat(state) && state->next_rank < rayspace->rank_count;
 }
 
-/* ---- with the host ---- */
+/* ---- descent with the host ---- */
 
-/* Until about that time. The host waits for each pass, and leaves out what there is none of. */
+/* Descends until about step_end_ns. The host waits for each pass, and skips passes with nothing to do. */
 static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gpu_scene *scene,
                                             struct rayspace_state *state, uint64_t step_end_ns,
                                             struct error *error)
@@ -452,7 +453,7 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
         gpu_buffer_read(scene->device, &state->control, 0, control, sizeof(*control));
         if (scene->device->lost)
             return tracer_progress_of(gpu_check(scene->device, "tracing", error));
-        if (control->failed_in_turn > FAILED_IN_TURN_MAX) { /* no pass ever ends: a mistake of ours */
+        if (control->failed_in_turn > FAILED_IN_TURN_MAX) { /* no pass succeeds: a mistake of ours */
             error_set(error, ERROR_INTERNAL, NULL, "rayspace: no room for the children of one pair");
             return TRACER_FAILED;
         }
@@ -473,7 +474,8 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
     }
 }
 
-/* The paper's rule: what did not fit is halved for the next frame; what would fit twice is doubled again. */
+/* Adapts the batch by the paper's rule: halved for the next frame if it did not fit, doubled again if twice as
+ * much would. */
 static void learn(struct rayspace_state *state)
 {
     uint8_t *halved = &state->halved[state->base.wave.family];
@@ -483,7 +485,7 @@ static void learn(struct rayspace_state *state)
         --*halved;
 }
 
-/* ---- without it ---- */
+/* ---- descent without the host ---- */
 
 static bool queue_passes(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                          uint32_t passes, struct error *error)
@@ -499,8 +501,8 @@ static bool queue_passes(struct rayspace *rayspace, struct gpu_scene *scene, str
     return true;
 }
 
-/* What is left of a batch when its passes are over stops the slice: the wave is traced again by a patient state.
- */
+/* Queues a fixed number of passes. Pairs that are left after them stop the slice, and a patient state traces
+ * the wave again. */
 static bool descend_ahead(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                           struct error *error)
 {

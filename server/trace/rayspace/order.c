@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Which rays stand beside one another in the hierarchy, and which way round they are taken. */
+/* Sorts rays for the hierarchy, and decides in which direction each is traversed. */
 #include "trace/rayspace/tracer.h"
 
 #include "gpu/program.h"
@@ -8,7 +8,7 @@
 #include <epoxy/gl.h>
 #include <stddef.h>
 
-/* About one for each ray. */
+/* Shift that makes about one bin per ray. */
 static uint32_t bin_shift(uint32_t rays)
 {
     uint32_t shift = 0;
@@ -64,7 +64,7 @@ static bool sort(struct rayspace_state *state, struct gpu_scene *scene, struct e
     for (unsigned i = 0; i < 3; i++) {
         bind(scene, state, programs[i]);
         if (i == 1)
-            gpu_dispatch(scene->device, programs[i], 1); /* of one group */
+            gpu_dispatch(scene->device, programs[i], 1); /* a single work group */
         else
             gpu_dispatch_indirect(programs[i], &state->control, groups);
     }
@@ -79,7 +79,7 @@ bool rayspace_order_reserve(struct rayspace_state *state, struct gpu_device *dev
 
 bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error)
 {
-    /* Rays that are alone from the beginning have no order. */
+    /* Rays without a level above them need no order. */
     if (state->levels.top == 0 && state->sorts != RAYSPACE_CHANCE_ON && state->turns != RAYSPACE_CHANCE_ON)
         return true;
     if (!sample(state, scene, error))

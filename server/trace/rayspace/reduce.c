@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Passes that move a stream's live pairs together, segment by segment.
 #include "trace/rayspace/reduce.h"
 
 #include "gpu/program.h"
@@ -7,7 +8,7 @@
 #include <epoxy/gl.h>
 #include <stddef.h>
 
-/* Of a pass: its slots take 20 MiB. */
+/* Pairs of a pass: their slots take 20 MiB. */
 #define PAIRS_MAX (1u << 18)
 
 uint32_t rayspace_reduction_pairs(const struct gpu_device *device, uint32_t pairs)

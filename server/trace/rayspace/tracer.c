@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// The tracer `rayspace`: its trees over the scene, and the waves that descend them.
 #include "trace/rayspace/tracer.h"
 
 #include <stdlib.h>
@@ -31,7 +32,7 @@ static void rayspace_destroy(struct tracer *tracer)
     free(tracer);
 }
 
-/* Ranks are 32 bits. */
+/* Uploads the first primitive's rank of each instance. Ranks are 32 bits. */
 static bool upload_ranks(struct rayspace *rayspace, const struct gpu_scene *scene, struct error *error)
 {
     uint32_t *ranks = malloc((scene->instance_count + 1) * sizeof(*ranks));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Embree's instances: their transform in each pose, and whether Embree can compute with it. */
+/* Embree's instances: their transform in each pose, and whether Embree can compute with them. */
 #include "trace/reference/tracer.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The world coordinates that rays must be able to have; otherwise the scene is refused. */
+/* World coordinates up to which rays must be usable; otherwise the scene is refused. */
 #define REACH_MIN 1e9
 
 static bool resize_instances(struct reference *reference, uint32_t count)
@@ -44,7 +44,8 @@ static double determinant(const float *m)
 
 /* The largest world coordinate that Embree can transform to the instance's space. It computes with coordinates up
  * to 1.844e18 and ends the process at a ray beyond (Debian's is built with its assertions); and it inverts the
- * transform by a determinant in single precision, which must neither vanish nor overflow. 0: it cannot at all. */
+ * transform by a determinant in single precision, which must neither vanish nor overflow. 0: it can transform
+ * none. */
 static float reach_of(const struct instance *instance)
 {
     const float *m = instance->world_from_object[0], *inverse = instance->object_from_world[0];
@@ -89,8 +90,8 @@ static double min_determinant(const float *a, const float *b)
     return lowest > 0.0 ? lowest : highest < 0.0 ? -highest : 0.0;
 }
 
-/* Likewise between two poses: an inverse has no entry above 2 m^2 / determinant, where none of the matrix is above
- * m. */
+/* The reach between two poses: an inverse has no entry above 2 m^2 / determinant, where no entry of the matrix
+ * is above m. */
 static float reach_between(const float *a, const float *b)
 {
     double maximum = 0.0, farthest = 0.0;
@@ -118,7 +119,7 @@ static float reach_in_motion(const struct gpu_scene *scene, const struct instanc
     return reach;
 }
 
-/* Passes moved and changed instances to Embree. */
+/* Passes a moved or changed instance to Embree. */
 static bool place_instance(struct reference *reference, const struct gpu_scene *scene, uint32_t i, bool *changed)
 {
     struct reference_instance *instance = &reference->instances[i];
@@ -168,7 +169,7 @@ static bool find_reach(struct reference *reference, const struct gpu_scene *scen
         }
         reference->coordinate_max = fminf(reference->coordinate_max, reach);
     }
-    /* Embree would silently leave out whole instances that lie beyond. */
+    /* Embree would silently drop whole instances beyond its range. */
     for (int k = 0; k < 3; k++) {
         const double farthest = fmax(-(double)scene->lower_world[k], (double)scene->upper_world[k]);
         if (scene->instance_count > 0 && farthest > (double)reference->coordinate_max) {
@@ -181,15 +182,15 @@ static bool find_reach(struct reference *reference, const struct gpu_scene *scen
     return true;
 }
 
-bool reference_update_instances(struct reference *reference, const struct gpu_scene *scene, bool look,
+bool reference_update_instances(struct reference *reference, const struct gpu_scene *scene, bool may_have_moved,
                                 bool *changed, struct error *error)
 {
-    if (look && !find_reach(reference, scene, error))
+    if (may_have_moved && !find_reach(reference, scene, error))
         return false;
     *changed = *changed || reference->instance_count != scene->instance_count;
     if (!resize_instances(reference, scene->instance_count))
         return false;
-    for (uint32_t i = 0; look && i < scene->instance_count; i++)
+    for (uint32_t i = 0; may_have_moved && i < scene->instance_count; i++)
         if (!place_instance(reference, scene, i, changed))
             return false;
     if (*changed)

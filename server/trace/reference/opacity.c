@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Alpha, tint and transmission of a point on the host, as shaders/common/alpha.glsl computes them. */
 #include "trace/reference/opacity.h"
 
 #include "trace/reference/texture.h"
@@ -84,7 +85,7 @@ static bool lets_light_pass(const struct opacity_material *material)
 
 /* ---- surfaces ---- */
 
-/* The ranges, and the default material in the gaps between them. */
+/* Copies the ranges, with the default material in the gaps between them. */
 static bool take_ranges(struct opacity_surface *surface, const struct material_range *ranges, uint32_t range_count,
                         uint32_t primitive_count)
 {
@@ -201,7 +202,7 @@ static const struct opacity_material *material_of(const struct opacity_surface *
     return &surface->materials->list[surface->runs[low].material];
 }
 
-/* What is not finite counts as zero, as gpu_scene/geometry.c uploads it. */
+/* Zero for values that are not finite, which is how gpu_scene/geometry.c uploads them. */
 static float finite_or_zero(float x)
 {
     return isfinite(x) ? x : 0.0f;
@@ -250,7 +251,7 @@ static void sphere_attributes(const struct opacity_surface *surface, const struc
     memcpy(out->uv[1], out->uv[0], sizeof(out->uv[1]));
 }
 
-/* tangent_frame() of common/math.glsl. */
+/* Attributes of a disc's point, by tangent_frame() of common/math.glsl. */
 static void disc_attributes(const struct opacity_surface *surface, const struct opacity_point *point,
                             struct attributes *out)
 {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Cutouts, blending and transmission as in shaders/common/alpha.glsl, from the host's copy of the scene. Keeps
- * references on the blobs that it reads and no pointer into the scene. Read by any number of threads at once. */
+/* Cutouts, blending and transmission by the rules of shaders/common/alpha.glsl, from the host's copy of the
+ * scene. Keeps references on the blobs that it reads and no pointer into the scene. Any number of threads may
+ * read it at once. */
 #ifndef FARLIGHT_TRACE_REFERENCE_OPACITY_H
 #define FARLIGHT_TRACE_REFERENCE_OPACITY_H
 
@@ -42,43 +43,43 @@ struct opacity_run {
     uint32_t material;    /* index in the list */
 };
 
-/* The data of one geometry; zero is an empty one. */
+/* Opacity data of one geometry; zero is empty. */
 struct opacity_surface {
     enum { OPACITY_MESH, OPACITY_SPHERES, OPACITY_DISCS } kind;
     const struct opacity_materials *materials;
     struct opacity_run *runs;
     uint32_t run_count;
     struct blob *indices, *texcoords[2], *colours; /* meshes; all but the indices may be missing */
-    bool has_wide_colours;                         /* of 16 bits */
+    bool has_wide_colours;                         /* 16 bits per channel */
     struct blob *centres_radii;                    /* spheres */
     struct disc *discs;                            /* discs: a copy */
 };
 
-/* A place on a primitive. In the space of the geometry: world space for discs. */
+/* A place on a primitive, in the space of the geometry: world space for discs. */
 struct opacity_point {
     uint32_t primitive; /* in its geometry */
     float u, v;         /* barycentrics of the second and third vertex */
     float origin[3], direction[3], distance;
 };
 
-/* As they are in the pose (NULL: as they were committed). All or nothing; false: out of memory. */
+/* Copies the materials in the pose (NULL: as committed). All or nothing; false: out of memory. */
 bool opacity_materials_init(struct opacity_materials *materials, const struct scene *scene,
                             const struct scene_pose *pose);
 void opacity_materials_finish(struct opacity_materials *materials); /* leaves it empty */
 
 bool opacity_surface_init_mesh(struct opacity_surface *surface, const struct scene_mesh *mesh);
 bool opacity_surface_init_spheres(struct opacity_surface *surface, const struct scene_spheres *spheres);
-/* `discs` as gpu_scene has them, `material_ids` beside them. */
+/* `discs` are gpu_scene's, with their `material_ids`. */
 bool opacity_surface_init_discs(struct opacity_surface *surface, const struct disc *discs,
                                 const uint32_t *material_ids, uint32_t count);
 void opacity_surface_finish(struct opacity_surface *surface); /* leaves it empty */
-/* To be called after each opacity_materials_init: looks its materials up. */
+/* Looks up the surface's materials; must be called after each opacity_materials_init. */
 void opacity_surface_bind(struct opacity_surface *surface, const struct opacity_materials *materials);
-/* Whether some ray may get past it: to a closest-hit ray (cutouts), and to an any-hit ray. */
+/* Whether some ray may pass: a closest-hit ray (cutouts), and an any-hit ray. */
 bool opacity_surface_has_cutout(const struct opacity_surface *surface);
 bool opacity_surface_lets_light_pass(const struct opacity_surface *surface);
 
-/* is_cut_out() and transmittance_of() of alpha.glsl. */
+/* Host versions of is_cut_out() and transmittance_of() in alpha.glsl. */
 bool opacity_is_cut_out(const struct opacity_surface *surface, const struct opacity_point *point);
 void opacity_transmittance(const struct opacity_surface *surface, const struct opacity_point *point, bool stops,
                            float transmittance[3]);

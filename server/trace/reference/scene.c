@@ -39,7 +39,7 @@ static void entry_destroy(struct reference_entry *entry)
     free(entry);
 }
 
-/* Of what deforms by its node, which shows no other. */
+/* Key of an entry. A deforming geometry is kept by its node, which shows no other. */
 static uint64_t entry_key(bool is_mesh, uint32_t id, uint32_t node)
 {
     return (uint64_t)(node ? node : id) << 2 | (node ? 2u : 0u) | is_mesh;
@@ -87,7 +87,7 @@ static bool take_shape(struct reference_entry *entry, RTCDevice device, const st
     return opacity_surface_init_spheres(&entry->surface, geometry->spheres);
 }
 
-/* Embree's builder is at it. False ends it. */
+/* Called by Embree's builder; false stops it. */
 static bool on_progress(void *context, double share)
 {
     const struct reference *reference = context;
@@ -127,7 +127,8 @@ static struct reference_entry *entry_create(struct reference *reference, const s
     return entry;
 }
 
-/* One step of time of a mesh that deforms, worked out here: what the device made of it is compared with this. */
+/* Computes one time step of a deforming mesh on the host, so that the device's result is compared with an
+ * independent one. */
 static bool take_vertices(struct reference_entry *entry, const struct gpu_scene *scene,
                           const struct scene_pose *pose, unsigned step, struct error *error)
 {
@@ -138,7 +139,7 @@ static bool take_vertices(struct reference_entry *entry, const struct gpu_scene 
     return vertices && scene_deform(scene->scene, pose, node, vertices, NULL, error);
 }
 
-/* Deforms geometries to the poses. Trees are built again: slow rather than wrong. */
+/* Deforms geometries to the poses. Trees are rebuilt, not refitted: slow rather than wrong. */
 static bool deform_entries(struct reference *reference, const struct gpu_scene *scene, struct error *error)
 {
     const struct scene_motion *motion = scene->motion;
@@ -182,7 +183,7 @@ static bool find_kept(const struct reference *reference, const struct gpu_scene 
     return ok;
 }
 
-/* One entry for each geometry of the scene, in its order; those that it no longer has are gone. */
+/* Lists one entry for each geometry of the scene, in its order, and drops those that the scene no longer has. */
 static bool list_entries(struct reference *reference, const struct gpu_scene *scene)
 {
     uint32_t count = scene->geometry_count;
@@ -209,8 +210,8 @@ static bool list_entries(struct reference *reference, const struct gpu_scene *sc
     return true;
 }
 
-/* Embree is asked to call back only where a material wants it: opaque surfaces cost nothing. It notices a change
- * of filter functions when it builds; they change seldom. */
+/* Sets filter functions only where a material needs them: opaque surfaces then cost nothing. Embree notices a
+ * change of filter functions when it builds; they change seldom. */
 static void set_filters(struct reference_entry *entry)
 {
     bool closest = opacity_surface_has_cutout(&entry->surface);
@@ -238,7 +239,7 @@ static void commit_small(void *context, uint32_t i)
         commit_entry(entry);
 }
 
-/* Those that are to be built are fresh for what follows. False: there are none. */
+/* Marks the entries to be built as fresh. False: there are none. */
 static bool mark_fresh(struct reference *reference)
 {
     bool any = false;
@@ -277,7 +278,7 @@ static int by_id(const void *a, const void *b)
     return id_a < id_b ? -1 : id_a > id_b;
 }
 
-/* The materials of the discs, by their ids, in the order in which gpu_scene has the discs. */
+/* Lists the materials of the discs by id, in gpu_scene's order of discs. */
 static uint32_t *list_disc_materials(const struct gpu_scene *scene)
 {
     const struct hashmap *discs = &scene->scene->objects[OBJECT_DISC];
@@ -338,8 +339,8 @@ static bool make_disc_geometry(struct reference *reference, const struct gpu_sce
     return true;
 }
 
-/* All discs again if one changed: there are few. `shading`: their materials may let other light pass now. A disc
- * that has got another material differs in gpu_scene's copy too. */
+/* Rebuilds all discs if one changed: there are few. `shading`: their materials may let other light pass now. A
+ * disc with a new material differs in gpu_scene's copy too. */
 static bool update_discs(struct reference *reference, const struct gpu_scene *scene, bool shading, bool *changed)
 {
     bool same = same_discs(reference, scene);
@@ -365,7 +366,7 @@ static bool update_discs(struct reference *reference, const struct gpu_scene *sc
     return true;
 }
 
-/* ---- all of it ---- */
+/* ---- the whole scene ---- */
 
 static bool update_materials(struct reference *reference, const struct gpu_scene *scene)
 {
@@ -405,7 +406,7 @@ bool reference_scene_update(struct reference *reference, const struct gpu_scene 
                             bool *builds, struct error *error)
 {
     bool ok = update_parts(reference, scene, changed, builds, error);
-    /* Embree's own error comes first: it says why. */
+    /* Embree's own error has priority: it says why. */
     return (reference_check(reference, "building", error) && ok) || no_memory(error, scene);
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Texture lookup on the host. */
 #include "trace/reference/texture.h"
 
 #include "trace/reference/opacity.h"
@@ -8,7 +9,7 @@
 #include <pthread.h>
 #include <string.h>
 
-/* Of the 256 values that there are. */
+/* Linear values of all 256 bytes. */
 static float linear_from_byte[256];
 
 static void make_table(void)
@@ -32,7 +33,7 @@ static float wrap_coordinate(float u, enum wrap wrap)
     return u - floorf(u);
 }
 
-/* Of a texel at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more. */
+/* Wraps an index at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more. */
 static int wrap_neighbour(int i, int size, enum wrap wrap)
 {
     if (wrap == WRAP_REPEAT)
@@ -51,7 +52,7 @@ static void add_texel(const struct opacity_texture *texture, int x, int y, float
     }
 }
 
-/* Where a wrapped coordinate lies among the texels of its axis. What is not a number lies at the first. */
+/* Texel of a wrapped coordinate along its axis, and its weight. NaN counts as the first texel. */
 static int corner_of(float wrapped, uint32_t size, bool nearest, float *weight)
 {
     float at = wrapped * (float)size - (nearest ? 0.0f : 0.5f);

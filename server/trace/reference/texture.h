@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* shaders/common/texture.glsl at the finest level, on the host's texels. */
+/* Texture lookup of shaders/common/texture.glsl at the finest level, on the host's texels. */
 #ifndef FARLIGHT_TRACE_REFERENCE_TEXTURE_H
 #define FARLIGHT_TRACE_REFERENCE_TEXTURE_H
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The tracer `reference`: Embree's device, its account of memory, and builds in a thread. */
 #include "trace/reference/tracer.h"
 
 #include "base/clock.h"
@@ -10,10 +11,10 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* How often it is looked whether the builder is done. */
+/* Interval at which an update polls the builder. */
 #define BUILDER_LOOK_US 200
 
-/* ---- what Embree calls ---- */
+/* ---- callbacks of Embree ---- */
 
 static void note_failure(void *context, enum RTCError code, const char *text)
 {
@@ -55,12 +56,12 @@ static bool count_memory(void *context, ssize_t bytes, bool post)
     if (bytes <= 0 || reference->limit_bytes == 0)
         return true;
     bool fits = sum < 0 || reference->others_bytes + (uint64_t)sum <= reference->limit_bytes;
-    if (!fits && !post) /* it will not be allocated */
+    if (!fits && !post) /* the allocation will not happen */
         atomic_fetch_sub(&reference->device_bytes, bytes);
     return fits;
 }
 
-/* Brings the device's books to what Embree has now. */
+/* Adjusts the device's account to Embree's current memory. */
 static bool book_memory(struct reference *reference, struct error *error)
 {
     struct gpu_device *gpu = reference->base.device;
@@ -89,7 +90,7 @@ static unsigned native_width(RTCDevice device)
     return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8 : 4;
 }
 
-/* Distributions build Embree with more or less in it. */
+/* Checks that this build of Embree has all features needed: distributions leave some out. */
 static bool check_features(RTCDevice device, struct error *error)
 {
     static const struct {
@@ -166,7 +167,7 @@ static void *run_builder(void *context)
     return NULL;
 }
 
-/* Without a thread, it is done here and now. */
+/* Builds in a thread; without one, at once. */
 static void begin_build(struct reference *reference)
 {
     atomic_store(&reference->is_built, false);
@@ -175,7 +176,7 @@ static void begin_build(struct reference *reference)
         build(reference);
 }
 
-/* What is under way of waves that nobody waits for any more reads the structure. */
+/* Ends waves in progress, whose results nobody waits for any more but whose threads read the structure. */
 static void end_waves(struct reference *reference)
 {
     atomic_store(&reference->ends_waves, true);
@@ -194,7 +195,7 @@ static void join_builder(struct reference *reference)
 static void reference_abandon(struct tracer *tracer)
 {
     struct reference *reference = (struct reference *)tracer;
-    struct error error = {0}; /* of what is given up */
+    struct error error = {0}; /* error of the dropped work */
     atomic_store(&reference->is_abandoned, true);
     join_builder(reference);
     atomic_store(&reference->is_abandoned, false);
@@ -212,13 +213,13 @@ static bool reference_waits(struct tracer *tracer)
 
 static enum tracer_progress fail(struct reference *reference)
 {
-    struct error second = {0}; /* says nothing that the first does not */
+    struct error second = {0}; /* repeats what the first one says */
     reference_scene_finish(reference);
     book_memory(reference, &second);
     return TRACER_FAILED;
 }
 
-/* What reads the scene is done here, Embree's builders run beside. */
+/* Reads the scene on this thread, while Embree builds on another. */
 static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_scene *scene,
                                              const struct tracer_update *update, struct error *error)
 {

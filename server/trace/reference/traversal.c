@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Waves through Embree, on all cores, as many rays a call as the processor takes at once.
+/* Waves through Embree, on all cores, with as many rays per call as the processor's vectors hold.
  *
- * Measured on an EPYC of Zen 4 (AVX-512), Embree 3.13.5, robust mode, million rays per second of one core's time:
+ * Measured on an EPYC of Zen 4 (AVX-512), Embree 3.13.5, robust mode, million rays per second of one core's
+ * time:
  *
  *   triangles                   5,204                 145,802               589,700
  *   rays a call            1      8     16        1      8     16       1      8     16
@@ -9,11 +10,11 @@
  *   diffuse bounce       9.8   11.5   12.2      5.9    6.3    6.9     4.5    4.8    5.1
  *   shadow              13.9   25.0   26.3      9.4   12.9   13.8     7.6    9.5   10.1
  *
- * Sixteen win everywhere. Streams (rtcIntersect1M, 1,024 rays) do 10.3, 6.2 and 4.4 on bounces. With
- * RTC_INTERSECT_CONTEXT_FLAG_COHERENT, which traverses rays as a frustum, streams do 21, 14.7 and 10.8 on primary
- * rays and sixteen a call 27 and 17. That is left alone: with it rtcOccluded16 did not terminate on the first
- * scene of tests/tracers, and a ray of a direction near zero changed the answers of others in its packet. The
- * ground truth is slow rather than wrong. */
+ * Sixteen wins everywhere. Streams (rtcIntersect1M, 1,024 rays) do 10.3, 6.2 and 4.4 on bounces. With
+ * RTC_INTERSECT_CONTEXT_FLAG_COHERENT, which traverses rays as a frustum, streams do 21, 14.7 and 10.8 on
+ * primary rays, and calls of sixteen 27 and 17. The flag stays off: with it rtcOccluded16 did not terminate on
+ * the first scene of tests/tracers, and a ray with a direction near zero changed the answers of others in its
+ * packet. The ground truth is slow rather than wrong. */
 #include "trace/reference/tracer.h"
 
 #include "base/parallel.h"
@@ -30,8 +31,8 @@
 #include <pmmintrin.h>
 #endif
 
-/* Rays that a thread takes at a time, at most: some tens of microseconds of work. Fewer where a range has few, as
- * its rays may cost milliseconds each. */
+/* Maximum of rays that a thread fetches at a time: some tens of microseconds of work. Fewer where a range has
+ * few, as its rays may cost milliseconds each. */
 #define CHUNK_RAYS 1024u
 
 /* A packet of n rays, and of hits behind them, is a row of n values for each of these fields (rtcore_ray.h has
@@ -41,7 +42,7 @@ enum ray_field {
     RAY_T_NEAR = 3,
     RAY_DIRECTION, /* x, y, z */
     RAY_TIME = 7,
-    RAY_T_FAR, /* of a hit: its distance; of an occluded ray: minus infinity */
+    RAY_T_FAR, /* hit: its distance; occluded ray: minus infinity */
     RAY_MASK,
     RAY_ID,
     RAY_FLAGS,
@@ -72,20 +73,20 @@ struct traversal {
     const struct ray_range *rays;
     unsigned width;
     uint32_t chunk_rays;
-    atomic_uint undone; /* the first ray without an answer, so far */
+    atomic_uint undone; /* first ray without an answer so far */
 };
 
-/* Embree's context, with what the filter functions write behind it. */
+/* Embree's context, followed by the output of the filter functions. */
 struct traversal_context {
-    struct RTCIntersectContext embree; /* first: it comes back by this address */
+    struct RTCIntersectContext embree; /* first: the filter functions get this address */
     float transmittance[CHUNK_RAYS][3];
     bool stops[CHUNK_RAYS]; /* RAY_STOPS_T_MIN */
 };
 
 /* ---- floating-point mode ---- */
 
-/* Numbers that have lost their precision (denormals) are zero to Embree while it traces; arithmetic with them
- * costs a hundred cycles. The mode is the thread's, so it is put back. */
+/* Sets the processor's mode for tracing: denormal numbers count as zero, as arithmetic with them costs a
+ * hundred cycles. The mode is the thread's, so it is restored afterwards. */
 #if defined(__SSE2__)
 static unsigned enter_fast_mode(void)
 {
@@ -142,7 +143,7 @@ void reference_filter_closest(const struct RTCFilterFunctionNArguments *argument
     }
 }
 
-/* A ray of which something is left goes on. */
+/* A ray that is only dimmed continues. */
 void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments)
 {
     const struct opacity_surface *surface = arguments->geometryUserPtr;
@@ -182,14 +183,15 @@ static float next_below(float x) /* x above 0 */
     return bits.f;
 }
 
-/* Where Embree's part of a ray begins: its rays do not reach behind their origin. */
+/* Beginning of the part of a ray that Embree traces: its rays do not reach behind their origin. */
 static float begin_of(const struct ray *ray)
 {
     float t_min = ray->origin_t_min[3];
     return t_min < 0.0f ? t_min : 0.0f;
 }
 
-/* Rays beyond the coordinates that the scene's instances allow, or with NaN, hit nothing. */
+/* Fills a lane of the packet. Rays beyond the coordinates that the scene's instances allow, or with NaN, hit
+ * nothing. */
 static inline void set_lane(struct packet *packet, unsigned n, unsigned lane, const struct ray *ray, float time,
                             uint32_t id, float coordinate_max)
 {
@@ -203,7 +205,7 @@ static inline void set_lane(struct packet *packet, unsigned n, unsigned lane, co
         rays[(RAY_ORIGIN + k) * n + lane].f = origin;
         rays[(RAY_DIRECTION + k) * n + lane].f = direction;
     }
-    /* The ends do not count; to Embree's spheres and discs they would. */
+    /* The ends are exclusive; Embree's spheres and discs would include them. */
     float t_near = alive ? next_above(t_min) : 0.0f, t_far = alive ? next_below(t_max) : 0.0f;
     rays[RAY_T_NEAR * n + lane].f = t_near;
     rays[RAY_TIME * n + lane].f = time;
@@ -283,8 +285,8 @@ static inline void occlude(RTCScene scene, struct traversal_context *context, st
     }
 }
 
-/* Asked before a packet; the first packet of all is traced in any case. Packets of n that end a range at a
- * multiple of REFERENCE_RAYS_MAX keep the packets of the next one what they would have been. */
+/* Whether to stop before a packet; the very first packet is always traced. A range ends at a multiple of
+ * REFERENCE_RAYS_MAX, which keeps the packets of the next range the same. */
 static bool is_over(struct traversal *traversal, uint32_t at)
 {
     bool is_cancelled =
@@ -298,7 +300,7 @@ static bool is_over(struct traversal *traversal, uint32_t at)
     return true;
 }
 
-/* The rays `first` .. of a chunk that ends at `end`, n at a time. Inlined with a constant n. */
+/* Traverses the rays `first` .. of a chunk that ends at `end`, n at a time. Inlined with a constant n. */
 static inline __attribute__((always_inline)) void traverse_packets(struct traversal *traversal,
                                                                    struct traversal_context *context,
                                                                    uint32_t first, uint32_t end, unsigned n)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waves on the host. A range of rays is traversed by a thread of its own, so that the thread that owns GL is back
- * at the end of its step even where a single packet of rays takes a quarter of a second. */
+/* Waves on the host. A thread traverses a range of rays, so that the GL thread returns at the end of its step
+ * even where a single packet of rays takes a quarter of a second. */
 #include "trace/reference/tracer.h"
 
 #include "base/clock.h"
@@ -11,8 +11,9 @@
 
 #include <stdlib.h>
 
-/* The traversal looks at the clock between two packets: usually it ends this soon after the step. */
-#define LANDING_NS UINT64_C(500000)
+/* Extra wait after the step's end: the traversal checks the clock between two packets, so it usually ends this
+ * soon. */
+#define GRACE_NS UINT64_C(500000)
 
 /* ---- life ---- */
 
@@ -26,7 +27,7 @@ struct trace_state *reference_state_create(struct gpu_device *device, const stru
         return NULL;
     }
     pthread_mutex_init(&wave->lock, NULL);
-    pthread_cond_init(&wave->landed, NULL);
+    pthread_cond_init(&wave->done, NULL);
     return &wave->base;
 }
 
@@ -48,7 +49,7 @@ void reference_state_destroy(struct trace_state *state)
 {
     struct reference_wave *wave = (struct reference_wave *)state;
     cancel(wave);
-    pthread_cond_destroy(&wave->landed);
+    pthread_cond_destroy(&wave->done);
     pthread_mutex_destroy(&wave->lock);
     free(wave->rays);
     free(wave->times);
@@ -59,7 +60,7 @@ void reference_state_destroy(struct trace_state *state)
 uint64_t reference_state_device_bytes(const struct trace_state *state)
 {
     (void)state;
-    return 0; /* they are the host's */
+    return 0; /* its memory is the host's */
 }
 
 static bool reserve(struct reference_wave *wave, uint32_t ray_count, struct error *error)
@@ -82,7 +83,7 @@ bool reference_trace_begin(struct tracer *tracer, struct gpu_scene *scene, struc
 {
     (void)tracer, (void)scene;
     struct reference_wave *wave = (struct reference_wave *)state;
-    cancel(wave); /* of a wave that was dropped */
+    cancel(wave); /* a dropped wave may still be traversed */
     return reserve(wave, state->wave.ray_count, error);
 }
 
@@ -95,8 +96,8 @@ static void traverse(struct reference_wave *wave)
     atomic_fetch_sub(&reference->waves_under_way, 1);
     pthread_mutex_lock(&wave->lock);
     wave->end = end;
-    wave->has_landed = true;
-    pthread_cond_signal(&wave->landed);
+    wave->is_done = true;
+    pthread_cond_signal(&wave->done);
     pthread_mutex_unlock(&wave->lock);
 }
 
@@ -107,8 +108,8 @@ static void *run_thread(void *context)
     return NULL;
 }
 
-/* Without a thread, it is done here and now. */
-static void take_off(struct reference *reference, struct reference_wave *wave, const struct ray_range *rays)
+/* Begins to traverse a range in a thread; without one, at once. */
+static void begin_traversal(struct reference *reference, struct reference_wave *wave, const struct ray_range *rays)
 {
     const struct wave *whole = &wave->base.wave;
     struct gpu_device *device = reference->base.device;
@@ -120,7 +121,7 @@ static void take_off(struct reference *reference, struct reference_wave *wave, c
     wave->traversed = *whole;
     wave->range = (struct ray_range){.wave = &wave->traversed, .first = rays->first, .end = rays->end};
     wave->step_end_ns = wave->base.step_end_ns;
-    wave->has_landed = false;
+    wave->is_done = false;
     wave->reference = reference;
     atomic_fetch_add(&reference->waves_under_way, 1);
     if (pthread_create(&wave->thread, NULL, run_thread, wave) == 0)
@@ -129,11 +130,11 @@ static void take_off(struct reference *reference, struct reference_wave *wave, c
     wave->reference = NULL;
 }
 
-/* Waits until about the end of the step. */
-static bool has_landed(struct reference_wave *wave, uint64_t step_end_ns)
+/* Waits until about the end of the step. True: the traversal is done. */
+static bool wait_done(struct reference_wave *wave, uint64_t step_end_ns)
 {
-    uint64_t until_ns = step_end_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : step_end_ns + LANDING_NS;
-    return clock_wait_for(&wave->has_landed, &wave->landed, &wave->lock, until_ns);
+    uint64_t until_ns = step_end_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : step_end_ns + GRACE_NS;
+    return clock_wait_for(&wave->is_done, &wave->done, &wave->lock, until_ns);
 }
 
 bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
@@ -144,9 +145,9 @@ bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene, struc
     struct reference_wave *wave = (struct reference_wave *)state;
     const uint64_t start_ns = clock_now_ns();
     if (!wave->reference)
-        take_off(reference, wave, rays);
-    if (!has_landed(wave, state->step_end_ns)) {
-        state->range_end = rays->first; /* the next step goes on with it */
+        begin_traversal(reference, wave, rays);
+    if (!wait_done(wave, state->step_end_ns)) {
+        state->range_end = rays->first; /* the next step continues it */
         return true;
     }
     join(wave);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Builds a binary tree by the surface area heuristic, on several threads.
 #include "trace/tree/build.h"
 
 #include "base/parallel.h"
@@ -10,15 +11,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Into what one thread does, where most ranges are small, and into what all do. */
+/* Functions that are inlined twice: into one thread's work, where most ranges are small, and into that of all
+ * threads. */
 #define INLINED static inline __attribute__((always_inline))
 
-#define TASK_PRIMITIVES 4096u /* smaller ranges stay with the thread that has them */
+#define TASK_PRIMITIVES 4096u /* smaller ranges stay with their thread */
 #define STACK_DEPTH 40        /* the smaller half comes first: at most one level for each doubling of the range */
-#define BLOCK_NODES 512u      /* that a thread takes at a time; an even number, as children come in pairs */
-#define FIRST_CHILD 2u        /* so that a pair lies in one line of the cache */
+#define BLOCK_NODES                                                                                               \
+    512u               /* nodes that a thread reserves at a time; an even number, as children come in             \
+                          pairs */
+#define FIRST_CHILD 2u /* even, so that a pair shares a cache line */
 
-/* So many ranges at most are cut by all threads together. */
+/* Maximum of ranges that all threads cut together. */
 #define CUTS_MAX(threads) (2 * (threads))
 
 /* Primitives begin .. end - 1, which lie in the first or the second array of boxes and numbers. */
@@ -29,35 +33,36 @@ struct range {
 
 struct builder {
     struct bvh_binary *tree;
-    /* A range's halves go to the other array than its own: what is not needed any more is written over. */
+    /* The halves of a range go to the other array than its own, and overwrite what is no longer needed. */
     struct bvh_box *boxes[2];
     uint32_t *order[2]; /* the first is the tree's */
     const struct bvh_costs *costs;
     atomic_uint next_block, node_count;
-    /* ranges that wait for a thread */
+    /* Ranges that wait for a thread. */
     pthread_mutex_t mutex;
     pthread_cond_t changed;
-    struct range *waiting; /* capacity for all ranges of at least TASK_PRIMITIVES, and those of the first cuts */
+    struct range *waiting; /* capacity for all ranges of at least TASK_PRIMITIVES, and for those of the first
+                              cuts */
     uint32_t waiting_count;
     unsigned busy;
     unsigned threads;
     const atomic_bool *stop;
 };
 
-/* Where a thread puts nodes. */
+/* The place where a thread puts nodes. */
 struct place {
     uint32_t next, end, made;
 };
 
-/* Half the surface, as the costs of splits are. */
+/* Half the surface of a box, as the costs of splits are. */
 static inline float half_area(const struct bvh_box *box)
 {
     bvh_vec4 d = box->upper - box->lower;
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Moves a part of a range to its halves, which go on at `left` and, from its end, at `right`. Returns where the
- * left one ends. The side of a primitive is unpredictable, so nothing branches on it. */
+/* Moves a part of a range to its halves, which grow from `left` upward and from the end, `right`, downward.
+ * Returns the end of the left one. The side of a primitive is unpredictable, so nothing branches on it. */
 INLINED uint32_t move(const struct builder *builder, unsigned array, uint32_t begin, uint32_t end, uint32_t left,
                       uint32_t right, const struct bvh_split *split)
 {
@@ -76,7 +81,7 @@ INLINED uint32_t move(const struct builder *builder, unsigned array, uint32_t be
     return left;
 }
 
-/* Boxes, and their centres. */
+/* Bounds of boxes, and of their centres. */
 struct extents {
     struct bvh_box all, centres;
 };
@@ -94,16 +99,16 @@ INLINED struct extents find_extents(const struct bvh_box *boxes, uint32_t count)
     return (struct extents){all, middle};
 }
 
-/* ---- a range that several threads cut, piece by piece ---- */
+/* ---- ranges cut by several threads, piece by piece ---- */
 
-/* Of each piece; also, of the one range that is being cut, where the pieces' halves go. */
+/* A range being cut by all threads: its pieces, and where their halves go. */
 struct cut {
     const struct builder *builder;
     const struct range *range;
     struct bvh_split split;
     struct extents *extents;
     struct bvh_bins *bins;
-    uint32_t *lefts; /* how many go left; then where they begin */
+    uint32_t *lefts; /* number of primitives of each piece that go left; then where they begin */
 };
 
 static void free_cut(struct cut *cut)
@@ -160,7 +165,7 @@ static void move_piece(void *context, uint32_t piece)
          cut->range->end - 1 - (begin - left), &cut->split);
 }
 
-/* As move() does it with the whole range. */
+/* Does with all threads what move() does with the whole range. */
 static uint32_t move_together(struct cut *cut)
 {
     const uint32_t pieces = bvh_piece_count(size_of(cut->range));
@@ -196,7 +201,8 @@ static void make_leaf(const struct builder *builder, const struct range *range, 
     node_set(&builder->tree->nodes[range->node], bounds, range->begin, count, 0);
 }
 
-/* Of two children. Which thread has which block differs from run to run, but nothing follows from it. */
+/* Reserves nodes for two children. Which thread has which block differs from run to run, but no result depends
+ * on it. */
 static uint32_t take_nodes(struct builder *builder, struct place *place)
 {
     if (place->next == place->end) {
@@ -208,8 +214,8 @@ static uint32_t take_nodes(struct builder *builder, struct place *place)
     return place->next - 2;
 }
 
-/* Makes the node of a range. False: it is a leaf; else the ranges of its children. cut: with all threads; NULL: by
- * this one. */
+/* Makes the node of a range. False: it is a leaf; otherwise *left and *right are its children's ranges. With
+ * `cut` all threads work on it; NULL: this one alone. */
 INLINED bool split_range(struct builder *builder, struct place *place, struct cut *cut, const struct range *range,
                          struct range *left, struct range *right)
 {
@@ -229,7 +235,7 @@ INLINED bool split_range(struct builder *builder, struct place *place, struct cu
         make_leaf(builder, range, &extents.all);
         return false;
     }
-    /* Where no border separates them (equal centres, or extents that overflow), half of them goes each way. */
+    /* Halves the range where no border separates the primitives (equal centres, or extents that overflow). */
     unsigned array = range->array;
     if (split.axis >= 0) {
         uint32_t border;
@@ -283,7 +289,7 @@ static void build_range(struct builder *builder, struct place *place, struct ran
     }
 }
 
-/* One thread of the builder: processes ranges until none is left and no thread can add one. */
+/* Thread of the builder: processes ranges until none is left and no thread can add one. */
 static void build_thread(void *context, uint32_t thread)
 {
     (void)thread;
@@ -309,7 +315,7 @@ static void build_thread(void *context, uint32_t thread)
     atomic_fetch_add(&builder->node_count, place.made);
 }
 
-/* Cuts the first ranges with all threads, until each thread has one. */
+/* Cuts the first ranges with all threads, until there is a range for each thread. */
 static void cut_together(struct builder *builder)
 {
     const uint32_t large = builder->tree->primitive_count / builder->threads;
@@ -344,7 +350,7 @@ static void free_work(struct builder *builder)
     free(builder->waiting);
 }
 
-/* The nodes' memory is as much as there may be at most, of which the kernel gives what is written. */
+/* Allocates the maximum for nodes; the kernel provides only the pages that are written. */
 static bool alloc_work(struct builder *builder, uint32_t count, unsigned threads)
 {
     struct bvh_binary *tree = builder->tree;
@@ -403,7 +409,7 @@ uint32_t *bvh_binary_list(const struct bvh_binary *tree)
              i = 0;
     if (!list)
         return NULL;
-    /* Right children wait at the list's end: each is a node that the list does not have yet. */
+    /* Right children wait at the end of the list, whose tail is still free. */
     for (;;) {
         list[count++] = i;
         if (nodes[i].count_axis >> 2 == 0) {

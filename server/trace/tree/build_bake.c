@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Turns a binary tree into baked elements: chooses the nodes that stay, and orders them for each octant.
 #include "trace/tree/build.h"
 
 #include "base/parallel.h"
@@ -7,9 +8,9 @@
 #include <stdlib.h>
 
 /* An inner node whose surface is at least this share of its nearest kept ancestor's is removed: its children
- * become that ancestor's. A node with two children saves two tests where it is missed and costs one whenever it is
- * reached, so by the heuristic it pays below one half. Measured at 0.5, 0.6, 0.7, 0.85 and never: boxes hardly
- * care (2 %), spheres lose 10 % where nothing is thrown back, and 0.5 leaves a fifth fewer elements. */
+ * become that ancestor's. A node with two children saves two tests where a ray misses it and costs one whenever
+ * it is reached, so by the heuristic it pays below one half. Measured at 0.5, 0.6, 0.7, 0.85 and never: boxes
+ * change by 2 %, spheres lose 10 % without any removal, and 0.5 leaves a fifth fewer elements. */
 #define THROW_BACK 0.5f
 
 /* Octants are ordered four at a time, one in each lane. */
@@ -18,7 +19,7 @@ typedef uint32_t lanes __attribute__((vector_size(LANES * sizeof(uint32_t))));
 
 /* A binary node, in depth-first order: a left child is the next one. */
 struct step {
-    uint32_t element; /* BVH_NONE: an inner node that is thrown back */
+    uint32_t element; /* BVH_NONE: an inner node that is removed */
     uint32_t below;   /* elements of its subtree */
     uint32_t right;   /* step of the right child; 0: a leaf */
     uint32_t axis;
@@ -28,11 +29,11 @@ struct bake {
     struct bvh_baked *baked;
     struct step *steps;
     uint32_t step_count;
-    uint32_t waiting_max; /* maximum of right children that wait during a traversal */
+    uint32_t waiting_max; /* maximum number of right children that wait during a traversal */
     bool failed[BVH_OCTANTS / LANES];
 };
 
-/* Going backwards, both children are done before their parent. */
+/* Links the steps backwards, so that both children are complete before their parent. */
 static void link_steps(struct bake *bake, const struct bvh_binary *tree, const uint32_t *list)
 {
     struct step *steps = bake->steps;
@@ -40,25 +41,25 @@ static void link_steps(struct bake *bake, const struct bvh_binary *tree, const u
         const struct bvh_binary_node *node = &tree->nodes[list[i]];
         const bool is_leaf = node->count_axis >> 2 > 0;
         const uint32_t right = is_leaf ? 0 : i + 1 + steps[i + 1].below;
-        /* `below` is nodes until the elements are chosen. */
+        /* `below` counts nodes until the elements are chosen. */
         steps[i] = (struct step){.below = is_leaf ? 1 : 1 + steps[i + 1].below + steps[right].below,
                                  .right = right,
                                  .axis = node->count_axis & 3};
     }
 }
 
-/* In depth-first order: which nodes are kept, and their new parents. */
+/* Chooses, in depth-first order, the nodes that are kept, and their new parents. */
 static void choose_elements(struct bake *bake, const float *areas, const uint32_t *list)
 {
     struct bvh_baked *baked = bake->baked;
     struct step *steps = bake->steps;
     uint32_t elements = 0, waiting = 0;
-    steps[0].element = BVH_NONE; /* of each step: its nearest kept ancestor, until the step itself is reached */
+    steps[0].element = BVH_NONE; /* until its own step is reached, .element is the step's nearest kept ancestor */
     for (uint32_t i = 0; i < bake->step_count; i++) {
         const bool is_leaf = steps[i].right == 0;
         const float area = areas[list[i]];
         uint32_t parent = steps[i].element;
-        /* written so that areas which are not numbers keep their node */
+        /* The negated comparison keeps nodes whose area is NaN. */
         bool pays = i == 0 || is_leaf || !(area >= THROW_BACK * areas[baked->node[parent]]);
         if (pays) {
             baked->node[elements] = list[i];
@@ -90,7 +91,7 @@ static void count_below(struct bake *bake)
     }
 }
 
-/* All ones in the lanes of octants that meet the left child of a node first: its axis is positive there. */
+/* Mask of the octants that meet the left child of a node first: its axis is positive there. */
 static lanes left_is_near(const struct step *step, uint32_t first_octant)
 {
     const lanes octants = {first_octant, first_octant + 1, first_octant + 2, first_octant + 3};
@@ -102,8 +103,8 @@ static lanes choose(lanes which, lanes yes, lanes no)
     return (yes & which) | (no & ~which);
 }
 
-/* The places of all elements in four octants' orders, in one traversal that carries where the subtree it is in
- * begins: its own element first, then all of the nearer child, then all of the farther one. */
+/* Finds the places of all elements in the orders of four octants, in one traversal that carries the beginning
+ * of the current subtree: its own element first, then the nearer child's, then the farther one's. */
 static void place_octants(void *context, uint32_t group)
 {
     struct bake *bake = context;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-/* Elements as the device has them. */
+/* Elements in the device's layout. */
 #include "trace/tree/build.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-/* The grid's cells begin this far inside of it, so that rounding outward stays within. */
+/* The grid's cells begin this far inside it, so that rounding outward stays within. */
 #define GRID_INNER 2.0
 /* A box's corners are moved outward by this much of a cell before they are rounded outward: the rounding of the
  * traversal's arithmetic on coordinates of up to BVH_GRID_CELLS cells (shaders/tree/slack.glsl), 2^-24 each, 8
@@ -81,7 +81,7 @@ static float float_below(double x)
     return (double)near > x ? nextafterf(near, -INFINITY) : near;
 }
 
-/* Extents reach twice the largest float: doubles. */
+/* Doubles, as extents reach twice the largest float. */
 struct bvh_grid bvh_grid_over(const float lower[3], const float upper[3], float room)
 {
     struct bvh_grid grid;
@@ -94,8 +94,8 @@ struct bvh_grid bvh_grid_over(const float lower[3], const float upper[3], float 
         extent = fmax(extent, (double)FLT_MIN / GRID_FLATNESS) * (1 + 2 * (double)room);
         double middle = ((double)lower[i] + (double)upper[i]) / 2;
         double begin = middle - extent * (0.5 + GRID_INNER / (BVH_GRID_CELLS - 2 * GRID_INNER));
-        /* Far from the origin a float is coarser than a cell: the grid begins at the next below, and its cells
-         * reach from there. */
+        /* Far from the origin a float is coarser than a cell: the grid begins at the next float below, and its
+         * cells extend from there. */
         grid.lower[i] = float_below(fmax(begin, -FLT_MAX));
         double cell = (middle + extent / 2 - (double)grid.lower[i]) / (BVH_GRID_CELLS - GRID_INNER);
         grid.cells_per_unit[i] = fmaxf(float_below(1 / cell), FLT_MIN);

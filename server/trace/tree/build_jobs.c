@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Builds many trees at once, in threads of their own.
 #include "trace/tree/build.h"
 
 #include "base/clock.h"
@@ -17,7 +18,7 @@ struct bvh_run {
     pthread_t thread;
     bool has_thread;
     pthread_mutex_t mutex;
-    pthread_cond_t ended; /* by the monotonic clock */
+    pthread_cond_t ended; /* waits by the monotonic clock */
     bool has_ended;
     uint64_t end_ns;
 };
@@ -42,7 +43,7 @@ static void run_small(void *context, uint32_t i)
         build(run, &run->jobs[i]);
 }
 
-/* Large shapes one after the other with all threads on each, then the small ones with a thread for each. */
+/* Builds large shapes one after the other, each with all threads, then the small ones with a thread for each. */
 static void run_all(struct bvh_run *run)
 {
     for (uint32_t i = 0; i < run->count; i++)

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-/* The order in which a tree's boxes are refitted after its primitives have moved. */
+/* Order in which a tree's boxes are refitted after its primitives have moved. */
 #include "trace/tree/build.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Software GL leaves the loops of an invocation after 65,535 rounds, without a word. */
+/* Limit of a shader's loop: software GL silently leaves the loops of an invocation after 65,535 rounds. */
 #define ROUNDS_MAX 30000u
 
 struct heights {
-    uint32_t *of;     /* each element */
-    uint32_t *rounds; /* each element: its children */
-    uint32_t *begin;  /* records, by height; one more than there are heights */
+    uint32_t *of;     /* height of each element */
+    uint32_t *rounds; /* rounds of each element's loop: its children */
+    uint32_t *begin;  /* first record of each height, and their end */
     uint32_t count;
 };
 
@@ -39,7 +39,7 @@ static bool find_heights(struct heights *heights, const struct bvh_baked *baked)
     return true;
 }
 
-/* Each height is a step. False: an element has too many children. */
+/* Makes a step of each height. False: an element has too many children. */
 static bool find_steps(struct bvh_refit_plan *plan, const struct heights *heights)
 {
     for (uint32_t h = 1; h < heights->count; h++)
@@ -71,7 +71,7 @@ bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *ba
     bool ok = find_heights(&heights, baked);
     uint32_t *next = ok ? malloc(((size_t)heights.count + 1) * sizeof(*next)) : NULL;
     plan->records = malloc(baked->element_count * sizeof(*plan->records));
-    plan->steps = malloc(baked->element_count * sizeof(*plan->steps)); /* none is empty */
+    plan->steps = malloc(baked->element_count * sizeof(*plan->steps)); /* no step is empty */
     ok = ok && next && plan->records && plan->steps;
     if (ok) {
         memcpy(next, heights.begin, heights.count * sizeof(*next));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Bins of primitives, and the sweep that finds the cheapest cut.
 #include "trace/tree/build_split.h"
 
 #include "base/parallel.h"
@@ -9,21 +10,21 @@
 #include <immintrin.h>
 #endif
 
-/* Into the two forms of bvh_split_find(): by the instructions that every processor has, and by AVX2's. */
+/* Functions that are inlined twice: into bvh_split_find() for any processor, and into that for AVX2. */
 #define INLINED static inline __attribute__((always_inline))
 
 #define BINS_MAX 16
-#define SMALL_RANGE 24 /* ranges below are split with fewer bins: the sweep would cost more than the filling */
+#define SMALL_RANGE 24 /* smaller ranges are split with fewer bins: the sweep would cost more than the filling */
 #define BINS_SMALL 8
 #define LARGE_RANGE 256
 
 typedef int32_t int4 __attribute__((vector_size(16)));
 
-/* A box as its lower corner and its upper one times -1, so that boxes are united by minima alone. */
+/* A box as its lower corner and its negated upper corner, so that minima alone unite boxes. */
 typedef float corners __attribute__((vector_size(32)));
 
 struct bvh_bins {
-    corners boxes[BINS_MAX][3]; /* of each axis */
+    corners boxes[BINS_MAX][3]; /* boxes of each axis */
     _Alignas(16) int32_t counts[BINS_MAX][4];
     int count;
 };
@@ -31,7 +32,7 @@ struct bvh_bins {
 /* The best cut of each axis; lane 3 is unused. */
 struct best {
     bvh_vec4 cost;
-    int4 bin; /* primitives of this bin and those after go right; 0: none found */
+    int4 bin; /* primitives of this bin and those after it go right; 0: none found */
 };
 
 static bvh_vec4 choose(int4 which, bvh_vec4 yes, bvh_vec4 no)
@@ -46,7 +47,7 @@ static inline int4 counts_of(const struct bvh_bins *bins, int bin)
     return counts;
 }
 
-typedef void minimum(corners *a, const corners *b); /* into the first */
+typedef void minimum(corners *a, const corners *b); /* stores the minimum in the first */
 
 static inline void minimum_of_halves(corners *a, const corners *b)
 {
@@ -75,7 +76,7 @@ INLINED void add_box(struct bvh_bins *bins, const struct bvh_box *of, bvh_vec4 o
                      bvh_vec4 last_bin, minimum *take_minimum)
 {
     const bvh_vec4 zero = {0, 0, 0, 0}, place = (bvh_box_centre(of) - origin) * scale;
-    /* in this order: what is not a number becomes 0 */
+    /* In this order NaN becomes 0. */
     int4 bin = __builtin_convertvector(bvh_vec_min(bvh_vec_max(place, zero), last_bin), int4);
     corners box;
     corners_of(&box, of);
@@ -98,8 +99,8 @@ INLINED void add_bins(struct bvh_bins *sum, const struct bvh_bins *bins, minimum
     }
 }
 
-/* Neighbours are mostly in the same bins, and one would wait for the other: of many, each half has bins of its
- * own. */
+/* Fills the bins. Neighbours mostly share bins and would wait for one another: in a long range each half has
+ * bins of its own. */
 INLINED void fill_bins(struct bvh_bins *bins, const struct bvh_box *boxes, uint32_t count, bvh_vec4 origin,
                        bvh_vec4 scale, minimum *take_minimum)
 {
@@ -162,7 +163,7 @@ INLINED struct best sweep(const struct bvh_bins *bins, minimum *take_minimum)
         left += counts_of(bins, i - 1);
         bvh_vec4 cost = box_areas(sum) * __builtin_convertvector(left, bvh_vec4) +
                         area_right[i] * __builtin_convertvector(total - left, bvh_vec4);
-        /* Where a side is empty its area means nothing. */
+        /* The area of an empty side is meaningless. */
         int4 better = (cost < best.cost) & (left > 0) & (left < total);
         best.cost = choose(better, cost, best.cost);
         best.bin = (better & i) | (~better & best.bin);
@@ -175,7 +176,7 @@ INLINED int bin_count_of(uint32_t count)
     return count < SMALL_RANGE ? BINS_SMALL : BINS_MAX;
 }
 
-/* Bins to a unit. */
+/* Bins per unit. */
 INLINED bvh_vec4 scale_of(bvh_vec4 extent, int bin_count)
 {
     bvh_vec4 scale = {0, 0, 0, 0};
@@ -199,7 +200,7 @@ INLINED struct bvh_split choose_split(const struct bvh_bins *bins, const struct 
 INLINED struct bvh_split find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres,
                               minimum *take_minimum)
 {
-    struct bvh_bins bins; /* filled as far as it is used */
+    struct bvh_bins bins; /* filled as far as used */
     bins.count = bin_count_of(count);
     const bvh_vec4 extent = centres->upper - centres->lower, scale = scale_of(extent, bins.count);
     fill_bins(&bins, boxes, count, centres->lower, scale, take_minimum);
@@ -234,14 +235,14 @@ struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, con
     return find(boxes, count, centres, minimum_of_halves);
 }
 
-/* ---- by several threads ---- */
+/* ---- splits by several threads ---- */
 
 struct pieces {
     const struct bvh_box *boxes;
     uint32_t count;
     bvh_vec4 origin, scale;
     int bin_count;
-    struct bvh_bins *bins; /* of each */
+    struct bvh_bins *bins; /* bins of each piece */
 };
 
 static void fill_piece(void *context, uint32_t piece)
@@ -259,7 +260,7 @@ static void fill_piece(void *context, uint32_t piece)
     fill_bins(bins, pieces->boxes + begin, count, pieces->origin, pieces->scale, minimum_of_halves);
 }
 
-/* A primitive goes left if its bin is before the border, by the same arithmetic. */
+/* Counts the primitives that go left, whose bins are before the border, by the same arithmetic. */
 static uint32_t count_left(const struct bvh_bins *bins, const struct bvh_split *split)
 {
     uint32_t left = 0;

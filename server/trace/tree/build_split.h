@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a range of primitives is best cut in two: the surface area heuristic over bins of the primitives' centres,
- * the three axes side by side in the lanes of a register. Private to the builder. */
+/* Finds where a range of primitives is best cut in two: the surface area heuristic over bins of the primitives'
+ * centres, with the three axes in the lanes of a register. Private to the builder. */
 #ifndef FARLIGHT_TRACE_TREE_BUILD_SPLIT_H
 #define FARLIGHT_TRACE_TREE_BUILD_SPLIT_H
 
@@ -13,21 +13,22 @@
 
 struct bvh_split {
     int axis;            /* -1: none found */
-    float cost;          /* half surfaces times primitives, both sides */
-    float origin, scale; /* primitives whose (centre - origin) scale is less than `border` go left */
+    float cost;          /* half surfaces times primitives, over both sides */
+    float origin, scale; /* primitives with (centre - origin) scale below `border` go left */
     float border;
 };
 
-/* The cheapest cut of boxes[0 .. count - 1], whose centres lie in `centres`. */
+/* Finds the cheapest cut of boxes[0 .. count - 1], whose centres lie in `centres`. */
 struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres);
 
 /* ---- by several threads, piece by piece ---- */
 
 #define BVH_PIECE 16384u /* primitives that a thread takes at a time */
 
-struct bvh_bins;                                       /* of a piece */
+struct bvh_bins;                                       /* bins of one piece */
 struct bvh_bins *bvh_bins_alloc(uint32_t piece_count); /* for free(); NULL: no memory */
-/* The same cut. Of each piece: its bins, for working, and how many of its primitives go left. */
+/* Finds the same cut with several threads. `bins` and `lefts` have an entry for each piece: working memory, and
+ * the number of its primitives that go left. */
 struct bvh_split bvh_split_find_together(const struct bvh_box *boxes, uint32_t count,
                                          const struct bvh_box *centres, unsigned threads, struct bvh_bins *bins,
                                          uint32_t *lefts);
@@ -51,7 +52,7 @@ static inline bvh_vec4 bvh_vec_max(bvh_vec4 a, bvh_vec4 b)
     return (bvh_vec4)_mm_max_ps((__m128)a, (__m128)b);
 }
 #else
-/* As SSE does it: where either is not a number, the second. */
+/* Minimum by SSE's rule: the second where either is NaN. */
 static inline bvh_vec4 bvh_vec_min(bvh_vec4 a, bvh_vec4 b)
 {
     for (int i = 0; i < 4; i++)
@@ -79,14 +80,16 @@ static inline void bvh_box_add(struct bvh_box *box, const struct bvh_box *other)
 
 static inline bvh_vec4 bvh_box_centre(const struct bvh_box *box)
 {
-    return 0.5f * box->lower + 0.5f * box->upper; /* halves first: the sum of two large ones is infinite */
+    return 0.5f * box->lower + 0.5f * box->upper; /* halves first: the sum of two large numbers would be
+                                                     infinite */
 }
 
-/* A place that is not a number (infinite extent times zero) is on the left, as it is in bin 0. */
+/* Whether a primitive goes left. A place that is NaN (infinite extent times zero) is on the left, as it is in
+ * bin 0. */
 static inline bool bvh_split_goes_left(const struct bvh_split *split, const struct bvh_box *box)
 {
     const float *lower = (const float *)&box->lower, *upper = (const float *)&box->upper;
-    float centre = 0.5f * lower[split->axis] + 0.5f * upper[split->axis]; /* as bvh_box_centre() */
+    float centre = 0.5f * lower[split->axis] + 0.5f * upper[split->axis]; /* by the formula of bvh_box_centre() */
     return !((centre - split->origin) * split->scale >= split->border);
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// The tree over the instances: its build, and refits where they move.
 #include "trace/tree/build_top.h"
 
 #include <math.h>
@@ -7,7 +8,8 @@
 
 /* A refitted tree is kept until its surface area cost has doubled. */
 #define STALE_FACTOR 2.0f
-/* What instances may move outward, of the extent of all, before there is a new grid and so a new tree. */
+/* Distance, as a share of the whole extent, by which instances may move outward before they need a new grid and
+ * hence a new tree. */
 #define GRID_ROOM 0.25f
 
 static const struct bvh_costs costs = {.element = 1, .primitive = 1, .leaf_max = 1};
@@ -46,7 +48,7 @@ static void set_element(struct bvh_top *top, uint32_t e)
     bvh_write_element(top->elements, &top->settings, &top->baked, &top->grid, e, &bound, top->leaves[e]);
 }
 
-/* Sum of the surfaces of all elements over that of the root: tests that a ray through the root makes. */
+/* Sum of the surfaces of all elements over that of the root: the number of tests of a ray through the root. */
 static float tree_cost(const struct bvh_top *top)
 {
     float sum = 0;
@@ -66,7 +68,7 @@ static bool top_alloc(struct bvh_top *top)
     return top->elements && top->boxes && top->leaves && top->moved;
 }
 
-/* instances[i]: which instance primitive i of the binary tree is. */
+/* instances[i]: the instance of primitive i of the binary tree. */
 static void fill_elements(struct bvh_top *top, const struct bvh_binary *binary, const uint32_t *instances)
 {
     const struct bvh_bound root = bvh_bound_of_box(binary->nodes[0].lower, binary->nodes[0].upper);
@@ -82,7 +84,7 @@ static void fill_elements(struct bvh_top *top, const struct bvh_binary *binary, 
         }
         set_element(top, e);
     }
-    top->left_grid = false; /* what overflows lies outside, but would in a new tree too */
+    top->left_grid = false; /* a box that overflows lies outside the grid, and would do so in a new tree */
 }
 
 static bool bake_top(struct bvh_top *top, const struct bvh_binary *binary)
@@ -165,7 +167,7 @@ bool bvh_top_move(struct bvh_top *top, uint32_t instance, const struct bvh_world
 uint32_t bvh_top_refit(struct bvh_top *top)
 {
     uint32_t refitted = 0;
-    /* Children come after their parent, so backwards. */
+    /* Children come after their parent, hence backwards. */
     for (uint32_t e = top->element_count; e-- > 0;) {
         if (!top->moved[e])
             continue;

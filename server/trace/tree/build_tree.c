@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Builds the tree of one shape: its binary tree, elements and primitives.
 #include "trace/tree/build.h"
 
 #include "base/parallel.h"
@@ -10,17 +11,17 @@
 
 #define CHUNK 16384u /* primitives that a thread takes at a time */
 #define SURVEYED_ELEMENTS 4096u
-#define GRID_COST_EACH_MAX 4.0f /* a few boxes that are all but points say nothing of the others */
+#define GRID_COST_EACH_MAX 4.0f /* limit for each box: a few that are almost points are not typical */
 
-/* Measured on 146K triangles: a leaf of up to 2, 4, 8 at costs of 0.5 to 2 changes the time of a ray by 3 %; this
- * choice is the fastest by a little and has the fewest elements. */
+/* Costs and leaf size. Measured on 146K triangles: leaves of up to 2, 4, 8 at costs of 0.5 to 2 change the time
+ * of a ray by 3 %; this choice is the fastest by a little and has the fewest elements. */
 static const struct bvh_costs costs = {.element = 1, .primitive = 0.5f, .leaf_max = BVH_LEAF_MAX};
 
-/* From which a tree's elements and primitives are written. */
+/* Source of a tree's elements and primitives while they are written. */
 struct bvh_draft {
     struct bvh_binary binary;
     struct bvh_baked baked;
-    float (*spheres)[4]; /* per node of the binary tree: centre, radius; NULL with boxes */
+    float (*spheres)[4]; /* for each node of the binary tree: centre, radius; NULL with boxes */
 };
 
 struct work {
@@ -102,7 +103,7 @@ static void write_triangle(const struct bvh_shape *shape, const float *positions
     memcpy(out + 3, &number, sizeof(number));
 }
 
-/* Primitives as the shader reads them, in the order of the leaves. */
+/* Writes primitives for the shader, in the order of the leaves. */
 static void chunk_primitives(void *context, uint32_t chunk)
 {
     struct work *work = context;
@@ -158,8 +159,8 @@ static float leaf_radius(const struct work *work, const struct bvh_binary_node *
     return radius;
 }
 
-/* About the centre of the box: tight for leaves, above them the smaller of what the box and what the two
- * children's spheres need. Children come after their parent, so backwards. */
+/* Makes a sphere for each node, about the centre of its box: tight for leaves, above them the smaller of the
+ * box's sphere and the one round the two children's spheres. Children come after their parent, hence backwards. */
 static bool make_spheres(struct work *work)
 {
     const struct bvh_binary_node *nodes = work->draft->binary.nodes;
@@ -183,9 +184,9 @@ static bool make_spheres(struct work *work)
             const float *left = work->draft->spheres[node->link], *right = work->draft->spheres[node->link + 1];
             other = fmaxf(distance(sphere, left) + left[3], distance(sphere, right) + right[3]);
         }
-        /* Each sum above rounds a few times. */
+        /* Margin for the few roundings of each sum above. */
         sphere[3] = fminf(sphere[3], other) * (1 + 0x1p-21f);
-        work->draft->binary.areas[order[count]] = sphere[3] * sphere[3]; /* the surface, up to a factor */
+        work->draft->binary.areas[order[count]] = sphere[3] * sphere[3]; /* surface, up to a factor */
     }
     free(order);
     return true;
@@ -220,8 +221,8 @@ static void chunk_elements(void *context, uint32_t chunk)
     }
 }
 
-/* Statistics of the tree from a sample of its elements. For the grid: the mean of each element's own cost, however
- * small it is: the camera looks where there is detail. */
+/* Finds statistics of the tree from a sample of its elements. The grid's cost is the mean over elements, each
+ * with the same weight however small it is: the camera is usually where the detail is. */
 static void survey(struct work *work)
 {
     const struct bvh_baked *baked = &work->draft->baked;
@@ -241,7 +242,7 @@ static void survey(struct work *work)
         uint32_t cells[3][2];
         bvh_grid_cells(&tree->grid, bound.lower, bound.upper, cells);
         float cost = bvh_grid_area(&tree->grid, cells) / bvh_box_area(bound.lower, bound.upper);
-        /* Not a number where surfaces are 0 or overflow. */
+        /* NaN where surfaces are 0 or overflow. */
         cost_sum += cost > 1 ? fminf(cost, GRID_COST_EACH_MAX) : 1;
     }
     tree->grid_cost = has_grid ? cost_sum / (float)count : 1;
@@ -376,7 +377,7 @@ bool bvh_tree_plan(struct bvh_tree *tree, const struct bvh_shape *shape, const s
                      shape->primitive_count);
 }
 
-/* Chunks of both arrays, as one list. */
+/* Writes a chunk of either array, as if they were one list. */
 static void chunk_of_either(void *context, uint32_t chunk)
 {
     const struct work *work = context;

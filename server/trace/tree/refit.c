@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Passes that refit a tree of a deformed geometry.
 #include "trace/tree/refit.h"
 
 #include "gpu/program.h"
@@ -8,7 +9,7 @@
 #include <stdlib.h>
 
 #define TEXEL_BYTES 16u
-#define PART_ALIGNMENT 256u /* the maximum that OpenGL lets a device require */
+#define PART_ALIGNMENT 256u /* maximum that OpenGL lets a device require */
 
 bool bvh_refit_init(struct bvh_refit *refit, struct gpu_device *device, struct bvh_refit_plan *plan,
                     struct error *error)
@@ -38,8 +39,8 @@ void bvh_refit_finish(struct bvh_refit *refit, struct gpu_device *device)
     *refit = (struct bvh_refit){0};
 }
 
-/* A part of a buffer as storage; returns how many texels of it lie before that part, which begins where the device
- * lets it. */
+/* Binds a part of a buffer as storage from the nearest offset that the device allows; returns the number of
+ * texels between that offset and the part. */
 static uint32_t bind_part(unsigned binding, const struct gpu_buffer *buffer, uint64_t first_texel, uint64_t texels)
 {
     uint32_t before = (uint32_t)(first_texel % (PART_ALIGNMENT / TEXEL_BYTES));

@@ -26,24 +26,25 @@ struct bvh_refit {
  */
 #define BVH_REFIT_WEAR_MAX 2.0f
 
-/* Takes the steps out of the plan. */
+/* Creates the plan's buffers, and moves its steps into *refit. */
 bool bvh_refit_init(struct bvh_refit *refit, struct gpu_device *device, struct bvh_refit_plan *plan,
                     struct error *error);
 void bvh_refit_finish(struct bvh_refit *refit, struct gpu_device *device);
 
-/* Where things lie. */
+/* Places of a tree's parts in the buffers. */
 struct bvh_refit_place {
     struct gpu_buffer *boxes, *primitives, *elements;
-    uint32_t first_box;    /* of this tree in `boxes`, which holds BVH_REFIT_BOX_BYTES each */
-    uint32_t first_texel;  /* in `primitives` */
-    uint32_t close_texels; /* to where triangles lie as they are when the shutter closes */
+    uint32_t first_box;    /* the tree's first box in `boxes`, of BVH_REFIT_BOX_BYTES each */
+    uint32_t first_texel;  /* first texel in `primitives` */
+    uint32_t close_texels; /* offset of the triangles at shutter close */
     uint32_t first_vertex; /* in the scene's positions, which are bound */
-    uint32_t close_offset; /* of vertices; 0: the shape stays while the shutter is open */
+    uint32_t close_offset; /* offset of the vertices at shutter close; 0: the shape stays while the shutter is
+                              open */
     uint32_t first_element;
 };
 #define BVH_REFIT_BOX_BYTES (BVH_REFIT_BOX_TEXELS * 16u)
 
-/* A tree's first box as it lies in `boxes`. */
+/* The first box of a tree in `boxes`. */
 struct bvh_refit_root {
     float lower[3];
     uint32_t size;
@@ -53,10 +54,10 @@ struct bvh_refit_root {
     uint32_t pad1[2];
 };
 
-/* Triangles and boxes. */
+/* Refits triangles and boxes. */
 bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
                       struct error *error);
-/* Elements from the boxes; `grid` is over the root's box. */
+/* Writes elements from the boxes; `grid` is over the root's box. */
 bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
                      const struct bvh_form *settings, const struct bvh_grid *grid, struct error *error);
 

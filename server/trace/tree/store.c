@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Buffers of the trees: which geometries need a tree, builds, uploads, and places.
 #include "trace/tree/store.h"
 
 #include "base/clock.h"
@@ -10,11 +11,11 @@
 #define TEXEL_BYTES (4 * sizeof(float))
 #define TOP_CAPACITY_MIN 64u
 #define PART_SLACK 256u
-/* If more than this share of its elements has moved, or more than this number, the whole top tree is uploaded at
- * once: a call costs as much as some thousand bytes. */
+/* Limits above which the whole top tree is uploaded at once: one over this share of its elements has moved, or
+ * more runs than this. A call costs as much as some thousand bytes. */
 #define WRITE_WHOLE 4u
 #define WRITE_RUNS_MAX 64u
-#define UPLOAD_BYTES ((uint64_t)1 << 22) /* at a time */
+#define UPLOAD_BYTES ((uint64_t)1 << 22) /* bytes at a time */
 
 void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_form *settings)
 {
@@ -30,7 +31,7 @@ static void unmap(struct bvh_store *store)
     store->build.is_mapped = false;
 }
 
-/* Also one that is still at work. */
+/* Drops the build, even one in progress. */
 static void end_build(struct bvh_store *store)
 {
     struct bvh_store_build *build = &store->build;
@@ -75,7 +76,7 @@ uint64_t bvh_store_bytes(const struct bvh_store *store)
 
 /* ---- memory ---- */
 
-/* The capacity of a texel buffer. */
+/* Checks the capacity of texel buffers. */
 static bool check_limits(const struct bvh_store *store, uint64_t elements, uint64_t texels, struct error *error)
 {
     const struct gpu_facts *facts = &store->device->facts;
@@ -94,13 +95,13 @@ static bool check_limits(const struct bvh_store *store, uint64_t elements, uint6
     return true;
 }
 
-/* A run of items that stays but lies elsewhere. */
+/* A run of items that is kept but moves to another place. */
 struct move {
     uint64_t from, to, count;
 };
 
-/* Makes the buffer hold `items`, with the runs at their new places. New storage is only taken where a run moves
- * or the old is too small. */
+/* Makes the buffer hold `items`, with the runs at their new places. It allocates new storage only where a run
+ * moves or the old one is too small. */
 static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t item_bytes, uint64_t items,
                    const struct move *moves, uint32_t move_count, struct error *error)
 {
@@ -110,7 +111,7 @@ static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t 
     if (!must_move)
         return gpu_buffer_reserve(device, buffer, items * item_bytes, error);
     struct gpu_buffer bigger = {0};
-    /* What has grown once will grow again. */
+    /* A buffer that has grown once will probably grow again. */
     size_t room = items * item_bytes, slack = buffer->capacity_bytes > 0 ? room / 2 : 0;
     if (!gpu_buffer_reserve(device, &bigger, room + slack, error) ||
         !gpu_buffer_reserve(device, &bigger, room, error)) {
@@ -127,7 +128,7 @@ static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t 
     return true;
 }
 
-/* Packs the entries behind the top tree's space and leaves `elements` and `texels` behind them for new ones. */
+/* Packs the entries behind the top tree's space, and leaves room for `elements` and `texels` behind them. */
 static bool pack(struct bvh_store *store, uint32_t top_capacity, uint64_t elements, uint64_t texels,
                  struct error *error)
 {
@@ -179,7 +180,7 @@ static bool entry_is_of(const struct bvh_entry *entry, const struct gpu_scene_ge
            entry->is_mesh == (geometry->mesh != NULL);
 }
 
-/* A deforming node shows one geometry, which no other node shows. */
+/* Key of an entry. A deforming node shows one geometry, which no other node shows. */
 static uint64_t entry_key(bool is_mesh, uint32_t id, uint32_t node)
 {
     return node != 0 ? (uint64_t)node << 2 | 2 : (uint64_t)id << 2 | is_mesh;
@@ -242,7 +243,7 @@ static bool find_missing(struct bvh_store *store, const struct gpu_scene *scene,
     return ok;
 }
 
-/* Its place, behind the others. */
+/* Places a tree behind the others. */
 static void add_entry(struct bvh_store *store, const struct gpu_scene_geometry *geometry,
                       const struct bvh_tree *tree)
 {
@@ -270,8 +271,7 @@ static void add_entry(struct bvh_store *store, const struct gpu_scene_geometry *
     entry->leaf_extent = tree->leaf_extent;
 }
 
-/* The rest of an array of which that many bytes are written; surplus bytes count for the next array.
- */
+/* Uploads the rest of an array after its first *done bytes; surplus bytes count for the next array. */
 static bool upload_array(struct bvh_store *store, struct gpu_buffer *buffer, uint64_t first_byte,
                          const void *array, uint64_t bytes, uint64_t *done, uint64_t step_end_ns)
 {
@@ -303,7 +303,7 @@ static bool upload_arrays(struct bvh_store *store, const struct bvh_entry *entry
     return all;
 }
 
-/* Goes on with the next one. */
+/* Uploads the next tree, as far as the step allows. */
 static enum tracer_progress upload_tree(struct bvh_store *store, uint64_t step_end_ns,
                                         struct bvh_store_report *report, struct error *error)
 {
@@ -319,14 +319,14 @@ static enum tracer_progress upload_tree(struct bvh_store *store, uint64_t step_e
     const struct bvh_refit_plan *plan = &tree->plan;
     report->uploaded_bytes += plan->record_count * sizeof(*plan->records);
     report->uploaded_bytes += plan->triangle_count * 4 * sizeof(*plan->corners);
-    /* The refit writes to parts of the buffers, and what a shader can write to is limited. */
+    /* The refit writes to parts of the buffers, and the size of writable storage is limited. */
     uint64_t part_max = store->device->facts.storage_block_bytes_max - PART_SLACK;
     if (element_bytes > part_max || texel_bytes > part_max)
         bvh_refit_plan_finish(&tree->plan);
     return tracer_progress_of(bvh_refit_init(&entry->refit, store->device, &tree->plan, error));
 }
 
-/* Of trees over the shapes of jobs[i] for the geometries which[i]; both arrays become the store's. */
+/* Begins trees over the shapes of jobs[i] for the geometries which[i]; the store owns both arrays from here on. */
 static bool begin_build(struct bvh_store *store, struct bvh_job *jobs, uint32_t *which, uint32_t count,
                         struct error *error)
 {
@@ -370,8 +370,8 @@ static bool make_entries(struct bvh_store *store, const struct gpu_scene *scene,
     return true;
 }
 
-/* Says where the trees go. Software GL's buffers are memory like any other: an array of its own for each would be
- * twice as much of it. */
+/* Sets the destination of each tree: buffers of software GL are host memory, so arrays of the trees' own would
+ * double it. */
 static bool open_arrays(struct bvh_store *store, struct error *error)
 {
     struct bvh_store_build *build = &store->build;
@@ -433,7 +433,7 @@ static enum tracer_progress upload_trees(struct bvh_store *store, uint64_t step_
     return TRACER_DONE;
 }
 
-static enum tracer_progress go_on_building(struct bvh_store *store, const struct gpu_scene *scene,
+static enum tracer_progress continue_build(struct bvh_store *store, const struct gpu_scene *scene,
                                            uint64_t step_end_ns, struct bvh_store_report *report,
                                            struct stage_times *times, struct error *error)
 {
@@ -451,7 +451,7 @@ static enum tracer_progress go_on_building(struct bvh_store *store, const struct
     return progress;
 }
 
-/* Which entry each geometry of the scene has. */
+/* Finds the entry of each geometry of the scene. */
 static bool index_entries(struct bvh_store *store, const struct gpu_scene *scene)
 {
     struct hashmap by_key;
@@ -497,7 +497,7 @@ bool bvh_store_rebuild(struct bvh_store *store, const struct gpu_scene *scene, s
     }
     drop_unwanted(store);
     bool ok = begin_build(store, jobs, which, count, error) &&
-              go_on_building(store, scene, STEP_WITHOUT_END, report, times, error) == TRACER_DONE;
+              continue_build(store, scene, STEP_WITHOUT_END, report, times, error) == TRACER_DONE;
     for (uint32_t i = 0; ok && i < count; i++) {
         struct bvh_entry *entry = &store->entries[store->entry_count - count + i];
         entry->leaf_extent = old[i].leaf_extent;
@@ -538,7 +538,7 @@ enum tracer_progress bvh_store_step(struct bvh_store *store, struct gpu_scene *s
                                     struct bvh_store_report *report, struct stage_times *times,
                                     struct error *error)
 {
-    enum tracer_progress progress = go_on_building(store, scene, step_end_ns, report, times, error);
+    enum tracer_progress progress = continue_build(store, scene, step_end_ns, report, times, error);
     if (progress == TRACER_MORE)
         return TRACER_MORE;
     end_build(store);
@@ -559,7 +559,7 @@ bool bvh_store_waits(struct bvh_store *store)
 
 /* ---- top tree ---- */
 
-/* One octant's copy: runs of adjacent elements. */
+/* Writes one octant's copy, in runs of adjacent elements. */
 static uint64_t write_top_copy(struct bvh_store *store, const struct bvh_top *top, uint32_t octant,
                                const bool *moved)
 {
@@ -598,7 +598,7 @@ uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top,
     for (uint32_t octant = 0; octant < bvh_octants(&store->settings); octant++) {
         for (uint32_t e = 0; moved && e < count; e++)
             moved[top->baked.place ? top->baked.place[(size_t)octant * count + e] : e] = top->moved[e];
-        bytes += write_top_copy(store, top, octant, moved); /* without memory for the marks: all */
+        bytes += write_top_copy(store, top, octant, moved); /* without memory for the marks, all elements */
     }
     free(moved);
     return bytes;

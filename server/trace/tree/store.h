@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The trees on the device: one for each geometry, kept by (kind, id, revision), behind a space for the top tree.
- * GL thread. */
+/* Trees on the device: one for each geometry, kept by (kind, id, revision), behind a space for the top tree. GL
+ * thread. */
 #ifndef FARLIGHT_TRACE_TREE_STORE_H
 #define FARLIGHT_TRACE_TREE_STORE_H
 
@@ -17,50 +17,50 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* A tree that is on the device. */
+/* A tree on the device. */
 struct bvh_entry {
     bool is_mesh;
     uint32_t id;
-    uint32_t node; /* as struct gpu_scene_geometry has it */
+    uint32_t node; /* gpu_scene_geometry.node */
     uint64_t revision;
-    uint64_t deformed_revision; /* of the vertices that it was built or refitted for */
+    uint64_t deformed_revision; /* the vertices that it was built or refitted for */
     struct bvh_refit refit;
-    float built_wear; /* as struct bvh_tree has it */
+    float built_wear; /* wear at the build (bvh_tree.wear) */
     bool is_wanted;   /* the scene still has it, in this revision */
     uint32_t first_element, element_count;
     uint32_t first_texel, texel_count;
     float lower[3], upper[3]; /* object space, padded */
     struct bvh_grid grid;
-    float grid_cost, leaf_extent; /* as struct bvh_tree has them */
+    float grid_cost, leaf_extent; /* those of struct bvh_tree */
 };
 
-/* Trees that are planned, then written: to the buffers themselves where the host shares their memory, else to
- * arrays that are uploaded. */
+/* Trees being planned, then written: into the buffers themselves where the host shares their memory, otherwise
+ * into arrays that are uploaded. */
 struct bvh_store_build {
     struct bvh_job *jobs; /* owned; NULL: there are none */
-    uint32_t *which;      /* owned; geometry of each */
+    uint32_t *which;      /* owned; geometry of each job */
     uint32_t count;
     struct bvh_run *run;     /* NULL: it has ended */
-    enum bvh_step step;      /* of the run */
-    bool is_mapped;          /* both buffers are, to be written */
-    uint64_t start_ns;       /* of the run */
-    uint32_t uploaded;       /* trees */
-    uint64_t uploaded_bytes; /* of the next one's elements and primitives */
+    enum bvh_step step;      /* current step of the run */
+    bool is_mapped;          /* both buffers are mapped for writing */
+    uint64_t start_ns;       /* beginning of the run */
+    uint32_t uploaded;       /* number of trees uploaded */
+    uint64_t uploaded_bytes; /* of the next tree's elements and primitives */
 };
 
 struct bvh_store {
     struct gpu_device *device;
     struct bvh_form settings;
-    struct bvh_entry *entries; /* as they lie on the device */
+    struct bvh_entry *entries; /* in the order of their places on the device */
     uint32_t entry_count;
-    uint32_t *entry_of; /* geometry of the scene to entry; BVH_NONE: without primitives */
+    uint32_t *entry_of; /* entry of each geometry of the scene; BVH_NONE: without primitives */
     uint32_t geometry_count;
     bool deforms;            /* some geometry's vertices may move */
-    bool deforms_in_shutter; /* and do, while the shutter is open */
-    uint32_t top_capacity;   /* elements before the first entry */
-    bool top_lost;           /* the top tree must be written again; cleared by the code that writes it */
+    bool deforms_in_shutter; /* some move while the shutter is open */
+    uint32_t top_capacity;   /* elements reserved before the first entry */
+    bool top_lost;           /* the top tree must be written again; its writer clears this */
     struct gpu_buffer elements, primitives;
-    struct gpu_buffer boxes, roots; /* of refits */
+    struct gpu_buffer boxes, roots; /* buffers of refits */
     struct bvh_store_build build;
 };
 
@@ -70,29 +70,30 @@ struct bvh_store_report {
 
 void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_form *settings);
 void bvh_store_finish(struct bvh_store *store);
-/* Trees for all geometries of the scene, building those that are new or changed: begun, then in steps that end at
- * about that time. What the scene's arrays hold must not change meanwhile. What is kept is not uploaded
- * again, though the device may move it. Trees of geometries whose vertices have moved are refitted on the device,
- * and built anew from where these are now where refitting has made one worse than BVH_REFIT_WEAR_MAX; their
- * leaf_extent and grid_cost stay those of the mesh as it is given, so that what is chosen by them does not depend
- * on earlier poses. `all`: deformed_revision of what is there says nothing. After a failure the store is empty. */
+/* Updates the trees of all geometries of the scene: begins to build new and changed ones, then continues in
+ * steps that end at about step_end_ns. The scene's arrays must not change meanwhile. Trees that are kept are
+ * not uploaded again, though the device may move them. Trees of geometries whose vertices have moved are
+ * refitted on the device, and rebuilt from the current vertices where refits have worn one beyond
+ * BVH_REFIT_WEAR_MAX; their leaf_extent and grid_cost stay those of the mesh at rest, so that choices by them
+ * do not depend on earlier poses. `all`: ignore deformed_revision and refit all. After a failure the store is
+ * empty. */
 bool bvh_store_begin(struct bvh_store *store, const struct gpu_scene *scene, bool all, struct error *error);
 enum tracer_progress bvh_store_step(struct bvh_store *store, struct gpu_scene *scene, uint64_t step_end_ns,
                                     struct bvh_store_report *report, struct stage_times *times,
                                     struct error *error);
 /* Whether the next step would only wait for the builder's threads. */
 bool bvh_store_waits(struct bvh_store *store);
-/* The second half of it: trees of geometries whose vertices are others than those that they were made for. */
+/* Second half of the update: refits or rebuilds trees of geometries whose vertices have changed since. */
 bool bvh_store_deform(struct bvh_store *store, struct gpu_scene *scene, struct bvh_store_report *report,
                       struct stage_times *times, struct error *error);
-/* Trees over the shapes of jobs[i] for the geometries which[i], in place of those that they have, all at once.
- * Both arrays become the store's, in any case. */
+/* Rebuilds trees over the shapes of jobs[i] for the geometries which[i], in place of their present ones, all at
+ * once. The store owns both arrays from here on, in any case. */
 bool bvh_store_rebuild(struct bvh_store *store, const struct gpu_scene *scene, struct bvh_job *jobs,
                        uint32_t *which, uint32_t count, struct bvh_store_report *report, struct stage_times *times,
                        struct error *error);
-/* Reserves a top tree of that many elements. */
+/* Reserves a top tree of `element_count` elements. */
 bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
-/* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes. */
+/* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes written. */
 uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all);
 /* The tree of a geometry, NULL if it has no primitives. */
 const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t geometry);

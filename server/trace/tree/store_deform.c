@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Trees follow the vertices of deformed meshes. */
+/* Updates trees to the vertices of deformed meshes. */
 #include "trace/tree/store.h"
 
 #include "base/clock.h"
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Geometries whose vertices have moved. */
+/* A geometry whose vertices have moved. */
 struct moved {
     uint32_t geometry;
     uint32_t first_box;
@@ -20,7 +20,7 @@ struct moved {
 struct deforming {
     struct moved *list;
     uint32_t count;
-    uint64_t boxes; /* of all that can be refitted */
+    uint64_t boxes; /* number of boxes in the trees that can be refitted */
 };
 
 static struct bvh_entry *entry_of(struct bvh_store *store, uint32_t geometry)
@@ -62,7 +62,7 @@ static struct bvh_refit_place place_of(struct bvh_store *store, const struct gpu
 
 /* ---- refit ---- */
 
-/* Boxes of all trees, then their roots in one go: reading waits for the device. */
+/* Refits the boxes of all trees, then reads their roots together: each read waits for the device. */
 static bool make_bounds(struct bvh_store *store, struct gpu_scene *scene, struct deforming *deforming,
                         struct bvh_refit_root *roots, struct error *error)
 {
@@ -85,7 +85,8 @@ static bool make_bounds(struct bvh_store *store, struct gpu_scene *scene, struct
     return true;
 }
 
-/* Padded as the builder does; what overflows is in it. Lower above upper: no corner is a number. */
+/* Sets an entry's box, padded as the builder does, with overflow included. Lower above upper: no corner is a
+ * number. */
 static void take_box(struct bvh_entry *entry, const struct bvh_refit_root *root)
 {
     memcpy(entry->lower, root->lower, sizeof(entry->lower));
@@ -128,7 +129,7 @@ static bool refit(struct bvh_store *store, struct gpu_scene *scene, struct defor
 
 /* ---- rebuild ---- */
 
-/* Vertices as they are on the device: as the shutter opens, then as it closes, 4 floats each. */
+/* Reads the vertices from the device: at shutter open, then at shutter close, 4 floats each. */
 static float *read_vertices(struct bvh_store *store, const struct gpu_scene *scene,
                             const struct geometry *geometry)
 {

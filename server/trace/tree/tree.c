@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Trees over a scene: updates of geometries, then of the top tree and its transforms.
 #include "trace/tree/tree.h"
 
 #include "base/clock.h"
@@ -12,7 +13,8 @@
 #include <string.h>
 
 #define BUILD_THREADS_MAX 8
-/* A grid that enlarges boxes by this factor costs more steps than its smaller elements save. */
+/* Maximum of the factor by which a grid may enlarge boxes: above it the additional steps cost more than smaller
+ * elements save. */
 #define GRID_COST_MAX 1.3f
 
 static unsigned build_threads(void)
@@ -49,7 +51,7 @@ void scene_tree_finish(struct scene_tree *tree)
 /* ---- instances ---- */
 
 /* The tree's box in world space, padded for the rounding of the ray's transform to object space: a few units in
- * the last place of all that is summed. Infinite where the sum overflows, which is right. */
+ * the last place of all that is summed. It is infinite where the sum overflows, which is a valid bound. */
 static struct bvh_world_box box_at_pose(const struct bvh_entry *entry, const float *world_from_object)
 {
     struct bvh_world_box box;
@@ -72,7 +74,8 @@ static struct bvh_world_box box_at_pose(const struct bvh_entry *entry, const flo
     return box;
 }
 
-/* Wherever it goes while the shutter is open: between two poses each point goes straight from one to the other. */
+/* Bounds an instance while the shutter is open: between two poses each point moves straight from one to the
+ * other. */
 static struct bvh_world_box world_box(const struct bvh_entry *entry, const struct gpu_scene *scene,
                                       const struct instance *instance)
 {
@@ -86,7 +89,7 @@ static struct bvh_world_box world_box(const struct bvh_entry *entry, const struc
     return box;
 }
 
-/* The current instance i. The box is empty if its geometry has no primitives. */
+/* Makes the transform of instance i. The box is empty if its geometry has no primitives. */
 static struct bvh_transform describe(const struct scene_tree *tree, const struct gpu_scene *scene, uint32_t i,
                                      struct bvh_world_box *box)
 {
@@ -133,7 +136,7 @@ static void survey_leaves(struct scene_tree *tree, const struct gpu_scene *scene
     tree->leaf_extent_world = count > 0 ? (float)(sum / count) : 0;
 }
 
-/* A new top tree and all transforms. */
+/* Builds a new top tree and all transforms. */
 static bool rebuild_top(struct scene_tree *tree, const struct gpu_scene *scene, struct error *error)
 {
     uint32_t count = scene->instance_count;
@@ -159,7 +162,7 @@ static bool rebuild_top(struct scene_tree *tree, const struct gpu_scene *scene, 
 /* Writes the changed transforms and moves their elements. False: the top tree must be built again. */
 static bool refit_top(struct scene_tree *tree, const struct gpu_scene *scene)
 {
-    uint32_t first = scene->instance_count, end = 0; /* of the transforms that changed */
+    uint32_t first = scene->instance_count, end = 0; /* range of transforms that changed */
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         struct bvh_world_box box;
         const struct bvh_transform transform = describe(tree, scene, i, &box);
@@ -202,7 +205,8 @@ static bool update_instances(struct scene_tree *tree, const struct gpu_scene *sc
                              struct error *error)
 {
     uint64_t start_ns = clock_now_ns();
-    /* First, since it may move the trees that the transforms point to. A tree of n leaves has at most 2 n - 1. */
+    /* The reservation comes first, as it may move the trees that the transforms point to. A tree of n leaves
+     * has at most 2 n - 1 elements. */
     uint64_t top_max = 2 * (uint64_t)scene->instance_count;
     if (top_max > BVH_LEAF_FIRST_MASK)
         return error_set(error, ERROR_LIMIT, NULL, "%u instances are too many", scene->instance_count);
@@ -227,7 +231,7 @@ static uint64_t node_count(const struct scene_tree *tree)
     return nodes;
 }
 
-/* A tree with more detail than its grid can tell apart, a statue in a landscape, say. */
+/* Whether a tree has detail finer than its grid, a statue in a landscape, say. */
 static bool has_coarse_grid(const struct scene_tree *tree)
 {
     for (uint32_t i = 0; i < tree->store.entry_count; i++)
@@ -236,8 +240,8 @@ static bool has_coarse_grid(const struct scene_tree *tree)
     return false;
 }
 
-/* One step of it. All trees of a scene have one form, whatever its history: if another form is needed, all are
- * built again, with or without boxes in floats. */
+/* Runs a step of the update of geometries. All trees of a scene have the same form, whatever its history: if
+ * another form is needed, all are rebuilt, with or without boxes in floats. */
 static enum tracer_progress update_geometries(struct scene_tree *tree, struct gpu_scene *scene,
                                               struct stage_times *times, struct error *error)
 {
@@ -254,8 +258,8 @@ static enum tracer_progress update_geometries(struct scene_tree *tree, struct gp
     return bvh_store_begin(&tree->store, scene, true, error) ? TRACER_MORE : TRACER_FAILED;
 }
 
-static enum tracer_progress go_on(struct scene_tree *tree, struct gpu_scene *scene, struct stage_times *times,
-                                  struct error *error)
+static enum tracer_progress update_step(struct scene_tree *tree, struct gpu_scene *scene,
+                                        struct stage_times *times, struct error *error)
 {
     enum tracer_progress progress = TRACER_MORE;
     while (tree->phase == SCENE_TREE_TREES && progress == TRACER_MORE) {
@@ -285,7 +289,7 @@ enum tracer_progress scene_tree_update(struct scene_tree *tree, struct gpu_scene
     if (tree->phase == SCENE_TREE_IDLE && !begin_update(tree, scene, update->changed, error))
         progress = TRACER_FAILED;
     if (progress == TRACER_MORE)
-        progress = go_on(tree, scene, update->times, error);
+        progress = update_step(tree, scene, update->times, error);
     if (progress == TRACER_FAILED)
         scene_tree_finish(tree);
     if (progress != TRACER_MORE)

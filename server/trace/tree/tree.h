@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounding volume trees over a scene, on the device: one for each geometry, and a top tree over the instances. The
- * structure of the tracer `bvh`, in which rays follow links, and of `rayspace`, in which bundles of rays descend.
- * Layout: shaders/tree/layout.h. GL thread. */
+/* Bounding volume trees over a scene, on the device: one for each geometry, and a top tree over the instances.
+ * They are the structure of the tracer `bvh`, whose rays follow links, and of `rayspace`, whose bundles of rays
+ * descend them. Layout: shaders/tree/layout.h. GL thread. */
 #ifndef FARLIGHT_TRACE_TREE_TREE_H
 #define FARLIGHT_TRACE_TREE_TREE_H
 
@@ -9,37 +9,38 @@
 #include "trace/tree/build_top.h"
 #include "trace/tree/store.h"
 
-/* Where an update is. */
+/* Phase of an update. */
 enum scene_tree_phase { SCENE_TREE_IDLE, SCENE_TREE_TREES, SCENE_TREE_TOP };
 
 struct scene_tree {
-    struct tracer_stats *stats; /* of its tracer */
+    struct tracer_stats *stats; /* stats of its tracer */
     enum scene_tree_phase phase;
-    uint64_t step_end_ns; /* of the update in progress */
+    uint64_t step_end_ns; /* end of the current step */
     struct bvh_store store;
     struct bvh_top top;
-    struct bvh_transform *transforms; /* mirror of the buffer, one per instance of the scene */
+    struct bvh_transform *transforms; /* mirror of the buffer, one for each instance of the scene */
     uint32_t transform_count;
     struct gpu_buffer transform_buffer;
-    float leaf_extent_world; /* diagonal of a leaf's box, in the mean over what the instances show */
+    float leaf_extent_world; /* diagonal of a leaf's box, mean over all instances */
 };
 
-/* `form` without its threads, which are as many as the machine has. */
+/* Initialises a tree. The threads in `form` are ignored: the builder uses all of the machine's. */
 void scene_tree_init(struct scene_tree *tree, struct gpu_device *device, const struct bvh_form *form,
                      struct tracer_stats *stats);
-/* Empty again, as after scene_tree_init(); also drops an update that is not done. */
+/* Empties the tree, as after scene_tree_init(), and drops an update in progress. */
 void scene_tree_finish(struct scene_tree *tree);
-/* As tracer_impl.update: a step until about `step_end_ns`. Counts in the stats nodes and uploaded bytes. A moved
- * instance rewrites the top tree alone, a mesh that deforms is refitted. After TRACER_FAILED it is empty. */
+/* Implements tracer_impl.update: runs a step until about `step_end_ns`. Adds nodes and uploaded bytes to the
+ * stats. A moved instance rewrites the top tree alone, a deforming mesh is refitted. After TRACER_FAILED the
+ * tree is empty. */
 enum tracer_progress scene_tree_update(struct scene_tree *tree, struct gpu_scene *scene,
                                        const struct tracer_update *update, uint64_t step_end_ns,
                                        struct error *error);
-bool scene_tree_waits(struct scene_tree *tree); /* as tracer_impl.waits */
+bool scene_tree_waits(struct scene_tree *tree); /* implements tracer_impl.waits */
 void scene_tree_tell(const struct scene_tree *tree, struct structure_rows *rows);
 uint64_t scene_tree_bytes(const struct scene_tree *tree);
-/* There is one instance: its tree is the scene's, and its number is returned. Else BVH_NONE. */
+/* The number of the only instance, whose tree is the scene's; otherwise BVH_NONE. */
 uint32_t scene_tree_only_instance(const struct scene_tree *tree);
-/* Elements, transforms and primitives, as shaders/tree/layout.h says. */
+/* Binds elements, transforms and primitives at the places in shaders/tree/layout.h. */
 void scene_tree_bind(struct scene_tree *tree);
 
 #endif

@@ -146,7 +146,7 @@ static void build_by(struct fixture *fixture, struct contents *contents, ldc_uni
         ldc_build_begin(fixture->builder, &fixture->store, LDC_CUBE_STATIC, &fixture->gpu, fixture->instances,
                         fixture->gpu.instance_count, &fixture->options, &error);
     for (int unit = 0; progress == TRACER_MORE; unit++) {
-        progress = ldc_build_go_on(fixture->builder, true, &error);
+        progress = ldc_build_step(fixture->builder, true, &error);
         if (unit == 0) /* it has begun */
             fixture->builder->task.next = way;
     }

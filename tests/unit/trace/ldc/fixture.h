@@ -75,7 +75,7 @@ static inline bool try_build(struct fixture *fixture, unsigned which, const uint
     enum tracer_progress progress = ldc_build_begin(fixture->builder, &fixture->store, which, &fixture->gpu,
                                                     instances, count, &fixture->options, error);
     while (progress == TRACER_MORE)
-        progress = ldc_build_go_on(fixture->builder, true, error);
+        progress = ldc_build_step(fixture->builder, true, error);
     return progress == TRACER_DONE;
 }
 

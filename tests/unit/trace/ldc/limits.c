@@ -213,7 +213,7 @@ TEST_LONG(a_texel_that_is_drawn_more_often_than_it_was_counted_stays_within_its_
     enum tracer_progress progress = ldc_build_begin(fixture.builder, &fixture.store, LDC_CUBE_STATIC, &fixture.gpu,
                                                     fixture.instances, 1, &fixture.options, &error);
     for (int unit = 0; progress == TRACER_MORE; unit++) {
-        progress = ldc_build_go_on(fixture.builder, true, &error);
+        progress = ldc_build_step(fixture.builder, true, &error);
         if (unit != 1) /* all is counted */
             continue;
         gpu_buffer_read(device, &fixture.builder->counts, 0, counts, TEXELS * sizeof(*counts));

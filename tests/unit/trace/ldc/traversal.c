@@ -19,7 +19,7 @@ static void build_levels(struct fixture *fixture)
     enum tracer_progress progress = TRACER_MORE;
     ldc_levels_begin(&levels, &fixture->store, LDC_CUBE_STATIC, &fixture->options);
     while (progress == TRACER_MORE)
-        progress = ldc_levels_go_on(&levels, &error);
+        progress = ldc_levels_step(&levels, &error);
     ldc_levels_finish(&levels);
     expect_ok(progress == TRACER_DONE, &error);
 }

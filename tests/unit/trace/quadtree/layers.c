@@ -51,7 +51,7 @@ static void draw_one_way(struct drawn *drawn)
     enum tracer_progress progress;
     expect_ok(quadtree_layers_begin(&drawn->layers, &drawn->store, &error), &error);
     do
-        progress = quadtree_layers_go_on(&drawn->layers, &drawn->seen.gpu, true, &error);
+        progress = quadtree_layers_step(&drawn->layers, &drawn->seen.gpu, true, &error);
     while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE, &error);
     read_back(drawn);
@@ -518,7 +518,7 @@ static void expect_parts_alike(struct drawn *drawn)
     do {
         do_something_else();
         drawn->layers.drawing.part_vertices = 300;
-        progress = quadtree_layers_go_on(&drawn->layers, &drawn->seen.gpu, false, &error);
+        progress = quadtree_layers_step(&drawn->layers, &drawn->seen.gpu, false, &error);
         steps++;
     } while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE, &error);

@@ -358,7 +358,7 @@ static inline void layers_build(struct layers *layers)
     gpu_buffer_clear(device, &store->nodes, 0x7fc00000); /* not a number where nothing is written */
     enum tracer_progress progress;
     do
-        progress = quadtree_nodes_go_on(&layers->build, store, &layers->gpu, &error);
+        progress = quadtree_nodes_step(&layers->build, store, &layers->gpu, &error);
     while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE && gpu_check(device, "nodes", &error), &error);
     free(layers->nodes);

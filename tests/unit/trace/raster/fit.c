@@ -186,7 +186,7 @@ TEST(deep_scenes_have_a_lower_one_and_a_warning)
 static uint32_t chosen(const struct tracer_options *options, unsigned tracer, double layers, uint32_t asked)
 {
     const struct tracer stand_in = {.impl = tracer_impl_by_number(tracer), .device = device, .options = *options};
-    return axes_choose_resolution(&stand_in, layers, &(struct axes_wish){asked, 1024, 4});
+    return axes_choose_resolution(&stand_in, layers, &(struct axes_request){asked, 1024, 4});
 }
 
 TEST(a_resolution_that_was_asked_for_is_taken_whatever_the_picture)
