@@ -31,9 +31,8 @@ enum scene_change {
     CHANGED_VIEW = 1 << 7,   /* the camera, or the size of the picture: struct trace_view. Never of a scene */
 };
 #define CHANGED_SCENE (CHANGED_VIEW - 1u) /* all that a scene can change */
-#define CHANGED_ALL                                                                                               \
-    (CHANGED_SCENE | (unsigned)CHANGED_VIEW) /* of a structure that is built for the first time                   \
-                                              */
+/* Of a structure that is built for the first time. */
+#define CHANGED_ALL (CHANGED_SCENE | (unsigned)CHANGED_VIEW)
 
 /* What one update of the copy changed. */
 struct scene_changes {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Links each fragment into its texel's list, and adds it to the voxels that it touches. Hu, Huang, Zhang, Yuan, Li. Ray
 // Tracing via GPU Rasterization. 2014, section 3.1.
-// Defines: those of raster/fragment.glsl; of raster/draw.geom ALL_IMAGES, always, and WITHOUT_STEEP.
+// Defines: those of raster/fragment.glsl; ALL_IMAGES (always set) and WITHOUT_STEEP of raster/draw.geom.
 
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
@@ -9,7 +9,7 @@
 #include "raster/fragment.glsl"
 
 uniform uint nodes_max;         // capacity
-uniform uint voxels_along;      // a side of the grid
+uniform uint voxels_along;      // voxels along a side of the grid
 uniform float voxels_per_cell;
 uniform bool has_subvoxels;
 
@@ -25,7 +25,8 @@ uint texel_in_tiles()
     return ABUFFER_TEXEL(ABUFFER_TILES_ALONG(texels_along), uint(gl_Layer), place.x, place.y);
 }
 
-// False if the list is full: the fragment is only counted, and everything is drawn once more.
+// Links the fragment into its texel's list. False: the list is full; the fragment is only counted, and the pass will be
+// repeated.
 bool link(float depth_cells, uint bits)
 {
     uint node = atomicAdd(build.nodes, 1u);
@@ -40,19 +41,20 @@ bool link(float depth_cells, uint bits)
     return true;
 }
 
-// Rounding loses no part of a patch, and a patch that ends at a voxel's side does not touch the next voxel. Sides of
-// voxels and subvoxels lie at least 1 / 512 of a cell from those of texels, if they do not coincide.
+// Margins by which rounding loses no part of a patch, while a patch that ends at a voxel's side does not touch the next
+// voxel. Sides of voxels and subvoxels that do not coincide with those of texels are at least 1 / 512 of a cell away from
+// them.
 const float DEPTH_MARGIN_CELLS = 1.0 / 64.0;
 const float HALF_TEXEL = 0.5 - 1.0 / 1024.0;
 
-// Depth, u and v to x, y and z.
+// Permutes depth, u and v to x, y and z.
 ivec3 turned(ivec3 duv)
 {
     return gl_Layer == 0 ? duv : gl_Layer == 1 ? duv.zxy : duv.yzx;
 }
 
-// The subvoxels from the first to the last that are in one half of a voxel, as bits of a word; `half_`: its number in
-// the grid, where halves are stacked along z.
+// The subvoxels from `first` to `last` that are in one half of a voxel, as bits of a word; `half_`: the number of the
+// half in the grid, where halves are stacked along z.
 uint subvoxels_between(ivec3 first, ivec3 last, ivec3 half_)
 {
     ivec3 lower = half_ * ivec3(4, 4, 2);
@@ -61,8 +63,8 @@ uint subvoxels_between(ivec3 first, ivec3 last, ivec3 half_)
     return (x * 0x1111u & y) * (from.z == to.z ? 1u << 16u * from.z : 0x10001u);
 }
 
-// The patch of a surface behind a texel, from one depth to the other: usually in one or two halves of a voxel. A load
-// is cheaper than an atomic, and the bits are usually set already. `looks_along`: its normal's dominant axis.
+// Marks the patch of a surface behind a texel, between two depths: usually in one or two halves of a voxel. A load is
+// cheaper than an atomic, and the bits are usually set already. `looks_along`: dominant axis of the normal.
 void mark(float min_cells, float max_cells, int bits, int looks_along)
 {
     float subvoxels_per_cell = 4.0 * voxels_per_cell;
@@ -87,7 +89,7 @@ void mark(float min_cells, float max_cells, int bits, int looks_along)
 }
 
 #ifndef WITHOUT_STEEP
-// The stride between voxels along depth, u and v, in texels of the sums.
+// Stride between voxels along depth, u and v, in texels of the sums.
 ivec3 strides()
 {
     int along = int(voxels_along), square_ = along * along;
@@ -112,8 +114,8 @@ void add_normal(float depth_cells, vec3 normal_duv)
 }
 #endif
 
-// For surfaces that lean to this image's axis: other images sample them no better. `leaves`: the outside faces greater
-// depths.
+// Bits for surfaces that lean to this image's axis, which no other image samples better. `leaves`: the outside faces
+// greater depths.
 int sum_bits(uint face, bool closed, bool leaves)
 {
     uint looks = (leaves ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << gl_Layer;
@@ -134,12 +136,12 @@ void main()
         discard;
     uint face = primitive.w;
     float depth_cells = triangle_depth_cells();
-    // The facing is the rasteriser's own, as the coverage is: a closed surface has as many entering as leaving
+    // The rasteriser's own facing is consistent with its coverage: a closed surface has as many entering as leaving
     // fragments in a texel.
     bool leaves = gl_FrontFacing;
     if (!link(depth_cells, face & (FACE_NORMAL_MASK | FACE_CLOSED) | (leaves ? ABUFFER_NODE_LEAVES : 0u)))
         return;
-    // The plane's range of depth in the texel; if it is steep, no farther than the triangle reaches.
+    // Range of the plane's depth in the texel; for a steep one at most the triangle's extent.
     float reach = 0.5 * (abs(plane.x) + abs(plane.y)), min_cells = depth_cells - reach, max_cells = depth_cells + reach;
     if ((face & FACE_STEEP << gl_Layer) != 0u) {
         min_cells = max(min_cells, depths.y);
@@ -155,9 +157,9 @@ void main()
 #endif
 }
 #else
-// The range of a sphere's surface in the texel's square, from its intersection with the line through the texel's
-// centre: outwards, it is bounded by the tangent plane and by the square's point nearest to the sphere's centre;
-// inwards by the rim, if that is in the square.
+// Range of a sphere's surface in the texel's square, from its intersection with the line through the texel's centre. On
+// the outer side the tangent plane and the square's point nearest to the sphere's centre bound it; on the inner side the
+// rim does, if that is in the square.
 void reach_of(sphere_chord c, vec3 normal, int side, float depth_cells, out float min_cells,
               out float max_cells)
 {
@@ -174,7 +176,7 @@ void reach_of(sphere_chord c, vec3 normal, int side, float depth_cells, out floa
 void main()
 {
     sphere_chord chord = chord_of_sphere();
-    if (chord.half_chord < 0.0) // passes it
+    if (chord.half_chord < 0.0) // the line misses the sphere
         discard;
     int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
     bool closed = (primitive.w & DRAWN_CLOSED) != 0u;

@@ -13,8 +13,8 @@ layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples; // two p
 
 uniform int abuffer_resolution;
 
-// The maximum deviation of a plane from its sample's depth within its texel and the slack, in cells. Steeper planes are
-// cut off there.
+// Maximum deviation of a plane from its sample's depth within its texel and the slack, in cells. Steeper planes are
+// clamped to it.
 const float SPAN = (1.0 + 2.0 * ABUFFER_SLACK) / AXES_OVERLAP;
 
 struct column {
@@ -37,8 +37,8 @@ ivec2 texel_of(vec2 p)
 struct column_sample {
     float depth;
     vec3 normal; // u v depth, of any length
-    int step_;   // the change of the winding behind it, towards greater depths
-    int behind;  // winding there
+    int step_;   // change of the winding behind the sample, towards greater depths
+    int behind;  // winding behind the sample
 };
 
 uvec2 words_at(int index)
@@ -66,21 +66,21 @@ column_sample sample_of(uvec2 words, int axis)
     return s;
 }
 
-// The depth of the sample's plane at an offset from the texel's centre.
+// Depth of the sample's plane at an offset from the texel's centre.
 float plane_depth(column_sample s, vec2 from_middle)
 {
     float shift = -dot(s.normal.xy, from_middle) / s.normal.z;
-    // Written so that NaN has a defined result.
+    // The order of the comparisons gives NaN a defined result.
     return s.depth + (shift < SPAN ? shift > -SPAN ? shift : -SPAN : SPAN);
 }
 
-// The samples of a column from a depth on, in order.
+// Scan of the samples of a column from a depth on, in order.
 struct column_scan {
     int next, end;
-    int bound; // the first one's index is at most this
+    int bound; // upper bound of the first sample's index
 };
 
-// Bisection stops at this many samples before the first: a linear search is as fast there.
+// Bisection stops at this number of samples before the first one, where a linear search is as fast.
 const int PASSED = 4;
 
 column_scan scan_of(column c)
@@ -88,7 +88,7 @@ column_scan scan_of(column c)
     return column_scan(c.first, c.end, c.end);
 }
 
-// One round of a loop that runs while next < end; true: it reached a sample, whose words are in `words`. Bisection runs
+// Runs a round of a loop that ends at next == end. True: it reached a sample, whose words are in `words`. Bisection runs
 // as rounds of the same loop, so that columns without it do not wait for code that they skip.
 bool scan(inout column_scan c, float depth_min, out int index, out uvec2 words)
 {
@@ -106,7 +106,7 @@ bool scan(inout column_scan c, float depth_min, out int index, out uvec2 words)
     return !is_far && index < c.end && depth_of(words) >= depth_min;
 }
 
-// The winding at a point of a texel: the number of bodies around it.
+// Winding at a point of a texel: the number of bodies around it.
 int winding_at(int axis, ivec2 texel, vec3 p)
 {
     vec2 from_middle = p.xy - vec2(texel) - 0.5;

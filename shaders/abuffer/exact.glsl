@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From the intersected plane to the surface: the sample's triangle, or one beside it.
+// Finds the surface behind an intersected plane: the sample's triangle, or one beside it.
 //
 // A sample's plane covers its whole texel, its triangle may not. The surface beyond the edge is usually sampled by the
 // texels around the intersection; if it is not, as triangles are smaller than texels, the plane stands for it.
@@ -8,34 +8,34 @@
 
 #if defined KEEPS_SAMPLE && !defined ABUFFER_PARITY
 
-// How far beyond its texel a sample's plane is tested, in cells. Where surfaces bend by more than ABUFFER_SLACK, rays
-// would pass between planes; intersections are verified with triangles, so the search may reach farther.
+// Distance beyond its texel up to which a sample's plane is tested, in cells. Where surfaces bend by more than
+// ABUFFER_SLACK, rays would pass between planes; triangles verify the intersections, so the search may reach farther.
 const float BEYOND = 0.25;
-// In cells: intersections no farther apart are the same one.
+// Maximum distance, in cells, of intersections that count as the same.
 const float AGAIN = 1e-3;
-// In cells of depth: samples of adjacent texels no farther apart are of one surface, in the image that it leans to.
+// Maximum distance in depth, in cells, of samples in adjacent texels that are of one surface, in the image that it leans
+// to.
 const float BESIDE = 3.0;
-// How far behind the plane's intersection that of an adjacent triangle may be, in cells.
+// Maximum distance, in cells, of an adjacent triangle's intersection behind the plane's.
 const float BESIDE_BEHIND = 4.0;
 
-// On a body as thin as a cell or two, planes go on beyond the surface, and would darken the side that a shadow ray
-// leaves. So shadow rays verify what they intersect within VERIFIED_WAY cells of their origin; farther on, they need not
-// know which triangle it is. There no plane stands for a triangle that is not sampled if it is hit from behind, as by
-// rays that leave a body, or within TRUSTED_WAY: farther on, planes from the front are what a mesh of triangles smaller
-// than texels has.
+// On a body as thin as a cell or two, planes extend beyond the surface and would darken the side that a shadow ray
+// leaves. Shadow rays therefore verify intersections within VERIFIED_WAY cells of their origin; farther on, any triangle
+// will do. A plane does not stand for a triangle without samples if it is hit from behind, as by rays that leave a body,
+// or within TRUSTED_WAY; farther on, planes hit from the front are all that a mesh of triangles smaller than texels has.
 const float VERIFIED_WAY = 4.0, TRUSTED_WAY = 2.0;
 
-// The samples around a point of an image, column by column of the four nearest ones.
+// The samples round a point of an image: the columns of the four nearest texels, one after the other.
 struct samples_beside {
     int axis;
     vec3 p;
     int columns; // columns begun so far
     column_scan column;
-    uint first_id, end_id; // of the instance
-    uvec3 seen;            // ids: of the intersected sample, of the last one and of the one before
+    uint first_id, end_id; // ids of the instance
+    uvec3 seen;            // ids of the intersected sample, of the last one and of the one before
 };
 
-// The texel of the point, its nearer neighbour, the other neighbour, the diagonal one.
+// Texel k of four: the point's own, its nearer neighbour, the other neighbour, the diagonal one.
 ivec2 texel_beside(vec2 p, int k)
 {
     vec2 from_middle = fract(p) - 0.5;
@@ -44,13 +44,13 @@ ivec2 texel_beside(vec2 p, int k)
     return texel_of(p + vec2(along_u ? sign(from_middle.x) : 0.0, along_v ? sign(from_middle.y) : 0.0));
 }
 
-// The next sample that may be of the same surface, of a triangle that was not tested yet; false: there is none.
+// Advances to the next sample that may be of the same surface but of an untested triangle. False: there is none.
 bool next_beside(inout samples_beside b, out int index, out uint id)
 {
     bool is_new = false;
     index = 0;
     id = 0u;
-    // After the fourth there is none: a fifth would be the first again, and the loop endless.
+    // The loop ends after the fourth column: a fifth would be the first again.
     while (!is_new && (b.columns < 4 || b.column.next < b.column.end)) {
         if (b.column.next >= b.column.end) {
             b.column = scan_of(column_at(b.axis, texel_beside(b.p.xy, b.columns)));
@@ -67,17 +67,18 @@ bool next_beside(inout samples_beside b, out int index, out uint id)
     return is_new;
 }
 
-// Replaces the intersected sample by that of the triangle that the ray hits there, before `limit`. False: it hits none.
+// Replaces the intersected sample by the sample of the triangle that the ray hits there, before `limit`. False: no
+// triangle is hit.
 //
-// A ray passes beyond an edge behind which the surface turns back, or if it would hit the next triangle before its
-// begin. Without such evidence from neighbours, a sample's plane stands for its texel.
+// A ray passes beyond an edge behind which the surface turns back, and where it would hit the next triangle before its
+// beginning. Without such evidence from neighbours, a sample's plane stands for its texel.
 bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found found)
 {
     int index = found.sample_index;
     uint id = texelFetch(abuffer_ids, index).x;
     int k = drawn_of(id);
     uvec4 drawn = texelFetch(abuffer_drawn, k);
-    // It has no edges.
+    // A sphere has no edges.
     if ((drawn.w & DRAWN_SPHERES) != 0u)
         return found.is_within;
     samples_beside b;
@@ -95,7 +96,8 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
     end = end < limit ? end : limit;
     line_intersection own;
     bool is_own = true, passes = false, is_hit = false, goes_on = true;
-    // The condition is not at the end: there llvmpipe let rays that had left the loop run on with their neighbours.
+    // The loop breaks inside and not by its condition at the end: with that, llvmpipe let rays that had left the loop run
+    // on with their neighbours.
     while (goes_on) {
         line_intersection c = intersect_line_triangle(o, d, id - drawn.y);
         if (is_own)
@@ -121,9 +123,9 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
 
 #ifndef ABUFFER_PARITY
 
-const int PASSES_MAX = 8; // then the sample's plane is the answer
+const int PASSES_MAX = 8; // after these passes the sample's plane is the answer
 
-// The rest of the ray.
+// Searches the voxels along the rest of the ray.
 void search_voxels(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
     while (w.s < w.s_end) {
@@ -154,7 +156,7 @@ void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found f
 
 #else
 
-// How far beyond its texel a plane is tested at first.
+// Distance beyond its texel at which a plane is tested at first.
 #ifdef ANY_HIT
 const float BEYOND_FIRST = ABUFFER_SLACK;
 #else
@@ -183,7 +185,7 @@ void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found f
         float s = w.s_limit;
         goes_on = found.sample_index >= 0 && !is_verified(r, w, nothing.end, found) && ++passes < PASSES_MAX;
         if (goes_on) {
-            // A plane that is extended beyond its texel may have hidden that of the next texel at the same point.
+            // A plane extended beyond its texel may have hidden the plane of the next texel at the same point.
             w.s_behind = found.is_within ? s + AGAIN : w.s_behind;
             w.beyond = found.is_within ? BEYOND_FIRST : ABUFFER_SLACK;
             w.s = s > w.s_min ? s : w.s_min;

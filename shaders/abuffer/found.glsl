@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a traversal of A-buffers does with the samples that a ray intersects.
+// Collects the samples that a ray intersects in a traversal of A-buffers.
 //
 // Defines: those of trace/wave.comp.
 #include "shared/hit.h"
@@ -8,28 +8,29 @@
 #include "abuffer/voxel_traversal.glsl"
 
 #if defined ANY_HIT && !defined HAS_TRANSLUCENT
-#define ANYTHING_ENDS // the first intersection is the answer, wherever it is
+#define ANYTHING_ENDS // any intersection ends the ray, wherever it is
 #endif
 #if !defined ANY_HIT || defined ANYTHING_ENDS && !defined ABUFFER_PARITY
-#define KEEPS_SAMPLE // the intersected sample is looked at again, behind the search
+#define KEEPS_SAMPLE // the intersected sample is read again after the search
 #endif
 
 #if defined ANY_HIT && defined HAS_TRANSLUCENT && !defined ABUFFER_PARITY
-#define OFFERS_LATER // intersections in a part of a voxel are offered behind its search
+#define OFFERS_LATER // intersections in a part of a voxel are offered after its search
 #endif
 
 #ifdef OFFERS_LATER
-// Software GL runs a loop's whole body in every round, and to look up what a surface lets pass takes longer than to
-// find it. So a search collects intersections; where a part of a voxel has more than MET_MAX, it is searched again.
+// Intersections that a search collects. Software GL executes a loop's whole body in every round, and evaluating a
+// surface's transmittance takes longer than finding it. A part of a voxel with more than MET_MAX intersections is
+// searched again.
 struct abuffer_met {
-    ivec4 samples;  // complements: the ray comes from behind
+    ivec4 samples;  // complement: the ray comes from behind
     vec4 distances;
-    int first, count; // the first one that is collected; how many the part has
+    int first, count; // number of the first one that is collected; number in the part
 };
 const int MET_MAX = 4;
 #endif
 
-// What a ray has found, and up to where it is still looking.
+// The nearest sample found, and the end of the remaining search.
 struct abuffer_found {
     float end; // in lengths of the direction
 #ifdef ANY_HIT
@@ -43,7 +44,7 @@ struct abuffer_found {
 #endif
 #ifdef KEEPS_SAMPLE
     int sample_index; // -1: none
-    bool is_within;   // in its texel, or at most ABUFFER_SLACK beside it
+    bool is_within;   // the intersection is in the sample's texel, or at most ABUFFER_SLACK beside it
 #endif
 };
 
@@ -97,7 +98,7 @@ abuffer_found found_of(trace_ray r, candidate best)
 
 #endif
 
-// The same at `s` of the traversal.
+// Records an intersection at `s` of the traversal.
 void offer_at(trace_ray r, inout voxel_traversal w, inout abuffer_found found, int sample_index, float s, float side)
 {
     offer_sample(r, found, sample_index, (s + w.ray.begin) / w.ray.scale, side, 1.0 / w.ray.scale);
@@ -115,7 +116,7 @@ void meet(inout abuffer_met met, int sample_index, float s, float side)
     met.count++;
 }
 
-// In the order in which they were found.
+// Offers the collected intersections in the order in which they were found.
 void offer_met(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
     int left = min(found.met.count - found.met.first, MET_MAX);

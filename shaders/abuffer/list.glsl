@@ -18,7 +18,7 @@ uint next_of(uint node)
     return texelFetch(nodes, int(node) - 1).x;
 }
 
-// Returns depth, id and bits of the node and advances to the next; ABUFFER_NO_DEPTH at the list's end.
+// Returns depth, id and bits of the node and advances to the next one; ABUFFER_NO_DEPTH at the end of the list.
 uvec3 take(inout uint node)
 {
     if (node == 0u)

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Lists the texels that have fragments, in image order, so that neighbours of an image are neighbours in the output.
+// Lists the texels that have fragments, in image order, so that neighbours in an image are neighbours in the output.
 
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 
-uniform uint first_item, end_item; // of ABUFFER_OCCUPIED_TEXELS each
+uniform uint first_item, end_item; // groups of ABUFFER_OCCUPIED_TEXELS texels
 
 layout(binding = UNIT_ABUFFER_HEADS) uniform usamplerBuffer heads;
 layout(binding = IMAGE_ABUFFER_OCCUPIED, r32ui) writeonly uniform uimageBuffer occupied;

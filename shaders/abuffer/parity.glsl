@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// The paper's own search (section 3.2): by 2D DDA, texel by texel through the image that a voxel names. An odd number of
-// surfaces before a place says that it is inside of a body; where that changes, the ray has passed one. A body that a ray
-// enters and leaves within a texel is missed, and so are bodies in bodies.
+// Search by parity, the paper's own (section 3.2): a 2D DDA visits the texels of the image that a voxel names. A place
+// behind an odd number of surfaces is inside of a body; where the parity changes, the ray has passed a surface. A body
+// that a ray enters and leaves within a texel is missed, and so are bodies in bodies.
 //
-// What has no inside is searched by planes.
+// Surfaces without an inside are searched by planes.
 #include "abuffer/planes.glsl"
 
 #ifdef ABUFFER_PARITY
 
 struct parity_walk {
     bool is_known, is_inside;
-    float s_least; // nothing is met before it, as the ray may begin on a surface
+    float s_least; // intersections before it do not count, as the ray may begin on a surface
 };
 
-// The image that the voxel names; of several the one along the ray's dominant axis: there it passes the fewest texels,
-// and sees no surface edge-on.
+// The image that the voxel names; among several, the one along the ray's dominant axis, where the ray passes the fewest
+// texels and meets no surface edge-on.
 int image_of(uint what, vec3 d)
 {
     vec3 along = abs(d);
@@ -28,7 +28,7 @@ bool is_inside(int axis, ivec2 texel, vec3 p)
     return (winding_at(axis, texel, p) & 1) != 0;
 }
 
-// The surface of the texel that the ray (o, d in the image) passes nearest to its way from s_in to s_out.
+// Records the surface of the texel that is nearest to the ray's way (o, d in the image) from s_in to s_out.
 void pass_surface(trace_ray r, inout voxel_traversal w, inout abuffer_found found, int axis, ivec2 texel, vec3 o, vec3 d,
                   float s_in, float s_out)
 {
@@ -76,7 +76,7 @@ void search_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found fou
 
 void traverse_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
-    // Everything beyond the voxels is outside.
+    // Places beyond the voxels are outside of all bodies.
     parity_walk walk = parity_walk(w.s > w.s_min, false, w.s_min + OWN_WAY);
     while (w.s < w.s_end) {
         found_voxel here = next_voxel(w);

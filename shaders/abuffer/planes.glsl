@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Linear search by 2D DDA: the texels of one image along a part of a ray, in order, and in each of them the samples
-// whose planes the ray intersects there.
+// Linear search by 2D DDA: visits the texels of one image along a part of a ray, in order, and in each of them the
+// samples whose planes the ray intersects there.
 #include "abuffer/found.glsl"
 
 // A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit the surface that
-// it leaves. So near its origin a ray ignores planes that pass the origin within this distance. From behind, as a ray
-// that leaves a body would hit its own surface, the distance is generous. From the front, as a ray in a corner hits the
-// other wall, and a refracted ray its own surface, it suffices for a concave surface with a curvature radius of two to
-// three cells, as the inner side of a handle: from a neighbour's centre, at most 0.78 cells away, to the origin it
-// falls by 0.78^2 / (2 * 2.5). A plane that is hit steeply may be nearer than one at a grazing angle: in a corner rays
-// hit the wall beside their origin, but for the last tenth of a cell.
+// it leaves. So within OWN_WAY of its origin a ray ignores planes that pass the origin within these distances. The one
+// for planes hit from behind, as a ray that leaves a body would hit its own surface, is generous. The one for planes hit
+// from the front, as a ray in a corner hits the other wall, and a refracted ray its own surface, suffices for a concave
+// surface with a curvature radius of two to three cells, as the inner side of a handle: from a neighbour's centre, at
+// most 0.78 cells away, to the origin it falls by 0.78^2 / (2 * 2.5). A plane that is hit steeply may be nearer than one
+// at a grazing angle: in a corner rays hit the wall beside their origin, except within the last tenth of a cell.
 const float OWN_WAY = 1.5;
 const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.12, OWN_RISE = 0.05; // the rise is per cell of the ray's length
 
-// Intersects a ray (o, d in the image) with a sample's plane; false: it begins on this plane. `side` is positive if it
-// comes from behind.
+// Intersects a ray (o, d in the image) with a sample's plane. False: the ray begins on this plane. `side` is positive if
+// it comes from behind.
 bool intersect_plane(vec3 o, vec3 d, float s_min, ivec2 texel, column_sample p, out float s, out float side)
 {
     float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o);
@@ -24,15 +24,15 @@ bool intersect_plane(vec3 o, vec3 d, float s_min, ivec2 texel, column_sample p, 
     return way > 0.0 && !(way < OWN_WAY && height * height < own * own * dot(p.normal, p.normal));
 }
 
-// Some surfaces are in several images, and are searched in those that show them.
+// Whether the sample's surface leans to this axis: a surface in several images is searched in those that it leans to.
 bool leans(column_sample p)
 {
     vec3 size = abs(p.normal);
     return size.z >= AXES_OVERLAP * max_component(size);
 }
 
-// Searches the part [s_in, s_out] of the ray. `only_leaning`: surfaces that do not lean to this axis are searched in
-// another image. True: an intersection was found.
+// Searches the part [s_in, s_out] of the ray. `only_leaning`: skip surfaces that do not lean to this axis, as another
+// image has them. True: an intersection was found.
 bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found found, int axis, bool only_leaning, float s_in,
                   float s_out)
 {
@@ -83,7 +83,7 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
     return any_intersected;
 }
 
-// All images that a voxel names, in order; an intersection in one ends the search in the next there.
+// Searches all images that a voxel names, in order; an intersection in one shortens the search in the next.
 void search_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found found, found_voxel here)
 {
     uint images = here.what & ABUFFER_VOXEL_IMAGES;

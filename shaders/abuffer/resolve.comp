@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// From lists to runs: the nodes of a texel become contiguous and sorted, with the winding behind each. Paper, section
-// 3.1: the second pass. A list of up to four is sorted as it is read; longer ones get their places, and are listed for
-// later passes. Define: RESOLVE_EIGHT sorts the listed ones of five to eight
+// Turns lists into runs: the nodes of a texel become contiguous and sorted, with the winding behind each. The second pass
+// of the paper's section 3.1. A list of up to four is sorted as it is read; longer ones get their places, and are listed
+// for later passes. Define: RESOLVE_EIGHT sorts the listed ones of five to eight nodes
 
 #include "common/dispatch.glsl"
 #include "abuffer/list.glsl"
 #include "abuffer/run.glsl"
 
-uniform uint first_item, end_item; // of the list
+uniform uint first_item, end_item; // items of the list
 
 #ifdef RESOLVE_EIGHT
 layout(binding = UNIT_ABUFFER_LONGER) uniform usamplerBuffer longer;
@@ -38,7 +38,7 @@ void finish(run r, uint i, uvec3 item, inout int winding)
 }
 
 #ifndef RESOLVE_EIGHT
-// The list is longer than what was read of it: counts the rest, up to the limit.
+// Counts the nodes of a list beyond those already read, up to the limit.
 uint count_rest(uint node, uint count)
 {
     for (; node != 0u && count <= ABUFFER_LIST_MAX; count++)
@@ -46,7 +46,8 @@ uint count_rest(uint node, uint count)
     return count;
 }
 
-// Lists a texel for a later pass: lists of up to eight from the first place on, longer ones from the last back.
+// Lists a texel for a later pass: lists of up to eight nodes from the first place upward, longer ones from the last
+// downward.
 void list_longer(uint texel, uint count)
 {
     if (count > ABUFFER_LIST_MAX)
@@ -89,7 +90,7 @@ void main()
     finish(r, 3u, d, winding);
 }
 #else
-// Batcher's network for eight.
+// Batcher's sorting network for eight.
 void main()
 {
     uint k = first_item + item_index();

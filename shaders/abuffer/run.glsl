@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The samples of a texel while they are sorted: depth, id, bits of ABUFFER_NODE_*, which the last pass replaces by the
-// sample's own.
+// A texel's samples during the sort: depth, id, and bits of ABUFFER_NODE_*, which the last pass replaces by the sample's
+// own.
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 
@@ -30,7 +30,7 @@ bool before(uvec3 a, uvec3 b)
     return a.x < b.x || a.x == b.x && a.y < b.y; // depths are not negative: their bits ascend as they do
 }
 
-// The winding behind a node with these bits.
+// Winding behind a node with these bits.
 int winding_behind(int winding, uint bits)
 {
     if ((bits & ABUFFER_NODE_CLOSED) == 0u)

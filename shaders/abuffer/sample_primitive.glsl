@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a sample to its primitive, and to the point on it.
+// Finds the primitive of a sample, and the point on it.
 #include "abuffer/layout.h"
 #include "raster/layout.h"
 #include "shared/bindings.h"
@@ -11,7 +11,7 @@ layout(binding = UNIT_TRACER_4) uniform usamplerBuffer abuffer_drawn;
 
 uniform int abuffer_drawn_count;
 
-// The drawn instance of a primitive's id: the last whose first id is not greater.
+// The drawn instance that has a primitive's id: the last one whose first id is not greater.
 int drawn_of(uint id)
 {
     int first = 0, end = abuffer_drawn_count - 1;
@@ -40,7 +40,7 @@ bool is_of_spheres(candidate c)
 #endif
 }
 
-// Barycentrics of the triangle's point nearest to the intersection, approximately: a sample's plane extends beyond its
+// Approximate barycentrics of the triangle's point nearest to the intersection: a sample's plane extends beyond its
 // primitive.
 vec2 nearest_barycentrics(candidate c, vec3 origin_world, vec3 direction_world)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From lists to runs: those too long for resolve.comp.
+// Sorts lists that are too long for resolve.comp into runs.
 
 #define SORT_ITEM uvec3
 #include "common/dispatch.glsl"
@@ -7,7 +7,7 @@
 #include "abuffer/run.glsl"
 #include "common/sort.glsl"
 
-uniform uint first_item, end_item; // of the list
+uniform uint first_item, end_item; // items of the list
 
 layout(binding = UNIT_ABUFFER_LONGER) uniform usamplerBuffer longer;
 layout(binding = UNIT_ABUFFER_TEXELS) uniform usamplerBuffer texels;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From the intersections of a closest-hit wave to hits: the second half of A-buffer tracing, in place of
-// trace/surface.comp. A hit is the sample's own primitive at its point nearest to the intersection.
+// Turns the intersections of a closest-hit wave into hits: the second half of A-buffer tracing, in place of
+// trace/surface.comp. A hit is on the sample's own primitive, at its point nearest to the intersection.
 //
 // Defines: HAS_SPHERES, HAS_DISCS as the scene has them; those of common/range.glsl.
 #include "common/dispatch.glsl"
@@ -8,8 +8,9 @@
 #include "common/surface.glsl"
 #include "abuffer/sample_primitive.glsl"
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
-layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
+// three texels per hit; the first one is the intersection
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits;
 
 void main()
 {

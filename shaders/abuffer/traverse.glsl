@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The traversal of voxels and A-buffers (abuffer/layout.h). Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU
-// Rasterization. 2014.
+// Traversal of voxels and A-buffers (abuffer/layout.h). Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization.
+// 2014.
 //
-// The host (trace/abuffer/trace.c) sets, besides the defines of trace/wave.comp, those that the files included here
-// name.
+// The host (trace/abuffer/trace.c) sets the defines of trace/wave.comp and those of the files included here.
 //
 // Defines: ABUFFER_PARITY the search is the paper's (abuffer/parity.glsl), else by planes (abuffer/planes.glsl), verified with
 // triangles (abuffer/exact.glsl); ABUFFER_EMPTY the scene has no samples.
@@ -23,7 +22,7 @@ void traverse_ray(trace_ray r, inout abuffer_found found)
 #endif
 }
 
-// Called by trace/wave.comp.
+// trace/wave.comp calls this for each ray.
 #ifdef ANY_HIT
 
 bool trace_any(trace_ray r, inout vec3 optical_depth)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The traversal of the voxels, from one occupied one to the next: a block of 4 x 4 x 4 knows which of its voxels are
-// occupied, or, if none is, how far it is empty around it; and a voxel knows its occupied ones of 4 x 4 x 4 subvoxels.
+// Traversal from one occupied voxel to the next: a block of 4 x 4 x 4 knows which of its voxels are occupied, or, if none
+// is, the extent of the empty space round it; and a voxel knows its occupied ones of 4 x 4 x 4 subvoxels.
 #include "abuffer/column.glsl"
 #include "raster/blocks.glsl"
 
@@ -13,24 +13,24 @@ uniform bool abuffer_has_subvoxels;
 
 struct voxel_traversal {
     cell_ray ray;
-    // In subvoxels, axes turned as raster/blocks.glsl says.
+    // In subvoxels, with axes turned as in raster/blocks.glsl.
     vec3 o, d, inverse;
     ivec3 flip; // -1: turned
     ivec3 subvoxel;
     int octant_shift;
     float s, s_end;
-    float s_min, s_limit; // between which an intersection counts
-    float s_behind;         // and behind which, if the ray continues from a rejected one
+    float s_min, s_limit; // range in which intersections count
+    float s_behind;         // beginning of that range, if the ray continues after a rejected intersection
     float beyond;           // extension of a sample's plane beyond its texel, in cells
 };
 
-// A voxel to be searched, and a part of the ray in it.
+// A voxel to be searched, and the part of the ray in it.
 struct found_voxel {
-    uint what; // ABUFFER_VOXEL_*; 0: there is none
+    uint what; // ABUFFER_VOXEL_*; 0: none
     float s_in, s_out;
 };
 
-// The subvoxel at w.s.
+// Sets the subvoxel at w.s.
 void enter(inout voxel_traversal w)
 {
     w.subvoxel = clamp(ivec3(w.o + w.s * w.d), ivec3(0), ivec3((abuffer_grid << 4) - 1));
@@ -40,7 +40,7 @@ void begin_traversal(trace_ray r, float end, out voxel_traversal w)
 {
     float along = float(abuffer_grid << 4), subvoxels_a_cell = along / float(abuffer_resolution);
     w.ray = cell_ray_of(r, abuffer_place, float(abuffer_resolution));
-    // Its origin is the ray's, unless that is far away.
+    // The traversal begins at the ray's origin, unless that is far away.
     float s_begin = w.ray.begin > 0.0 ? 0.0 : r.t_min * w.ray.scale;
     w.ray.o += s_begin * w.ray.d;
     w.ray.begin += s_begin;
@@ -80,7 +80,7 @@ bool is_set_in(uvec2 bits, uvec3 p)
     return ((p.z < 2u ? bits.x : bits.y) >> part_bit(p) & 1u) != 0u;
 }
 
-// The bits of an occupied voxel. `b`: its place in the block.
+// Bits of an occupied voxel. `b`: its place in the block.
 uint what_of(int block, uvec3 b)
 {
     uint i = b.x | b.y << 2 | b.z << 4;
@@ -89,13 +89,13 @@ uint what_of(int block, uvec3 b)
     return ((i & 8u) == 0u ? two.x : two.y) >> 4u * (i & 7u) & 15u;
 }
 
-// A part of the ray in one subvoxel, as it is stored, or in empty space.
+// The part of a ray in one subvoxel, as stored, or in empty space.
 struct voxel_step {
     uvec3 subvoxel;
     float s_in, s_out;
 };
 
-// Past an occupied subvoxel, or past empty space. True: it is occupied.
+// Steps past an occupied subvoxel, or past empty space. True: the next one is occupied.
 bool step_on(inout voxel_traversal w, out voxel_step step_)
 {
     bvec3 down = notEqual(w.flip, ivec3(0));
@@ -106,7 +106,7 @@ bool step_on(inout voxel_traversal w, out voxel_step step_)
     bool is_set = is_set_in(words.xy, b);
     uvec2 inner = texelFetch(abuffer_subvoxels, subvoxels_at(voxel) + ABUFFER_SUBVOXELS_ANY).xy;
     bool is_whole = is_set && !abuffer_has_subvoxels;
-    // The next of 64 voxels, or of a voxel's 64 subvoxels.
+    // Next one of 64 voxels, or of a voxel's 64 subvoxels.
     uvec2 bits = is_set ? inner : words.xy;
     uvec3 p = is_set ? subvoxel & 3u : b;
     int many = is_whole ? 4 : parts_to_pass(bits, p, down);
@@ -127,13 +127,14 @@ bool step_on(inout voxel_traversal w, out voxel_step step_)
     return is_set && is_set_in(bits, p);
 }
 
-// What an occupied subvoxel is to be searched for. Read behind the loop over empty space, which needs none of it.
+// The images in which an occupied subvoxel is searched. They are read after the loop over empty space, which does not
+// need them.
 found_voxel found_in(voxel_step step_)
 {
     uvec3 voxel = step_.subvoxel >> 2u, p = step_.subvoxel & 3u;
     int inside = subvoxels_at(voxel);
     uint what = what_of(block_at(voxel), voxel & 3u);
-    // If one image does not show all of a voxel, the images that show the subvoxel's surfaces best.
+    // Where no single image shows all of a voxel, the images that show the subvoxel's surfaces best.
     uint best = 0u;
     for (int axis = 0; axis < 3; axis++)
         best |= is_set_in(texelFetch(abuffer_subvoxels, inside + axis).xy, p) ? 1u << axis : 0u;
@@ -141,12 +142,12 @@ found_voxel found_in(voxel_step step_)
     return found_voxel(what, step_.s_in, step_.s_out);
 }
 
-// To the next occupied subvoxel, if there is one.
+// Advances to the next occupied subvoxel, if there is one.
 found_voxel next_voxel(inout voxel_traversal w)
 {
     voxel_step step_ = voxel_step(uvec3(0u), 0.0, 0.0);
     bool is_found = false;
-    // Under a condition: without one, llvmpipe gave rays that had found theirs the last step of their neighbours.
+    // The condition is needed: without one, llvmpipe gave rays that had found theirs the last step of their neighbours.
     do {
         voxel_step next;
         if (step_on(w, next)) {

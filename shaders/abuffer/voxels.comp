@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From the sums of each voxel's samples to the voxel as rays read it (abuffer/layout.h); then raster/reach.comp adds
-// the empty space around empty blocks. One invocation per block.
+// Turns the sums of each voxel's samples into the voxel that rays read (abuffer/layout.h); raster/reach.comp then adds
+// the empty space round empty blocks. One invocation per block.
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -11,23 +11,23 @@ layout(binding = IMAGE_ABUFFER_SUBVOXELS, rg32ui) uniform uimageBuffer subvoxels
 uniform int grid; // blocks along a side
 uniform bool has_subvoxels;
 uniform bool without_steep; // no image has samples that are steep in it, and no normals are summed
-uniform uint first_item, end_item; // of the blocks
+uniform uint first_item, end_item; // blocks of the pass
 
-layout(binding = UNIT_TRACER_0) uniform isamplerBuffer sums; // a voxel's four as one texel
+layout(binding = UNIT_TRACER_0) uniform isamplerBuffer sums; // a voxel's four sums as one texel
 
-// ABUFFER_VOXEL_*; 0: it is empty.
+// ABUFFER_VOXEL_* bits of a voxel with these sums; 0: it is empty.
 uint judged(ivec4 sum)
 {
     uint bits = uint(sum.w), leaned = bits & ABUFFER_VOXEL_IMAGES;
     if (bits == 0u)
         return 0u;
-    if (without_steep) { // an image that shows all, or those that show something best
+    if (without_steep) { // an image that shows the whole voxel, or those that show something best
         uint whole = leaned & ~(bits / ABUFFER_SUM_STEEP);
         return whole != 0u ? 1u << findLSB(whole) : leaned;
     }
     vec3 average = abs(vec3(sum.xyz));
     uint first = average.x >= average.y && average.x >= average.z ? 0u : average.y >= average.z ? 1u : 2u;
-    // Opposite normals of a thin body's sides cancel out.
+    // The normals of a thin body's two sides cancel out.
     first = bitCount(leaned) == 1 ? uint(findLSB(leaned)) : first;
     bool shows_all = (bits & ABUFFER_SUM_STEEP << first) == 0u;
     bool is_thin = (bits / ABUFFER_SUM_UP & bits / ABUFFER_SUM_DOWN & 7u) != 0u;
@@ -63,7 +63,7 @@ void settle(int at, ivec3 place)
         }
         occupied[half_] = holds;
         imageStore(voxels, at + 1 + half_, words);
-        // Most voxels are empty, and have none.
+        // Empty voxels, as most are, have no subvoxels.
         for (uint left = has_subvoxels ? holds : 0u; left != 0u; left &= left - 1u)
             join_subvoxels(voxel_at(place, 32 * half_ + findLSB(left)));
     }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Rays against the bound of an element: spheres (BVH_SPHERES), boxes in floats, or boxes on the tree's grid
-// (BVH_PACKED), whose cells are then the unit of the ray too. All tests only ever err towards a hit.
+// Tests of rays against the bound of an element: spheres (BVH_SPHERES), boxes in floats, or boxes on the tree's grid
+// (BVH_PACKED), whose cells are then the unit of the ray too. The tests err only towards a hit.
 #include "tree/slack.glsl"
 
-// The grid of the traversed tree; without one: 0 and 1.
+// Grid of the traversed tree; without one: 0 and 1.
 struct tree_grid {
     vec3 lower;
     vec3 cells_per_unit;
@@ -18,7 +18,7 @@ struct bound_ray {
     float slack;
 };
 
-// Hit if the line intersects the sphere, and the sphere is not entirely before t_min nor beyond t_max.
+// Whether the line intersects the sphere, and the sphere is not entirely before t_min or beyond t_max.
 bool sphere_is_hit(bound_ray r, vec4 centre_radius, float t_min, float t_max)
 {
     vec3 to_centre = centre_radius.xyz - r.origin;
@@ -31,7 +31,7 @@ bool sphere_is_hit(bound_ray r, vec4 centre_radius, float t_min, float t_max)
            !(outside > 0.0 && outside * outside > squared_half_chord * r.inverse_square) && t_min < t_max;
 }
 
-// All rays of the packet: each has its own test. `alive` has a bit for each ray.
+// The rays of the packet, each with a test of its own. `alive` has a bit for each ray.
 struct bundle {
     bound_ray rays[PACKET_RAYS];
     uint octant;
@@ -52,12 +52,12 @@ bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid g
 
 #else
 
-// Where rays intersect the planes of boxes, as an interval that holds for all rays of the packet: the test of eight
-// costs that of two. Wald, Boulos, Shirley, Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies,
-// ACM TOG 2007, section 4.2 (interval arithmetic). A plane at p is hit at (p - c) i - e, with c the leading ray's
-// origin, i of a ray between the minimum and the maximum inverse direction, e how far the ray's own origin is off c; e
-// and the slack are in the offsets. Along an axis where the rays' directions differ in sign nothing is culled: scales
-// are 0 there, and offsets beyond everything. One ray has no interval: its minimum and maximum are equal.
+// Interval of the distances at which the rays of a packet intersect the planes of boxes: a test of eight rays costs as
+// much as one of two. Wald, Boulos, Shirley, Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies, ACM
+// TOG 2007, section 4.2 (interval arithmetic). A plane at p is hit at (p - c) i - e, with c the leading ray's origin, i
+// of a ray between the minimum and the maximum inverse direction, e how far the ray's own origin is off c; e and the
+// slack are in the offsets. Along an axis where the rays' directions differ in sign nothing is culled: scales are 0
+// there, and offsets beyond everything. One ray has no interval: its minimum and maximum are equal.
 struct bundle {
     vec3 scale_min, near_offset_min, far_offset_min;
 #if PACKET_RAYS > 1
@@ -73,8 +73,8 @@ bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid g
     vec3 scale[PACKET_RAYS], origin[PACKET_RAYS], slacks[PACKET_RAYS];
     vec3 centre = vec3(0.0), scale_leading = vec3(0.0);
     for (int k = 0; k < PACKET_RAYS; k++) {
-        // A component of zero would give infinity times zero. The replacement moves the ray sideways by 1e-12 of its
-        // length, far below the slack.
+        // A zero component would give infinity times zero. Its replacement moves the ray sideways by 1e-12 of its length,
+        // far below the slack.
         vec3 d = o[k].direction * grid.cells_per_unit;
         float smallest = 1e-12 * max_component(abs(d));
         scale[k] = 1.0 / mix(d, vec3(smallest), lessThan(abs(d), vec3(smallest)));
@@ -104,7 +104,7 @@ bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid g
 #else
         vec3 off = (origin[k] - centre) * scale[k];
 #endif
-        // The products centre * scale round as the ray's own would: their part is in the slack.
+        // The products centre * scale round as the ray's own would: the slack includes that.
         bool counts = (alive & 1u << k) != 0u;
         minimum = counts ? min(minimum, scale[k]) : minimum;
         maximum = counts ? max(maximum, scale[k]) : maximum;
@@ -122,7 +122,7 @@ bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid g
     return b;
 }
 
-// `near`, `far`: the corners that rays of the packet's octant reach first and last.
+// Tests a box. `near`, `far`: the corners that rays of the packet's octant reach first and last.
 bool box_is_hit(bundle b, vec3 near, vec3 far, float t_min, float t_max)
 {
     vec3 enter = near * b.scale_min - b.near_offset_min;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A leaf's primitives against the rays of a packet.
+// Tests a leaf's primitives against the rays of a packet.
 #include "tree/layout.h"
 #include "common/candidate.glsl"
 
@@ -10,18 +10,18 @@ layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_primitives;
 #endif
 
 #ifdef ANY_HIT
-#define answer vec3 // the optical depth
+#define answer vec3 // optical depth
 #else
 #define answer candidate
 #endif
 
-// The state of the traversed instance.
+// State of the traversed instance.
 struct entered_instance {
     uint index; // NOT_INSIDE: the top tree is traversed
     uint first_texel;
     uint first_primitive;
 #ifdef BVH_DEFORMS_IN_SHUTTER
-    uint close_texels; // as in bvh_transform
+    uint close_texels; // bvh_transform.close_texels
 #endif
 };
 
@@ -32,7 +32,7 @@ void put_out(inout trace_ray r)
     r.t_max = -1.0;
 }
 
-// The end of a ray; before its begin if it has ended.
+// End of a ray; before its beginning if the ray has ended.
 float end_of(trace_ray r, answer found)
 {
 #ifdef ANY_HIT
@@ -43,7 +43,7 @@ float end_of(trace_ray r, answer found)
 }
 
 #if defined BVH_DEFORMS && !defined ANY_HIT
-// Of surfaces at one distance the one with lower numbers counts; a disc before all, and nothing at the ray's end (both
+// Order of surfaces at one distance: lower numbers first, a disc before all, and nothing at the ray's end (disc and miss
 // have numbers that wrap to 0).
 bool is_before(candidate a, candidate b)
 {
@@ -69,16 +69,16 @@ void offer(inout trace_ray r, candidate c, inout answer found)
 #endif
 }
 
-// If materials must be evaluated, the rays' intersections with a primitive are noted first, and the traversal leaves
-// its inner loops to settle them. Software GL runs the evaluating code (textures included) at every visit, hit or no
-// hit: in the loop over primitives shadow rays took eight times as long.
+// Intersections with a primitive whose materials must be evaluated. They are noted first, and the traversal leaves its
+// inner loops to settle them: software GL executes the evaluating code (textures included) at every visit, hit or no hit,
+// and in the loop over primitives shadow rays took eight times as long.
 struct noted_hits {
-    vec2 distances; // triangles have the first alone
+    vec2 distances; // triangles have only the first
     vec2 barycentrics;
 };
 
 struct noted_primitive {
-    uint bits; // two per ray; 0: none is noted
+    uint bits; // two per ray; 0: no hit
     candidate common_part;
     noted_hits hits[PACKET_RAYS];
 };
@@ -131,14 +131,14 @@ void settle(inout noted_primitive noted, inout trace_ray r[PACKET_RAYS], inout a
 #define ORIGINS_DIFFER
 #endif
 
-// Rays in an instance's space, as triangles are tested against them: relative to the leading ray's origin, so that what
-// depends on the origin alone is computed once for all. The leading ray is the packet's, finished or not: the rounding
-// of a triangle's distance must not depend on earlier hits.
+// Rays in an instance's space for tests against triangles: relative to the leading ray's origin, so that terms of the
+// origin alone are computed once for all. The packet's leading ray leads, finished or not: the rounding of a triangle's
+// distance must not depend on earlier hits.
 struct relative_rays {
     vec3 centre;
     vec3 direction[PACKET_RAYS];
 #ifdef ORIGINS_DIFFER
-    vec3 origin[PACKET_RAYS]; // from the centre
+    vec3 origin[PACKET_RAYS]; // relative to the centre
     vec3 moment[PACKET_RAYS]; // 2 (origin x direction)
 #endif
 };
@@ -159,7 +159,7 @@ relative_rays relative_to(vec3 centre, object_ray o[PACKET_RAYS])
 
 #ifdef BVH_DEFORMS_IN_SHUTTER
 
-// The corners at the ray's own time: rays share no computation of such a triangle.
+// Moves the corners to each ray's own time, so rays share no computation of such a triangle.
 void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], relative_rays rays,
                    inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS], inout noted_primitive noted)
 {
@@ -168,7 +168,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], r
     vec3 v0 = uintBitsToFloat(first.xyz);
     vec3 v1 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 1).xyz);
     vec3 v2 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 2).xyz);
-    // Linear motion: the offset of a triangle that does not move is zero.
+    // Motion is linear: the offset of a triangle that does not move is zero.
     vec3 way0 = uintBitsToFloat(texelFetch(bvh_primitives, close).xyz) - v0;
     vec3 way1 = uintBitsToFloat(texelFetch(bvh_primitives, close + 1).xyz) - v1;
     vec3 way2 = uintBitsToFloat(texelFetch(bvh_primitives, close + 2).xyz) - v2;
@@ -188,9 +188,10 @@ void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], r
 
 #else
 
-// As intersect_triangle (common/intersect.glsl), for several rays. An edge from a to b, e = b - a, s = b + a, has for a
-// ray from o along d the edge function d . (e x (s - 2 o)) = d . (e x s) - e . (2 o x d): the first cross product is the
-// same for all rays, the second for all edges. Two triangles that share an edge still get exactly opposite values.
+// Tests several rays with the method of intersect_triangle() (common/intersect.glsl). An edge from a to b, e = b - a, s =
+// b + a, has for a ray from o along d the edge function d . (e x (s - 2 o)) = d . (e x s) - e . (2 o x d): the first
+// cross product is the same for all rays, the second for all edges. Two triangles that share an edge still get exactly
+// opposite values.
 void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], relative_rays rays,
                    inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS], inout noted_primitive noted)
 {
@@ -216,7 +217,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], r
         precise float sum = w0 + w1 + w2, slope = dot(normal, d);
         bool inside_edges = (w0 >= 0.0 && w1 >= 0.0 && w2 >= 0.0) || (w0 <= 0.0 && w1 <= 0.0 && w2 <= 0.0);
         c.distance = above / slope;
-        // seen on edge, or no area: not hit
+        // seen on edge, or without area: no hit
         c.distance = inside_edges && sum != 0.0 && slope != 0.0 ? c.distance : -1.0;
 #ifdef ASK_MATERIALS
         c.barycentrics = vec2(w1, w2) / sum;
@@ -253,8 +254,7 @@ void test_sphere(uint i, entered_instance inside, object_ray o[PACKET_RAYS], ino
 }
 #endif
 
-// Tests the leaf from `primitive` on, and returns the next one in it. False: the leaf is not finished, as an
-// intersection is noted.
+// Tests the leaf from `primitive` on, and advances it. False: the leaf is not finished, as an intersection is noted.
 bool test_leaf(uint leaf, inout uint primitive, entered_instance inside, object_ray o[PACKET_RAYS], relative_rays rays,
                inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS], inout noted_primitive noted)
 {

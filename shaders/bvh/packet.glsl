@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Which rays form a packet.
+// Formation of packets: which rays are traversed together.
 
 uint octant_of(vec3 direction)
 {
     return (direction.x < 0.0 ? 1u : 0u) | (direction.y < 0.0 ? 2u : 0u) | (direction.z < 0.0 ? 4u : 0u);
 }
 
-uniform float bvh_packet_reach;             // maximum distance of their origins; world space
-const float PACKET_SQUARED_COSINE = 0.998;  // of the maximum angle between them: 2.6 degrees
+uniform float bvh_packet_reach;             // maximum distance of origins; world space
+const float PACKET_SQUARED_COSINE = 0.998;  // squared cosine of the maximum angle between two rays: 2.6 degrees
 
-// Do two rays have similar directions? Others have no interval that would cull anything.
+// Whether two rays have similar directions; otherwise their interval would cull nothing.
 bool form_packet(vec3 origin_a, vec3 direction_a, vec3 origin_b, vec3 direction_b)
 {
 #ifdef SHARED_ORIGIN

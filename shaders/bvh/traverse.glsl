@@ -3,32 +3,32 @@
 // traversal of a sphere BVH', sections 4 (links), 5 (packets) and 6 (transform elements).
 //
 // The host (trace/bvh/tracer.c) sets, besides the defines of trace/wave.comp:
-//   BVH_SPHERES  the paper's form: bounds are spheres, there is one order for all directions, and the rays of a packet stay
-//                together, whether they go the same way or not
+//   BVH_SPHERES  the paper's form: bounds are spheres, there is one order for all directions, and the rays of a packet
+//                stay together, however they diverge
 //   BVH_PACKED   boxes are on a grid
 //   BVH_ONE_INSTANCE  there is one instance: no top tree is traversed
-//   SHARED_ORIGIN     all rays of the wave begin at one point, and do so in each instance: what follows from it alone is
+//   SHARED_ORIGIN     all rays of the wave begin at one point, also in each instance: terms of the origin alone are
 //                     computed once for a packet
 //   BVH_DEFORMS       there are meshes that deform, whose trees may have several histories
-//   BVH_DEFORMS_IN_SHUTTER  and some do while the shutter is open
-//   BVH_BUDGET        a ray, or a packet, stops after as many elements as a dispatch may have of it, and says so
-//   BVH_RESUMES       and goes on in the next dispatch
+//   BVH_DEFORMS_IN_SHUTTER  some of these deform while the shutter is open
+//   BVH_BUDGET        a ray, or a packet, stops at the maximum number of elements per dispatch, and reports it
+//   BVH_RESUMES       it resumes in the next dispatch
 //
-// With HAS_MOTION every ray enters an instance at the ray's own time, and leaves bound all times.
+// With HAS_MOTION every ray enters an instance at the ray's own time, and the bounds of leaves include all times.
 //
 // PACKET_RAYS rays form a packet: an element is entered when any of them may hit its bound, a primitive is fetched
-// once and tested against all. The octant is that of the first live ray; the others' answers are right whatever the
-// order, only less is pruned.
+// once and tested against all. The octant is that of the first live ray; the others' answers do not depend on the order,
+// but less is pruned.
 //
-// Answers do not depend on the top tree: a refitted and a rebuilt one give the same to the bit. The intersection with a
-// primitive depends on the ray and the packet's leading ray alone (leaf.glsl); of instances at one distance the first
-// by number is hit (favour_instance), within one the first in the order of its tree, which is that of its shape (with
-// BVH_DEFORMS: the first by number, is_before); optical depths are summed exactly (optical_depth_of).
+// Answers do not depend on the top tree: a refitted and a rebuilt one give the same answers, to the bit. The intersection
+// with a primitive depends on the ray and the packet's leading ray alone (leaf.glsl); of instances at one distance the
+// first by number is hit (favour_instance), within one the first in the order of its tree, which is that of its shape
+// (with BVH_DEFORMS: the first by number, is_before); optical depths are summed exactly (optical_depth_of).
 //
-// Three loops in one another: elements until a leaf, leaves until an instance is entered or left, instances. All
-// invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY): software
-// GL runs the code of both sides of a branch for the whole group, so leaf code in the inner loop would be paid for at
-// each element.
+// Three loops are nested: over elements until a leaf, over leaves until an instance is entered or left, over instances.
+// All invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY): software
+// GL runs the code of both sides of a branch for the whole group, so each element would pay for leaf code in the inner
+// loop.
 #include "bvh/layout.h"
 #include "bvh/bounds.glsl"
 #include "bvh/leaf.glsl"
@@ -47,8 +47,8 @@ uniform vec3 bvh_top_grid_lower;
 uniform vec3 bvh_top_cells_per_unit;
 #endif
 
-// Shadow rays that are traversed one by one have few octants in common: all read the first octant's copy, whose order
-// is as good for finding any hit, and which stays in the cache. Measured on software GL with 146K triangles: ambient
+// Shadow rays that are traversed one by one share few octants: all of them read the first octant's copy, whose order is
+// as good for finding any hit, and which stays in the cache. Measured on software GL with 146K triangles: ambient
 // occlusion takes 0.9 of the time. (Closest hits take 1.5 of it without their order.)
 #if defined ANY_HIT && PACKET_RAYS == 1 && !defined BVH_SPHERES
 #define ONE_ORDER
@@ -57,8 +57,9 @@ uniform vec3 bvh_top_cells_per_unit;
 #define NOT_INSIDE 0xffffffffu
 
 #ifdef BVH_BUDGET
-// A driver ends a dispatch that takes seconds, and a ray may meet every element of a scene.
-uniform uint bvh_budget_max; // elements of a ray, or a packet
+// Limit of elements per dispatch: a driver ends a dispatch that takes seconds, and a ray may meet every element of a
+// scene.
+uniform uint bvh_budget_max; // elements of a ray, or of a packet
 uniform uint unfinished_word; // set to BVH_UNFINISHED where a ray is not finished
 layout(std430, binding = BIND_BVH_UNFINISHED) buffer unfinished_block { uint unfinished[]; };
 uint budget_left = min(bvh_budget_max, BVH_DISPATCH_ELEMENTS_MAX / max(ray_end - first_ray, 1u));
@@ -93,7 +94,7 @@ void begin_tree(inout tree_traversal traversal, uint first_element, uint element
     traversal.leaf = traversal.primitive = 0u;
 }
 
-// The range of distances in which some ray may still hit something.
+// Range of distances in which some ray may still hit something.
 struct distances_left {
     float t_min, t_max;
 };
@@ -111,8 +112,7 @@ distances_left left_of(trace_ray r[PACKET_RAYS], answer found[PACKET_RAYS])
     return left;
 }
 
-// A step of the traversal: tests an element, and goes on to the next one. Returns its link if it is a leaf that some
-// ray may hit, else 0.
+// Tests an element, and advances to the next one. Returns its link if it is a leaf that some ray may hit, else 0.
 uint test_element(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[PACKET_RAYS],
                   answer found[PACKET_RAYS])
 {
@@ -133,7 +133,7 @@ uint test_element(inout tree_traversal traversal, bundle b, distances_left left,
         any_hit = sphere_is_hit(b.rays[k], lower, r[k].t_min, end_of(r[k], found[k])) || any_hit;
 #elif defined BVH_PACKED
 #ifdef ONE_ORDER
-    uvec3 first_corner = uvec3(b.octant << 4, b.octant << 3, b.octant << 2) & 16u; // 16: the other one
+    uvec3 first_corner = uvec3(b.octant << 4, b.octant << 3, b.octant << 2) & 16u; // 16: the other corner
 #else
     const uvec3 first_corner = uvec3(0u);
 #endif
@@ -147,8 +147,8 @@ uint test_element(inout tree_traversal traversal, bundle b, distances_left left,
     bool is_leaf = link >> BVH_LEAF_KIND_SHIFT != 0u;
     uint after_miss = link;
 #ifdef BVH_BUDGET
-    // Always forward, whatever a link says: no structure can keep a ray longer than it has elements. Software GL leaves
-    // a loop after 65535 rounds.
+    // A link never leads backwards, so no structure can keep a ray longer than it has elements. Software GL leaves a loop
+    // after 65535 rounds.
     after_miss = max(link, traversal.element + 1u);
 #endif
     traversal.element = any_hit || is_leaf ? traversal.element + 1u : after_miss;
@@ -160,7 +160,7 @@ bool is_searching(tree_traversal traversal)
     return traversal.leaf == 0u && traversal.element < traversal.end;
 }
 
-// The inner loop: on to the next leaf whose bound some ray may hit. Returns its link, 0: the tree is finished.
+// The inner loop: advances to the next leaf whose bound some ray may hit. Returns its link; 0: the tree is finished.
 uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[PACKET_RAYS],
                answer found[PACKET_RAYS])
 {
@@ -189,7 +189,7 @@ bool is_alive_any(trace_ray r[PACKET_RAYS])
 void enter_tree(object_ray o[PACKET_RAYS], trace_ray r[PACKET_RAYS], int leading, tree_grid grid, float slack,
                 out bundle b, out relative_rays rays)
 {
-    uint alive = 0u; // a bit each: Mesa 22.3's zink fails over an array of bool
+    uint alive = 0u; // a bit for each ray: Mesa 22.3's zink fails with an array of bool
     vec3 centre = o[0].origin;
     for (int k = 0; k < PACKET_RAYS; k++) {
         alive |= r[k].t_max > r[k].t_min ? 1u << k : 0u;
@@ -237,11 +237,11 @@ void enter_instance(uint instance_index, trace_ray r[PACKET_RAYS], int leading, 
     begin_tree(traversal, tree.x, tree.y, b.octant);
 }
 
-// A link that no leaf has: an intersection is noted, and the current leaf not finished.
+// Link that no leaf has: an intersection is noted, and the current leaf is not finished.
 #define LEAF_NOTED 1u
 
-// Traverses the current tree's leaves up to an instance, whose link is returned; 0: the tree is finished; or up to an
-// intersection that must be settled.
+// Traverses the leaves of the current tree. Returns the link of the next instance; 0: the tree is finished; or
+// LEAF_NOTED, where an intersection must be settled.
 uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance inside, object_ray o[PACKET_RAYS],
                  relative_rays rays, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS],
                  inout noted_primitive noted)
@@ -333,7 +333,7 @@ bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversa
 
 #else
 
-// Enters the instance of that leaf, or with 0, as its tree is finished, leaves the one that the packet is in. False:
+// Enters the instance of that leaf; or leaves the current instance if `leaf` is 0, as its tree is finished. False:
 // nothing is left to traverse.
 bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversal world_traversal, inout bundle b,
                   bundle world_bundle, int leading, inout entered_instance inside, inout object_ray o[PACKET_RAYS],
@@ -348,7 +348,7 @@ bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversa
         return true;
     }
 #ifdef BVH_BUDGET
-    if (traversal.element < traversal.end) // it is not finished
+    if (traversal.element < traversal.end) // the top tree is not finished
         return false;
 #endif
     bool all_done = inside.index == NOT_INSIDE;
@@ -368,7 +368,7 @@ bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversa
 
 #endif
 
-// All instances along the rays. True: an intersection must be settled before the traversal continues.
+// Traverses the instances along the rays. True: an intersection must be settled before the traversal continues.
 bool traverse_instances(inout tree_traversal traversal, inout tree_traversal world_traversal, inout bundle b,
                         bundle world_bundle, int leading, inout entered_instance inside, inout object_ray o[PACKET_RAYS],
                         inout relative_rays rays, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS],
@@ -385,7 +385,8 @@ bool traverse_instances(inout tree_traversal traversal, inout tree_traversal wor
     }
 }
 
-// `leading`: the first ray that was active as the packet began: it leads to the end, also when it is finished.
+// Traces a packet. `leading`: the first ray that was active as the packet began; it keeps the lead, also when it is
+// finished.
 void trace_packet(inout trace_ray r[PACKET_RAYS], int leading, inout answer found[PACKET_RAYS])
 {
     entered_instance inside;
@@ -428,7 +429,7 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], int leading, inout answer foun
 #endif
 }
 
-// False: nothing is left to do.
+// Begins the invocation's budget of elements. False: it has nothing left to do.
 bool begin_budget()
 {
 #ifdef BVH_BUDGET
@@ -454,7 +455,7 @@ void end_budget()
 #endif
 }
 
-// Called by trace/wave.comp.
+// trace/wave.comp calls this for each ray.
 #if PACKET_RAYS == 1
 
 #ifdef ANY_HIT
@@ -488,8 +489,8 @@ void trace_closest(trace_ray r, inout candidate best)
 #define TRACE_GROUP trace_closest_rays
 #endif
 
-// Each packet has all remaining rays with a direction similar to the first one's; the first in any case, NaN included. In the
-// paper's form it has all.
+// Divides the rays into packets: each packet has all remaining rays with a direction similar to the first one's, and the
+// first one in any case, NaN included. In the paper's form a single packet has all rays.
 void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 {
     uint waiting = 0u;
@@ -499,7 +500,7 @@ void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
         waiting = 0u;
 #ifdef BVH_RESUMES
     else if (resumes != 0u)
-        waiting = place_of_ray.w >> 1; // the packet is formed again as it was, of rays that may be finished by now
+        waiting = place_of_ray.w >> 1; // forms the same packet again; some of its rays may be finished by now
 #endif
     while (waiting != 0u) {
         uint before = waiting;
@@ -511,7 +512,7 @@ void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
         for (int k = 0; k < PACKET_RAYS; k++) {
             packet[k] = r[k];
 #ifdef SHARED_ORIGIN
-            packet[k].origin = leading.origin; // a dead ray has none
+            packet[k].origin = leading.origin; // dead rays get an origin
 #endif
 #ifdef BVH_SPHERES
             const bool goes = true;

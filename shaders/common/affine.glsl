@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // 3x4 transforms.
 
-// Rows of a 3x4 matrix times a point, a vector; and the transposed upper 3x3 times a covector: with the rows
-// of object_from_world this takes an object-space normal to world space, also where the scale is uneven. `precise`: all
-// programs find the same place, and what one of them counts or hits there, another one draws or shades.
+// Transforms by the rows of a 3x4 matrix: a point, a vector; and a covector, by the transposed upper 3x3: with the rows
+// of object_from_world this takes an object-space normal to world space, also where the scale is uneven. `precise` makes
+// all programs find the same place: one draws or shades what another one counts or hits there.
 vec3 affine_point(vec4 rows[3], vec3 point)
 {
     vec4 p = vec4(point, 1.0);

@@ -15,7 +15,7 @@ uint material_index_of(candidate found)
     return texelFetch(triangles, int(found.primitive)).w & HIT_MATERIAL_MASK;
 }
 
-// The inputs of alpha and tint, for any kind of primitive.
+// Inputs of alpha and tint, for any kind of primitive.
 struct surface_point {
     vec4 uv01;
     vec4 colour;
@@ -56,7 +56,7 @@ vec4 base_colour_at(material m, surface_point point)
     return colour;
 }
 
-// Alpha mode mask: is the surface cut away here?
+// Whether the surface is cut away here (alpha mode mask).
 bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
 #ifdef HAS_CUTOUT
@@ -69,9 +69,9 @@ bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world, float 
 #endif
 }
 
-// The transmittance of the surface for a shadow ray: 0 if it is opaque, 1 if it is cut away; the base colour tints
-// transmitted light, and the share that alpha blending leaves open passes untinted. `stops`: only what is cut away lets
-// the ray pass.
+// Transmittance of the surface for a shadow ray: 0 if it is opaque, 1 if it is cut away; the base colour tints
+// transmitted light, and the share that alpha blending leaves open passes untinted. `stops`: only a surface that is cut
+// away lets the ray pass.
 vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, float time, bool stops)
 {
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
@@ -87,7 +87,7 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, 
     if (stops)
         return vec3(0.0);
     vec3 through = vec3(0.0);
-#ifdef HAS_TRANSMISSION // else only alpha is needed, and no colour is decoded
+#ifdef HAS_TRANSMISSION // otherwise only alpha is needed, and no colour is decoded
     float metallic = m.metallic;
 #ifndef EVEN_ALPHA
     if (metallic > 0.0 && m.texture_metallic_roughness != 0u)

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// A place on a primitive, and what is interpolated there. Apart from common/surface.glsl, as traversal and shading need no
-// more, and a stage has few samplers.
+// Places on primitives, and the attributes interpolated there. common/surface.glsl is another file, as traversal and
+// shading do not need it, and a stage has few samplers.
 //
-// Software GL runs both sides of every branch: what no surface of the scene has may be left out by defines, without
-// any change to a hit. NO_TEXCOORDS, NO_COLOURS: no mesh has texture coordinates, vertex colours.
+// Software GL runs both sides of every branch: defines leave out attributes that no surface of the scene has, without any
+// change to a hit. NO_TEXCOORDS, NO_COLOURS: no mesh has texture coordinates, vertex colours.
 #include "shared/hit.h"
 #include "common/math.glsl"
 #include "common/motion.glsl"
@@ -12,7 +12,7 @@
 // A possible hit of a ray.
 struct candidate {
     float distance;     // in lengths of the direction
-    uint primitive;     // scene-wide triangle or sphere, or disc; HIT_NO_PRIMITIVE: nothing yet
+    uint primitive;     // scene-wide triangle or sphere, or disc; HIT_NO_PRIMITIVE: none yet
     uint instance_index; // HIT_NO_PRIMITIVE: a disc
     vec2 barycentrics;  // triangles: of the second and third vertex
 };
@@ -48,7 +48,8 @@ vec4 triangle_colour(uvec4 triangle, uint flags, vec3 weights)
 #endif
 }
 
-// Seen from the front (+z) with y up, u grows to the right and v downwards, as an image is stored.
+// Texture coordinates of a sphere. Seen from the front (+z) with y up, u grows to the right and v downwards, as an image
+// is stored.
 vec4 sphere_texcoords(vec3 normal_object)
 {
     float u = 0.5 + azimuth(normal_object.x, normal_object.z) / TWO_PI;
@@ -56,7 +57,7 @@ vec4 sphere_texcoords(vec3 normal_object)
     return vec4(u, v, u, v);
 }
 
-// 0..1 across the disc.
+// Texture coordinates of a disc, 0..1 across it.
 vec4 disc_texcoords(disc d, vec3 position_world)
 {
     vec3 tangent, bitangent;
@@ -66,8 +67,8 @@ vec4 disc_texcoords(disc d, vec3 position_world)
     return vec4(uv, uv);
 }
 
-// The interpolated normal, mirrored at the surface where it points to the wrong side of it: a reversed normal becomes
-// its opposite, one slightly below the horizon moves slightly.
+// Mirrors the interpolated normal at the surface where it points to the wrong side: a reversed normal becomes its
+// opposite, one slightly below the horizon moves slightly.
 vec3 same_hemisphere(vec3 shading, vec3 geometric)
 {
     float cosine = dot(shading, geometric);

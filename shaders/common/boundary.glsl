@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What one facet, or a boundary that is smooth, mirrors, and how it bends what it lets through: dielectrics by Fresnel's
-// equations, metals by Schlick's approximation, each as KHR_materials_specular, _iridescence and _dispersion change it.
+// Reflection and refraction at one facet, or at a smooth boundary: dielectrics by Fresnel's equations, metals by
+// Schlick's approximation, each modified by KHR_materials_specular, _iridescence and _dispersion.
 //
 // Defines: those of common/material.glsl.
 
@@ -9,19 +9,20 @@
 #include "common/film.glsl"
 #include "common/material.glsl"
 
-// What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
+// Type of a dielectric's reflectance for light from outside: a colour if some mirror has one.
 #if defined(HAS_SPECULAR) || defined(HAS_IRIDESCENCE) || defined(HAS_DISPERSION)
 #define SHARE vec3
 #else
 #define SHARE float
 #endif
 
-// `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored all light.
+// Reflectance without a film. `exact`: the facets' share by the equations; `all_`: their share if they mirrored all
+// light.
 SHARE without_film(surface s, float exact, float all_)
 {
 #ifdef HAS_SPECULAR
-    // KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a
-    // colour, and all of it is less. As the change is the same line at every angle, it holds for means over facets and
+    // KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 gets another beginning, a
+    // colour, and is scaled down. The change is the same line at every angle, so it holds for means over facets and
     // angles, too.
     float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
     vec3 begins = min(f0 * s.specular_colour, 1.0);
@@ -31,7 +32,7 @@ SHARE without_film(surface s, float exact, float all_)
 #endif
 }
 
-// What a facet of a dielectric mirrors of light from outside, or facets of which it is the mean one.
+// Reflectance of a dielectric's facet, or of facets with this mean, for light from outside.
 SHARE outside_mirror(surface s, float cosine, float exact, float all_)
 {
     SHARE mirrored = without_film(s, exact, all_);
@@ -41,8 +42,8 @@ SHARE outside_mirror(surface s, float cosine, float exact, float all_)
     return mirrored;
 }
 
-// What facets mirror of light from outside at the first go, along a view of that cosine. `mean`: facets_cosine() of it;
-// `loss`: what they send into each other.
+// First reflection of facets for light from outside, along a view with this cosine. `mean`: facets_cosine() of it;
+// `loss`: the share that facets send into each other.
 SHARE facets_outside_mirror(surface s, float cosine, float mean, float alpha, float loss)
 {
     float all_ = 1.0 - loss;
@@ -54,7 +55,7 @@ SHARE facets_outside_mirror(surface s, float cosine, float mean, float alpha, fl
     return mirrored;
 }
 
-// What a facet of a metal mirrors.
+// Reflectance of a metal's facet.
 vec3 metal_mirror(surface s, float cosine)
 {
     vec3 mirrored = fresnel_schlick(s.base, cosine);
@@ -73,8 +74,8 @@ vec3 facets_metal_mirror(surface s, float cosine, float mean, float alpha, float
     return mirrored * (1.0 - loss);
 }
 
-// The direction of what a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it: it is
-// the mirrored direction on the other side (KHR_materials_transmission).
+// Direction of the light that a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it:
+// it is the mirrored direction on the other side (KHR_materials_transmission).
 vec3 bent_direction(surface s, float eta, vec3 direction, vec3 facet, vec3 normal)
 {
 #ifdef HAS_THIN_WALLS
@@ -87,7 +88,7 @@ vec3 bent_direction(surface s, float eta, vec3 direction, vec3 facet, vec3 norma
     return refract(direction, facet, 1.0 / eta);
 }
 
-// The share that a boundary mirrors of light from inside of glass.
+// Reflectance of a boundary for light from inside of glass.
 SHARE inside_mirror(surface s, float cosine)
 {
 #ifdef HAS_DISPERSION
@@ -99,9 +100,9 @@ SHARE inside_mirror(surface s, float cosine)
 #endif
 }
 
-// Glass that disperses sends on one colour of what it lets through, bent as that one is, with a chance in proportion to
-// what the path would bring of it. `number` chooses it and comes back stretched; `window` becomes its share by its chance.
-// Returns the index behind / before.
+// Chooses a colour that glass with dispersion transmits, with a chance in proportion to its contribution to the path, and
+// bends it accordingly. `number` chooses it and is stretched to [0, 1) again; `window` becomes the colour's share divided
+// by its chance. Returns the index behind / before.
 float disperse(surface s, inout float number, inout vec3 window)
 {
     float eta = index_ratio(s);

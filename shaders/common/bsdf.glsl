@@ -3,39 +3,38 @@
 // and bsdf_choose() implement one model, and bsdf_evaluate() returns the density with which bsdf_choose() samples a
 // direction.
 //
-//   scattered   Lambert, diminished by the boundary both ways, and what metal mirrors more than once, as in brdf() of
+//   scattered   Lambert, diminished by the boundary both ways, and multiple reflections of metal, as in brdf() of
 //               common/scattering.glsl
 //   mirrored    GGX facets, each a smooth mirror by Fresnel's equations (metal: Schlick); or Ward's lobe with the same
 //               reflectances
-//   refracted   GGX facets as windows: also for what they would mirror into another facet
+//   refracted   GGX facets as windows, which also transmit the light mirrored into another facet
 //
 //   coat        GGX facets over all of them (common/coat.glsl)
 //
-// Mirrored and refracted may be stretched along a grain. Where they are smooth they are a mirror and a window, which
-// nothing but bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's.
-// Radiance on the other side is divided by the square of the index, so that a window neither dims nor brightens the
-// view through it.
+// Mirrored and refracted may be stretched along a grain. Where they are smooth they are a mirror and a window, which only
+// bsdf_choose() finds; it alone also finds light inside of glass, where both are GGX's. Radiance on the other side is
+// divided by the square of the index, so that a window neither dims nor brightens the view through it.
 //
-// Defines: those of common/material.glsl; WARD; LIGHT_LAYERS it is told what is scattered.
+// Defines: those of common/material.glsl; WARD; LIGHT_LAYERS the scattered part is needed apart.
 
 #include "common/grain.glsl"
 #include "common/scattering.glsl"
 
-// The minimum probability of a lobe, as its mean may exceed its value at this angle.
+// Minimum probability of a lobe, as its value at this angle may exceed its mean.
 const float LOBE_CHANCE_MIN = 1e-3;
 
 struct bsdf {
     vec3 x, y, z;           // unit, world space: along the grain, across it, shading normal
     vec3 view;              // in that frame, towards the eye, z > 0
-    vec2 alpha;             // of the facets along x and y
+    vec2 alpha;             // roughness of the facets along x and y
     bool rough;             // else mirror and window are smooth
     bool leaves;            // the ray comes from inside of glass
-    split parts;            // none is scattered from inside of glass: bsdf_choose() does that by facets
-    float scattered_chance; // of choosing that lobe
-    float mirror_chance;    // WARD: of choosing the mirror otherwise
+    split parts;            // nothing is scattered from inside of glass: bsdf_choose() does that by facets
+    float scattered_chance; // probability of choosing that lobe
+    float mirror_chance;    // WARD: probability of the mirror otherwise
 #ifdef HAS_CLEARCOAT
     vec3 coat_x, coat_y, coat_view; // the coat's frame with its normal, and the view in it
-    float coat_alpha, coat_chance;  // of choosing its lobe
+    float coat_alpha, coat_chance;  // probability of choosing its lobe
     bool coat_rough;
 #endif
 };
@@ -56,7 +55,7 @@ float bsdf_lost(bsdf b, vec3 direction)
     return mean.y * facets_lost(facet_stretched(direction, b.alpha), mean.x);
 }
 
-// `view`: towards the eye, as NoV, which is not 0.
+// Prepares the BSDF. `view` is the direction to the eye; NoV is not 0.
 bsdf bsdf_of(surface s, vec3 view, float NoV)
 {
     bsdf b;
@@ -92,7 +91,7 @@ bsdf bsdf_of(surface s, vec3 view, float NoV)
     return b;
 }
 
-// The share of the light mirrored by a facet that no other one catches; what comes from inside of glass stays there.
+// Share of the light mirrored by a facet that no other facet blocks; light from inside of glass stays there.
 float bsdf_lit(bsdf b, vec3 light)
 {
 #ifndef WARD
@@ -102,24 +101,24 @@ float bsdf_lit(bsdf b, vec3 light)
     return 1.0;
 }
 
-// The reflectance and transmittance of a facet. `light`: the direction that it mirrors.
+// Reflectance and transmittance of a facet. `light`: the direction that it mirrors.
 void facet_parts(bsdf b, surface s, float VoH, vec3 light, out vec3 mirror, out vec3 window)
 {
     float lit = bsdf_lit(b, light);
     SHARE dielectric = b.leaves ? inside_mirror(s, VoH) : outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0);
     SHARE mirrored = dielectric * lit;
 #ifdef WARD
-    if (!b.leaves && b.rough) // whose mirror has other facets than the window
+    if (!b.leaves && b.rough) // its mirror and its window have different facets
         mirrored = b.parts.dielectric;
 #endif
     mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) *
              (lit * over_mirrored(s, b.parts, bsdf_world(b, light)));
-    // Glass is tinted once, where light enters it. From inside, also what is scattered is left to it.
+    // Glass is tinted once, where light enters it. Scattering, too, is left to the inside.
     vec3 through = b.leaves ? mix(s.base, vec3(1.0), s.transmission) : s.base * s.transmission;
     window = through * ((1.0 - mirrored) * ((1.0 - s.metallic) * over_view(b.parts)));
 }
 
-// The probability of choosing the mirror over the window. Ward's lobe has other facets than the window, so it is chosen
+// Probability of choosing the mirror over the window. Ward's lobe has other facets than the window, so it is chosen
 // before the facet.
 float facet_mirror_chance(bsdf b, vec3 mirror, vec3 window)
 {
@@ -131,7 +130,7 @@ float facet_mirror_chance(bsdf b, vec3 mirror, vec3 window)
     return both > 0.0 ? size / both : 1.0;
 }
 
-// As evaluate_below(), of what is scattered from the other side.
+// The counterpart of evaluate_below() for light scattered from the other side.
 vec3 bsdf_passed(bsdf b, surface s, vec3 light, vec3 light_world, out float probability)
 {
     probability = 0.0;
@@ -144,10 +143,10 @@ vec3 bsdf_passed(bsdf b, surface s, vec3 light, vec3 light_world, out float prob
 }
 
 #ifdef LIGHT_LAYERS
-vec3 evaluated_scattered; // of what bsdf_evaluate() has returned last
+vec3 evaluated_scattered; // scattered part of the last bsdf_evaluate()
 #endif
 
-// bsdf_evaluate() of the surface below a coat, as if there were only its lobes to choose from.
+// Evaluates the surface below a coat, as bsdf_evaluate() would if only its lobes could be chosen.
 vec3 evaluate_below(bsdf b, surface s, vec3 light_world, out float probability)
 {
     vec3 light = bsdf_local(b, light_world);
@@ -182,8 +181,8 @@ vec3 evaluate_below(bsdf b, surface s, vec3 light_world, out float probability)
     return sent;
 }
 
-// The reflectance from a direction (unit) to the eye, per steradian, times the cosine; and the probability per steradian
-// with which bsdf_choose() samples it. A smooth mirror is left out of both, and what is refracted.
+// Reflectance from a direction (unit) to the eye, per steradian, times the cosine; and the probability per steradian with
+// which bsdf_choose() samples it. Smooth mirrors and refraction are left out of both.
 vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
 {
     vec3 sent = evaluate_below(b, s, light_world, probability);
@@ -206,11 +205,11 @@ vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
 #define BSDF_SCATTERED 0u
 #define BSDF_MIRRORED 1u
 #define BSDF_REFRACTED 2u
-#define BSDF_COAT 3u // mirrored by it
+#define BSDF_COAT 3u // mirrored by the coat
 
 struct bsdf_choice {
     vec3 direction;    // unit, world space
-    vec3 weight;       // of the radiance along it: reflectance times cosine / probability; 0: there is no ray
+    vec3 weight;       // factor of the radiance along it: reflectance times cosine / probability; 0: there is no ray
     float probability; // per steradian; 0: undefined (smooth, or through a window)
     uint lobe;         // BSDF_*
 };
@@ -221,8 +220,8 @@ vec3 direction_by_cosine(vec2 u)
     return vec3(sine * cos(phi), sine * sin(phi), sqrt(1.0 - u.x));
 }
 
-// Of the light that meets glass from inside, chosen to be no mirror's: whether it is scattered. One number makes two
-// for its direction: its upper and its lower bits.
+// Whether light that meets glass from inside, and is not mirrored, is scattered. One number makes two for its direction,
+// from its upper and its lower bits.
 bool scattered_inside(surface s, inout float choice, inout vec3 window, inout vec3 local)
 {
     vec3 rest = s.base * (1.0 - s.transmission);
@@ -236,11 +235,11 @@ bool scattered_inside(surface s, inout float choice, inout vec3 window, inout ve
     return scattered;
 }
 
-// `choice` chooses the lobe and comes back stretched; `u` the direction.
+// Chooses a direction. `choice` chooses the lobe and is stretched to [0, 1) again; `u` chooses the direction.
 bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
 {
     bsdf_choice result = bsdf_choice(b.z, vec3(0.0), 0.0, BSDF_SCATTERED);
-    float below = 1.0; // the chance of it
+    float below = 1.0; // chance of the surface below the coat
 #ifdef HAS_CLEARCOAT
     bool coated = choice < b.coat_chance;
     below = 1.0 - b.coat_chance;
@@ -258,7 +257,7 @@ bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
     facet_parts(b, s, VoH, mirrored_at, mirror, window);
     float chance = facet_mirror_chance(b, mirror, window), eta = disperse(s, choice, window);
     vec3 bent = bent_direction(s, eta, -b.view, facet, vec3(0.0, 0.0, 1.0));
-    if (!b.rough && dot(bsdf_world(b, bent), s.geometric) >= 0.0) { // totally reflected, or a tilted normal sends it back
+    if (!b.rough && dot(bsdf_world(b, bent), s.geometric) >= 0.0) { // totally reflected, or sent back by a tilted normal
         mirror += window;
         window = vec3(0.0);
         chance = facet_mirror_chance(b, mirror, window);
@@ -281,7 +280,7 @@ bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
         local = bent;
         result.lobe = BSDF_REFRACTED;
     }
-    if (b.rough && b.leaves) // what would meet another facet goes where the flat surface would send it
+    if (b.rough && b.leaves) // light mirrored into another facet goes where the flat surface would send it
         local.z = mirrored ? abs(local.z) : -abs(local.z);
     bool diffuse = b.leaves && !mirrored && scattered_inside(s, choice, window, local);
     if (diffuse)

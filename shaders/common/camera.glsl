@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The frame's camera (shared/frame.h).
+// Rays and projections of the frame's camera (shared/frame.h).
 
 #include "common/slots.glsl"
 
-// How far a view's eye is from the camera's, in view space.
+// Offset of a view's eye from the camera, in view space.
 vec2 eye_of_view(uvec2 view)
 {
     vec2 steps = vec2(view) - frame.eyes_middle.xy;
@@ -30,7 +30,7 @@ vec3 view_from_world_point(vec3 p)
 }
 
 // The ray through a point of a view, in pixels from its top left, from the centre of the lens; unit direction, t_min at
-// the near plane. The eye is the camera's: those of several views look in parallel to it.
+// the near plane. The directions are the camera's: the eyes of several views look in parallel.
 void camera_ray_through(vec2 view_place, out vec3 origin, out vec3 direction, out float t_min)
 {
     vec2 place = view_place / vec2(frame.view_width, frame.view_height) * 2.0 - 1.0;
@@ -48,16 +48,16 @@ void camera_ray_through(vec2 view_place, out vec3 origin, out vec3 direction, ou
     }
 }
 
-// Where in a pixel that one of the current samples is, if it is the same in all.
+// Place in its pixel of one of the current samples, if that is the same in all pixels.
 vec2 sample_place(uint i)
 {
     vec4 two = frame_in_block.sample_places[i >> 1];
     return (i & 1u) != 0u ? two.zw : two.xy;
 }
 
-// Clip coordinates of a point so that a pixel's centre shows what camera_ray_through() sees through that place in it.
-// Row 0 of the target is the picture's uppermost. Depth is reversed: 1 at the near plane; 0 infinitely far away, or, in
-// an orthographic view, at the far distance.
+// Clip coordinates of a point, such that a pixel's centre shows what camera_ray_through() meets through `place` in it.
+// Row 0 of the target is the uppermost of the picture. Depth is reversed: 1 at the near plane; 0 infinitely far away, or,
+// in an orthographic view, at the far distance.
 vec4 clip_from_world_point(vec3 p, vec2 place)
 {
     vec3 v = view_from_world_point(p);
@@ -71,7 +71,7 @@ vec4 clip_from_world_point(vec3 p, vec2 place)
     return vec4(scaled - shift * v.z, near, -v.z);
 }
 
-// Ray cone of a primary ray: width at the origin and growth per length. Many samples share a pixel.
+// Ray cone of a primary ray: width at the origin and growth per length. The samples of a pixel share it.
 vec2 camera_cone()
 {
     float step = 2.0 * frame.extent_near.y / float(frame.view_height) * frame.far_width.y;

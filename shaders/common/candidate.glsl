@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tests a primitive that an exact tracer's structure leads to.
+// Tests of primitives that an exact tracer's structure leads to.
 #include "common/alpha.glsl"
 #include "common/intersect.glsl"
 #include "common/optical_depth.glsl"
@@ -26,7 +26,7 @@ float time_of(trace_ray r)
 #endif
 }
 
-// The same ray in an instance's space: the direction is not made unit, so distances stay those of the world.
+// A ray in an instance's space: the direction is not normalised, so distances stay those of the world.
 struct object_ray {
     vec3 origin;
     vec3 direction;
@@ -51,8 +51,8 @@ void offer_closest(trace_ray r, candidate found, inout candidate best)
         best = found;
 }
 
-// Any hit: true if no light is left and the ray is finished. A surface counts once for each intersection, so no
-// primitive may be offered twice to one ray.
+// Any hit: adds the candidate's optical depth. True: no light is left, and the ray is finished. A surface counts once for
+// each intersection, so no primitive may be offered twice to one ray.
 bool offer_any(trace_ray r, candidate found, inout vec3 optical_depth)
 {
     if (!(found.distance > r.t_min && found.distance < r.t_max))

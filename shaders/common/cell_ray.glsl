@@ -9,7 +9,7 @@
 // quotient is infinite.
 const float CELL_RAY_MIN_SLOPE = 1e-8;
 
-// At this distance, in cells, floats round positions by more than the distance of distinct planes: the origin of a ray
+// Distance, in cells, at which floats round positions by more than the distance of distinct planes: the origin of a ray
 // from farther away is moved nearer, or its steps and intersections would be off.
 const float CELL_RAY_FAR = 16384.0;
 
@@ -26,14 +26,14 @@ vec3 without_zeros(vec3 d)
     return mix(d, smallest, lessThan(abs(d), vec3(small)));
 }
 
-// `place`: the cube's lower corner, world; size of a cell. `cells`: along a side.
+// Makes the ray. `place`: the cube's lower corner, world; size of a cell. `cells`: along a side.
 cell_ray cell_ray_of(trace_ray r, vec4 place, float cells)
 {
     vec3 size = abs(r.direction);
     float length_ = max_component(size);
     cell_ray c;
     c.scale = length_ / place.w;
-    // Written so that a direction that is NaN, or too small or large for a finite inverse, hits nothing.
+    // The form of the conditions makes a direction that is NaN, or too small or large for a finite inverse, hit nothing.
     vec3 away = abs(r.origin);
     bool is_direction = length_ > 1e-30 && size.x + size.y + size.z < 1e30 && away.x + away.y + away.z < 1e30;
     c.scale = is_direction ? c.scale : 0.0;
@@ -47,7 +47,7 @@ cell_ray cell_ray_of(trace_ray r, vec4 place, float cells)
     return c;
 }
 
-// Clips [lower, upper] of the ray to a box; lower > upper if it misses.
+// Clips the interval of the ray to a box [lower, upper]; s_first > s_end if the ray misses it.
 void clip(inout float s_first, inout float s_end, vec3 o, vec3 inverse, vec3 lower, vec3 upper)
 {
     vec3 a = (lower - o) * inverse, b = (upper - o) * inverse;

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// A clear varnish over a surface: KHR_materials_clearcoat. GGX facets of a roughness and a normal of their own, each a
-// smooth mirror by Fresnel's equations; what they do not mirror reaches the surface below, and its light comes out by
-// as much.
+// A clear varnish over a surface: KHR_materials_clearcoat. GGX facets with a roughness and a normal of their own, each a
+// smooth mirror by Fresnel's equations. Light that they do not mirror reaches the surface below; its reflection leaves
+// with the same loss.
 //
-// Light is mirrored by the coat by E(V) along the view, so T = 1 - E passes. What is scattered below is seen as
+// The coat mirrors E(V) of the light along the view, so T = 1 - E passes. Light scattered below appears as
 //
-//   T(V) T(L) / T~             T~ the mean of T(L): it adds up to T(V) times what the surface scatters, and is reciprocal
-//                              (Kelemen, Szirmay-Kalos. A Microfacet Based Coupled Specular-Matte BRDF Model. 2001)
+//   T(V) T(L) / T~             T~ the mean of T(L): the sum is T(V) times the light that the surface scatters, and it is
+//                              reciprocal (Kelemen, Szirmay-Kalos. A Microfacet Based Coupled Specular-Matte BRDF Model.
+//                              2001)
 //
-// and what is mirrored below as the greater one of
+// and light mirrored below as the greater one of
 //
-//   min(T(V), T(L))            adds up exactly where L is V's mirrored direction
-//   T(V) T(L) / T_upright      where facets below are so rough that few L are; T_upright: the mean seen from above
+//   min(T(V), T(L))            exact where L is V's mirrored direction
+//   T(V) T(L) / T_upright      where facets below are so rough that few L are near it; T_upright: the mean seen from above
 //
 // which in a furnace, of white metal, leaves 0.957 to 1.01 at every angle and roughness, and 0.98 to 1 on average
 // (integrals over the facets of common/facets.glsl). No light is lost within the coat.
@@ -24,10 +25,10 @@
 #include "common/facet_albedo.glsl"
 #include "common/material.glsl"
 
-// KHR_materials_clearcoat.
+// Index of refraction in KHR_materials_clearcoat.
 const float COAT_IOR = 1.5;
 
-// What a coat does with light along the view.
+// Shares of light along the view at a coat.
 struct coating {
 #ifdef HAS_CLEARCOAT
     float mirrors;                  // E(V)
@@ -58,17 +59,18 @@ coating coating_of(surface s, vec3 view)
     c.mirrors = in_glass(s) ? 0.0 : coat_mirrors(s, coat_cosine(s, view));
     c.passes = 1.0 - c.mirrors;
     float mean = facets_dielectric_mean(square(s.coat_roughness), COAT_IOR), alpha = square(s.roughness);
-    // What enters a dielectric does so away from the horizon, as what passes the coat does: 0.88 of its plain mean.
+    // Light enters a dielectric mostly away from the horizon, as light that passes the coat does: the mean is 0.88 of the
+    // plain one.
     c.scattered_mean = 1.0 - 0.88 * s.coat * mean;
-    // Of the light that facets mirror upwards: the share that comes from all around grows with their roughness.
+    // Share of the light mirrored upwards by facets that comes from all around; it grows with their roughness.
     float around = 1.2 * square(alpha) / (square(alpha) + 0.2);
     c.upright_ = 1.0 - mix(coat_mirrors(s, 1.0), 1.15 * s.coat * mean, around);
 #endif
     return c;
 }
 
-// The share of the light from a direction that gets through the coat to where it is scattered, and what is scattered of
-// it back to the view; less that along the view, which `split` has.
+// Share of the light from a direction that passes the coat, is scattered below and comes back to the view; divided by the
+// share along the view, which `split` has.
 float coat_over_scattered(coating c, surface s, vec3 light)
 {
 #ifdef HAS_CLEARCOAT
@@ -78,7 +80,7 @@ float coat_over_scattered(coating c, surface s, vec3 light)
 #endif
 }
 
-// The share of the light from a direction that the surface below mirrors to the view, through the coat both ways.
+// Share of the light from a direction that the surface below mirrors to the view, through the coat both ways.
 float coat_over_mirrored(coating c, surface s, vec3 light)
 {
 #ifdef HAS_CLEARCOAT
@@ -90,15 +92,15 @@ float coat_over_mirrored(coating c, surface s, vec3 light)
 }
 
 #ifdef HAS_CLEARCOAT
-// The coat's own mirrored direction; about the geometric normal where its normal would send it into the surface.
+// Mirrored direction of the coat; about the geometric normal where the coat's own would send it into the surface.
 vec3 coat_mirror_direction(surface s, vec3 direction)
 {
     vec3 mirrored = reflect(direction, s.coat_normal);
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
 }
 
-// Of the irradiance from a direction the coat's own highlight, as brdf() has it for the surface, times the cosine to the
-// coat. `roughness`: of the coat, or wider.
+// The coat's own highlight for the irradiance from a direction, in the form of brdf(), times the cosine to the coat.
+// `roughness`: the coat's, or a wider one.
 float coat_highlight(surface s, coating c, vec3 view, vec3 light, float roughness)
 {
     float NoL = dot(s.coat_normal, light), NoV = coat_cosine(s, view), alpha = square(roughness);

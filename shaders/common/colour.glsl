@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Between linear light and sRGB. IEC 61966-2-1.
+// Conversions between linear light and sRGB. IEC 61966-2-1.
 
-// Of linear light.
+// Luminance of linear light.
 float luminance(vec3 colour)
 {
     return dot(colour, vec3(0.2126, 0.7152, 0.0722));

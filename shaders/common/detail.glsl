@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The surface about a hit, for ray cones (common/cone.glsl).
+// Curvature and texture footprint of the surface about a hit, for ray cones (common/cone.glsl).
 //
 // Defines: HAS_SPHERES.
 #include "common/attributes.glsl"
@@ -8,16 +8,16 @@
 
 struct surface_detail {
     texture_footprint footprint;
-    float curvature; // mean of the shading normal's, 1 / metre; above 0: it bulges to the outside
+    float curvature; // mean curvature by the shading normal, 1 / metre; above 0: it bulges to the outside
 };
 
-// `u`, `v`: gradients, in texture coordinates per metre.
+// Footprint from gradients `u`, `v`, in texture coordinates per metre.
 texture_footprint footprint_of_gradients(vec3 u, vec3 v, mat2x3 edges)
 {
     return texture_footprint(vec2(dot(u, edges[0]), dot(v, edges[0])).xyxy, vec2(dot(u, edges[1]), dot(v, edges[1])).xyxy);
 }
 
-// A turn along u and half of one along v.
+// Texture coordinates turn once along u, and by a half turn along v.
 surface_detail detail_sphere(instance i, float radius, vec2 uv, mat2x3 edges)
 {
     float scale = pow(abs(determinant(mat3(i.world_from_object[0].xyz, i.world_from_object[1].xyz,
@@ -29,7 +29,7 @@ surface_detail detail_sphere(instance i, float radius, vec2 uv, mat2x3 edges)
                                                  south * (curvature / PI), edges), curvature);
 }
 
-// The instance's scale is taken to be the same in all directions of the triangle's plane.
+// The instance's scale counts as uniform in the triangle's plane.
 surface_detail detail_triangle(instance i, uint primitive, uint flags, mat2x3 edges)
 {
     uvec4 triangle = texelFetch(triangles, int(primitive));
@@ -46,7 +46,7 @@ surface_detail detail_triangle(instance i, uint primitive, uint flags, mat2x3 ed
     if ((flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) != 0u) {
         vec4 t0 = texelFetch(texcoords, int(triangle.x));
         vec4 d1 = texelFetch(texcoords, int(triangle.y)) - t0, d2 = texelFetch(texcoords, int(triangle.z)) - t0;
-        // The gradients of the barycentric coordinates.
+        // Gradients of the barycentric coordinates.
         vec3 g1 = cross(e2_world, across_world) / square(area_world), g2 = cross(across_world, e1_world) / square(area_world);
         detail.footprint.along = dot(g1, edges[0]) * d1 + dot(g2, edges[0]) * d2;
         detail.footprint.across = dot(g1, edges[1]) * d1 + dot(g2, edges[1]) * d2;
@@ -56,7 +56,7 @@ surface_detail detail_triangle(instance i, uint primitive, uint flags, mat2x3 ed
              n2 = texelFetch(normals, int(triangle.z)).xyz, sum = n0 + n1 + n2;
         // Half the divergence along the plane of the normals between the corners.
         float divergence = dot(n1 - n0, cross(e2, across)) + dot(n2 - n0, cross(across, e1));
-        float size = length(sum) / 3.0 * sign(dot(sum, across)); // those of other winding are turned round
+        float size = length(sum) / 3.0 * sign(dot(sum, across)); // negative where the winding is reversed
         if (size != 0.0)
             detail.curvature = 0.5 * divergence / (area * sqrt(area * area_world) * size);
     }

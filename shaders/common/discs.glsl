@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Discs, which no acceleration structure holds.
+// Tests of discs, which no acceleration structure holds.
 //
 // Defines: ANY_HIT, HAS_DISCS, those of common/candidate.glsl.
 #include "common/candidate.glsl"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The size of a work group, and which item of a one-dimensional list this invocation works on. The counterpart of
-// gpu_dispatch(), which spreads more groups than an axis may have over y: the caller skips items beyond its count. A
-// pass with another size than 64 defines GROUP_SIZE before it includes this.
+// Size of a work group, and the item of a one-dimensional list that this invocation processes. The counterpart of
+// gpu_dispatch(), which spreads more groups than an axis may have over y: the caller skips items beyond its count. A pass
+// with another size than 64 defines GROUP_SIZE before it includes this.
 #ifndef GROUP_SIZE
 #define GROUP_SIZE 64
 #endif

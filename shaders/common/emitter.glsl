@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Emissive triangles seen from a point: one is chosen by the tree of shared/emitter.h, by power, distance and the angles
-// on both sides, and a direction to it, or, where it looks small, a point of it by its area. Conty Estevez, Kulla.
-// Importance Sampling of Many Lights with Adaptive Tree Splitting. 2018.
+// Sampling of emissive triangles from a point: the tree of shared/emitter.h chooses one by power, distance and the angles
+// on both sides; then a direction to it is chosen, or, where it looks small, a point of it by its area. Conty Estevez,
+// Kulla. Importance Sampling of Many Lights with Adaptive Tree Splitting. 2018.
 //
-// Defines: HAS_EMITTERS there are some; those of common/motion.glsl and common/texture.glsl; HAS_TEXTURES some material
-// has a texture.
+// Defines: HAS_EMITTERS the scene has some; those of common/motion.glsl and common/texture.glsl; HAS_TEXTURES some
+// material has a texture.
 
 #include "shared/emitter.h"
 #include "shared/hit.h"
@@ -43,24 +43,25 @@ emitter_leaf emitter_leaf_at(uint first_texel, uint index)
     return emitter_leaf(first.x, first.y, first.z, first.w, texelFetch(tables, texel + 1).x, 0u, 0u, 0u);
 }
 
-// The cosine of the difference of two angles of 0..pi, of 0 where the second one is larger.
+// Cosine of the difference of two angles of 0..pi; of 0 where the second one is larger.
 float cosine_within(float cosine, float other)
 {
     float sines = sqrt(max((1.0 - cosine * cosine) * (1.0 - other * other), 0.0));
     return cosine >= other ? 1.0 : cosine * other + sines;
 }
 
-// The minimum cosine at the receiver: its normal is not known more exactly (emitter_normal of path.comp).
+// Minimum cosine at the receiver, whose normal is known only up to this (emitter_normal of path.comp).
 const float EMITTER_COSINE_SLACK = 0.01;
 
-// An upper estimate of the irradiance of a node's emitters at a point, without shadows: not 0 where any light may arrive.
+// Upper estimate of the irradiance of a node's emitters at a point, without shadows: above 0 wherever light may arrive.
 float emitter_importance(emitter_node node, vec3 position, vec3 normal)
 {
     vec3 to_middle = node.centre_radius.xyz - position;
     float squared = max(dot(to_middle, to_middle), 1e-30), radius_squared = square(node.centre_radius.w);
     to_middle *= inversesqrt(squared);
     bool inside = squared <= radius_squared;
-    float seen = inside ? -1.0 : sqrt(1.0 - radius_squared / squared); // of half the angle under which it is seen
+    // cosine of half the angle under which the node is seen
+    float seen = inside ? -1.0 : sqrt(1.0 - radius_squared / squared);
     float received = cosine_within(dot(normal, to_middle), seen) + EMITTER_COSINE_SLACK;
     float sent = cosine_within(cosine_within(abs(dot(unpack_unit(node.axis), to_middle)), node.cos_spread), seen);
     received = inside ? 1.0 : received;
@@ -95,17 +96,17 @@ emitter_triangle emitter_triangle_at(uint instance_index, uint primitive, float 
     return t;
 }
 
-// A triangle as a point sees it.
+// A triangle seen from a point.
 struct emitter_view {
     vec3 first, second, third; // unit, towards the corners
     float solid_angle;         // 0: sampled by its area
 };
 
-// Below this solid angle the area is as good, and the angles of the spherical triangle are not known well; above the
-// other one they are not, either. Steradians.
+// Solid angles, steradians, between which directions are sampled: below, sampling by the area is as good, and the angles
+// of the spherical triangle are imprecise; above, they are too.
 const float EMITTER_ANGLE_MIN = 0.01, EMITTER_ANGLE_MAX = 6.25;
 
-// The solid angle: Van Oosterom, Strackee. The Solid Angle of a Plane Triangle. 1983.
+// View of a triangle, with its solid angle: Van Oosterom, Strackee. The Solid Angle of a Plane Triangle. 1983.
 emitter_view emitter_view_of(emitter_triangle t, vec3 position)
 {
     vec3 first = t.corner - position, second = first + t.first_edge, third = first + t.second_edge;
@@ -118,7 +119,7 @@ emitter_view emitter_view_of(emitter_triangle t, vec3 position)
     return emitter_view(first, second, third, angle > EMITTER_ANGLE_MIN && angle < EMITTER_ANGLE_MAX ? angle : 0.0);
 }
 
-// The density per steradian of a point that is uniform on the triangle; 0: seen edge on.
+// Density per steradian of a point that is uniform on the triangle; 0: seen edge on.
 float emitter_density(emitter_view view, vec3 across, vec3 direction, float distance_)
 {
     float facing = 0.5 * abs(dot(across, direction)); // area times cosine
@@ -126,7 +127,7 @@ float emitter_density(emitter_view view, vec3 across, vec3 direction, float dist
     return view.solid_angle > 0.0 ? 1.0 / view.solid_angle : by_area;
 }
 
-// Between two unit vectors, exact for small ones.
+// Angle between two unit vectors, exact for small ones.
 float angle_between(vec3 a, vec3 b)
 {
     return azimuth(length(cross(a, b)), dot(a, b));
@@ -138,8 +139,8 @@ vec3 emitter_direction(emitter_view view, vec2 u)
     vec3 ab = normalize(cross(view.first, view.second)), bc = normalize(cross(view.second, view.third));
     vec3 ca = normalize(cross(view.third, view.first));
     float alpha = angle_between(ab, -ca), sin_alpha = sin(alpha), cos_alpha = cos(alpha);
-    // u.x cuts off a triangle of a part of the area, with the same first two corners; u.y is the way from the second one
-    // to the far side.
+    // u.x cuts off a triangle with that share of the area and the same first two corners; u.y is the way from the second
+    // one to the far side.
     float area = u.x * (alpha + angle_between(bc, -ab) + angle_between(ca, -bc) - PI);
     float sine = -sin(area - alpha), cosine = -cos(area - alpha);
     float k = cosine + cos_alpha, l = sine - sin_alpha * dot(view.first, view.second);
@@ -151,18 +152,19 @@ vec3 emitter_direction(emitter_view view, vec2 u)
     return z * view.second + sqrt(max(1.0 - z * z, 0.0)) * normalize(last - dot(last, view.second) * view.second);
 }
 
-// Of a point of the triangle in a direction: how much of the second and the third corner it has.
+// Weights of the second and third corner at the triangle's point in a direction.
 vec2 emitter_weights(emitter_triangle t, vec3 position, vec3 direction)
 {
     vec3 to_corner = t.corner - position;
     vec3 from_corner = direction * (dot(to_corner, t.across) / dot(direction, t.across)) - to_corner;
     vec2 weights = vec2(dot(cross(from_corner, t.second_edge), t.across), dot(cross(t.first_edge, from_corner), t.across)) /
                    dot(t.across, t.across);
-    weights = clamp(weights, 0.0, 1.0); // NaN: 0
+    weights = clamp(weights, 0.0, 1.0); // NaN becomes 0
     return weights / max(weights.x + weights.y, 1.0);
 }
 
-// The leaf of a node's tree that `number` chooses, which comes back stretched to [0, 1) again, and the probability.
+// Chooses a leaf of a node's tree. `number` chooses it and is stretched to [0, 1) again; the probability is that of the
+// leaf.
 uint emitter_choose_leaf(uint nodes, vec3 position, vec3 normal, inout float number, out float probability)
 {
     uint link = emitter_node_at(nodes, 0u).link;
@@ -179,7 +181,7 @@ uint emitter_choose_leaf(uint nodes, vec3 position, vec3 normal, inout float num
     return link & ~EMITTER_LEAF;
 }
 
-// The probability with which it chooses a leaf.
+// Probability with which emitter_choose_leaf() chooses this leaf.
 float emitter_leaf_probability(uint nodes, uint trail, vec3 position, vec3 normal, bool asked)
 {
     uint link = asked ? emitter_node_at(nodes, 0u).link : EMITTER_LEAF;
@@ -195,7 +197,7 @@ float emitter_leaf_probability(uint nodes, uint trail, vec3 position, vec3 norma
     return probability;
 }
 
-// Where the share of the i-th triangle of a leaf ends.
+// End of the share of the i-th triangle of a leaf.
 float emitter_share_end(uint shares, emitter_leaf leaf, uint i)
 {
     uint place = leaf.first_share + i;
@@ -207,7 +209,7 @@ float emitter_share(uint shares, emitter_leaf leaf, uint i)
     return emitter_share_end(shares, leaf, i) - (i > 0u ? emitter_share_end(shares, leaf, i - 1u) : 0.0);
 }
 
-// The triangle of a leaf, counted from its first one.
+// Chooses a triangle of a leaf, counted from its first one.
 uint emitter_choose_triangle(uint shares, emitter_leaf leaf, inout float number, inout float probability)
 {
     uint low = 0u, high = leaf.count - 1u;
@@ -240,7 +242,7 @@ vec3 emitter_radiance(uvec4 indices_material, vec2 weights)
     return radiance;
 }
 
-// `u`: two numbers in [0, 1) that choose the triangle and the point on it.
+// Samples a point of the emitters. `u`: two numbers in [0, 1) that choose the triangle and the point on it.
 emitter_sample emitter_sample_at(vec3 position, vec3 normal, vec2 u, float time)
 {
     emitter_starts starts = find_emitters();
@@ -263,7 +265,7 @@ emitter_sample emitter_sample_at(vec3 position, vec3 normal, vec2 u, float time)
     return result;
 }
 
-// In the place of emitter_probability() where hits do not tell which triangle they are of: the density of a point that is
+// Stands for emitter_probability() where hits do not say which triangle they are on: the density of a point that is
 // uniform on all emitters, as if it faced the ray.
 float emitter_rough_probability(float distance_)
 {
@@ -285,8 +287,8 @@ emitter_run emitter_find_run(emitter_starts starts, uint instance_index, uint pr
     return emitter_run(found.x, found.y, found.z, found.w);
 }
 
-// The density per steradian with which emitter_sample_at() finds what a ray from `position` hit; 0: it does not.
-// `asked`: false leaves the work out.
+// Density per steradian with which emitter_sample_at() finds the point that a ray from `position` hit; 0: it never does.
+// `asked`: false skips the work.
 float emitter_probability(vec3 position, vec3 normal, uint instance_index, uint primitive, vec3 direction,
                           float distance_, float time, bool asked)
 {

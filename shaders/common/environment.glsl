@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The environment infinitely far away, from the frame's uniforms.
+// Radiance and irradiance of the infinitely distant environment, from the frame's uniforms.
 // Defines: HAS_ENVIRONMENT_IMAGE its kind is ENVIRONMENT_IMAGE.
 
 #include "shared/bindings.h"
@@ -7,15 +7,15 @@
 #include "common/frame.glsl"
 #include "common/math.glsl"
 
-// The default sky of a scene without any light; server/render/environment.c integrates the same.
+// Default sky of a scene without any light; server/render/environment.c integrates the same.
 vec3 environment_sky(float up)
 {
     bool below = up < 0.0;
     return mix(vec3(SKY_HORIZON), below ? vec3(SKY_GROUND) : vec3(SKY_ZENITH), below ? min(-up * SKY_GROUND_SLOPE, 1.0) : up);
 }
 
-// The point of a direction on an equirectangular image, 0..1: rows from +y down, the middle column is -z; turned by w
-// of the colour about +y.
+// Place of a direction on an equirectangular image, 0..1: rows from +y down, the middle column is -z; turned about +y by
+// w of the colour.
 vec2 environment_place(vec3 direction)
 {
     float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
@@ -23,7 +23,7 @@ vec2 environment_place(vec3 direction)
     return vec2(azimuth(d.x, -d.z) / TWO_PI + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
 }
 
-// From the image's own axes to the world's.
+// Rotates from the image's own axes to the world's.
 vec3 environment_turned_back(vec3 d)
 {
     float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
@@ -31,7 +31,7 @@ vec3 environment_turned_back(vec3 d)
 }
 
 #ifdef HAS_ENVIRONMENT_IMAGE
-// Filtered here, as the columns wrap and the rows do not, whatever the texture's own state is.
+// The shader filters, whatever the texture's own state is, as columns wrap and rows do not.
 layout(binding = UNIT_ENVIRONMENT) uniform sampler2D environment_image;
 
 vec3 environment_image_radiance(vec3 direction)
@@ -61,7 +61,7 @@ vec3 environment_radiance(vec3 direction)
     return frame.environment_kind != ENVIRONMENT_NONE ? frame.environment_colour.rgb : vec3(0.0);
 }
 
-// Behind the surfaces of the picture; not in mirrors and glass.
+// Whether the picture hides the environment behind its surfaces; mirrors and glass show it all the same.
 bool environment_is_hidden()
 {
     return frame.far_width.z != 0.0;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Samples a direction of the environment in proportion to its radiance: per cell of a table over the directions, rows
 // from +y down, made by server/render/environment_choice.c. An environment of one colour is equally bright everywhere,
-// so it is sampled by the cosine.
+// and sampled by the cosine.
 //
-// The table: rows + 1 sums up to each row, then for each row columns + 1 sums up to each column, as shares of all.
+// The table: rows + 1 sums up to each row, then for each row columns + 1 sums up to each column, as shares of the total.
 //
 // Defines: HAS_ENVIRONMENT_TABLE there is a table; those of common/environment.glsl.
 
@@ -13,7 +13,7 @@
 layout(binding = UNIT_SHADE_ENVIRONMENT) uniform samplerBuffer environment_table;
 uniform uint environment_rows, environment_columns;
 
-// The last of `count` cells whose sum begins at or below u, and the position of u in it, 0..1.
+// Finds the last of `count` cells whose sum begins at or below u, and the position of u in it, 0..1.
 uint environment_cell(uint first, uint count, float u, out float rest, out float share)
 {
     uint low = 0u, high = count;
@@ -41,7 +41,7 @@ float environment_solid_angle(uint row)
 }
 #endif
 
-// `probability`: per steradian; 0: there is none.
+// Chooses a direction. `probability`: per steradian; 0: there is none.
 vec3 environment_choose(vec3 normal, vec2 u, out float probability)
 {
 #ifdef HAS_ENVIRONMENT_TABLE
@@ -64,7 +64,7 @@ vec3 environment_choose(vec3 normal, vec2 u, out float probability)
 #endif
 }
 
-// The probability density of a direction that another technique sampled.
+// Probability density of a direction that another technique sampled.
 float environment_probability(vec3 normal, vec3 direction)
 {
 #ifdef HAS_ENVIRONMENT_TABLE

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What rough facets mirror of the light from all around, at the first go and afterwards. Kulla, Conty. Revisiting
-// Physically Based Shading at Imageworks. 2017: what a facet mirrors into another one is not lost but comes out sooner
-// or later, in all directions.
+// Albedo of rough facets, by the first reflection and by further ones. Kulla, Conty. Revisiting Physically Based Shading
+// at Imageworks. 2017: light that a facet mirrors into another one is not lost but leaves the surface after further
+// reflections, in all directions.
 //
-// Polynomials fitted to integrals over the facets of common/facets.glsl, each to the side where no energy is made. For
+// Polynomials fitted to integrals over the facets of common/facets.glsl, erring on the side that creates no energy. For
 // cosines above 0.08 they are off by at most
 //
-//   lost        -0.007 (of what arrives)
+//   lost        -0.007 (of the arriving light)
 //   dielectric  +0.006 for an index of 1.1 to 2.4; beyond it -0.025 to +0.005
 //   means       those of the functions above within 0.004
 //
-// `stretched`: the cosine where the surface is so stretched that its facets are spheres' (stretched_cosine()).
+// `stretched`: the cosine after a stretch of the surface that makes its facets those of a sphere (stretched_cosine()).
 //
 // Defines: WARD the facets are Ward's, else GGX's.
 
@@ -45,7 +45,7 @@ float stretched_cosine(float cosine, float alpha)
     return cosine * inversesqrt(mix(square(alpha), 1.0, square(cosine)));
 }
 
-// The share that facets which mirror all send from a direction into other facets.
+// Share of the light from a direction that fully reflecting facets send into other facets.
 float facets_lost(float stretched, float alpha)
 {
     float s = stretched, s2 = s * s, a2 = alpha * alpha;
@@ -55,7 +55,7 @@ float facets_lost(float stretched, float alpha)
     return max(s * share / (1.0 + by_alpha + by_cosine), 0.0);
 }
 
-// The mean of it over the hemisphere, cosine-weighted.
+// Mean of facets_lost() over the hemisphere, cosine-weighted.
 float facets_lost_mean(float alpha)
 {
     float r = sqrt(alpha), r3 = r * alpha;
@@ -63,7 +63,7 @@ float facets_lost_mean(float alpha)
     return alpha * alpha * (dot(LOST_MEAN, powers) + r3 * dot(LOST_MEAN_HIGH, powers));
 }
 
-// The cosine to the facet at which its reflectance is the mean one of the facets that are seen and lit.
+// Cosine to the facet at which its reflectance is the mean over the facets that are seen and lit.
 float facets_cosine(float cosine, float alpha)
 {
     float r = sqrt(alpha), x = cosine / (cosine + alpha);
@@ -71,17 +71,17 @@ float facets_cosine(float cosine, float alpha)
     return cosine + r * (dot(COSINE, vec4(1.0, r, alpha, alpha * r)) + x * upright);
 }
 
-// The cosine at which a dielectric's curve has the mean of the facets that are seen and lit. `mean`: facets_cosine().
+// Cosine at which a dielectric's curve has the mean over the facets that are seen and lit. `mean`: facets_cosine().
 float facets_dielectric_cosine(float mean, float alpha, float ior)
 {
-    // Where Fresnel's curve is bent the most, facets at the horizon count for more than the mean one.
+    // Where Fresnel's curve bends the most, facets at the horizon count for more than the mean one.
     float r = sqrt(alpha), s = (ior - 1.0) / (ior + 1.0);
     float bent = max(1.0 / (s + 0.04) - 1.0 / 0.24, 0.0) * (COSINE_THIN.x + COSINE_THIN.y * r) + max(s - 0.29, 0.0) *
                  square(1.0 - mean);
     return clamp(mean * max(1.0 - bent * r * square(1.0 - mean), 0.1), 1e-4, 1.0);
 }
 
-// The share that facets of a dielectric mirror at the first go.
+// Share that facets of a dielectric mirror at the first reflection.
 float facets_dielectric(float mean, float lost, float alpha, float ior)
 {
     return (1.0 - lost) * fresnel_dielectric(facets_dielectric_cosine(mean, alpha, ior), ior);
@@ -95,8 +95,8 @@ float facets_dielectric_mean(float alpha, float ior)
     return s * (dot(DIELECTRIC_MEAN_0, powers) + s * steeper);
 }
 
-// The colour of what a metal mirrors more than once, as a share of facets_lost(): its mean reflectance for each facet,
-// of which some send it out and the others on to further ones. Hill. A Multi-Faceted Exploration. 2018.
+// Colour of a metal's multiple reflections, as a share of facets_lost(): its mean reflectance for each facet, some of
+// which send the light out and the others on to further facets. Hill. A Multi-Faceted Exploration. 2018.
 vec3 metal_again(vec3 mean, float lost_mean)
 {
     return mean * mean * (1.0 - lost_mean) / (1.0 - mean * lost_mean);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What a surface mirrors through a thin film, whose two sides' light interferes: Belcour, Barla. A Practical Extension to
-// Microfacet Theory for the Modeling of Varying Iridescence. 2017, as KHR_materials_iridescence has it (appendix B.3 of its
-// implementation notes): Schlick's curve at the lower side, no polarisation, and light that went to and fro up to twice.
-// The upper side obeys Fresnel's equations, as Schlick's curve is not 0 where there is no other index.
+// Reflectance of a surface under a thin film, whose two sides interfere: Belcour, Barla. A Practical Extension to
+// Microfacet Theory for the Modeling of Varying Iridescence. 2017, in the form of KHR_materials_iridescence (appendix B.3
+// of its implementation notes): Schlick's curve at the lower side, no polarisation, and up to two round trips of the
+// light. The upper side obeys Fresnel's equations, as Schlick's curve is not 0 where both indices are equal.
 //
 // Defines: HAS_IRIDESCENCE some material has a thin film.
 
@@ -10,13 +10,13 @@
 #include "common/material.glsl"
 
 #ifdef HAS_IRIDESCENCE
-// Thinner films go over to none, nanometres.
+// Thickness, nanometres, below which a film fades out.
 const float FILM_THIN_NM = 0.03;
-// Indices are those of what mirrors at most so much.
+// Maximum reflectance for which an index is computed.
 const float FILM_F0_MAX = 0.9999;
 
-// Its spectrum by what eyes see of it, as Rec. 709: section 4.1, Gaussians fitted to CIE 1931 in the Fourier domain.
-// `difference_nm`: of the two optical paths; `shift`: of their phases.
+// Spectrum of interference as the eye perceives it, in Rec. 709: section 4.1, Gaussians fitted to CIE 1931 in the Fourier
+// domain. `difference_nm`: of the two optical paths; `shift`: of their phases.
 vec3 film_sensitivity(float difference_nm, vec3 shift)
 {
     const vec3 HEIGHT = vec3(5.4856e-13, 4.4201e-13, 5.2481e-13), PLACE = vec3(1.6810e+06, 1.7953e+06, 2.2084e+06),
@@ -36,11 +36,11 @@ vec3 film_schlick(vec3 f0, float cosine)
     return f0 + (1.0 - f0) * (m2 * m2 * m);
 }
 
-// The reflectance of a film over what mirrors `f0` in air.
+// Reflectance of a film over a surface that mirrors `f0` in air.
 vec3 film_reflectance(float cosine, float ior, float thickness_nm, vec3 f0)
 {
     ior = mix(1.0, ior, smoothstep(0.0, FILM_THIN_NM, thickness_nm));
-    float within = sqrt(max(1.0 - (1.0 - square(cosine)) / square(ior), 0.0)); // the cosine there
+    float within = sqrt(max(1.0 - (1.0 - square(cosine)) / square(ior), 0.0)); // cosine within the film
     float first = fresnel_dielectric(cosine, ior), passes = 1.0 - first;
     vec3 root = sqrt(clamp(f0, 0.0, FILM_F0_MAX)), base_ior = (1.0 + root) / (1.0 - root);
     vec3 step_ = (base_ior - ior) / (base_ior + ior), second = film_schlick(step_ * step_, within);
@@ -52,10 +52,10 @@ vec3 film_reflectance(float cosine, float ior, float thickness_nm, vec3 f0)
         order *= sqrt(both);
         sum += order * 2.0 * film_sensitivity(float(m) * difference_nm, float(m) * shift);
     }
-    return clamp(sum, 0.0, 1.0); // colours beyond Rec. 709 are cut off
+    return clamp(sum, 0.0, 1.0); // clamps colours beyond Rec. 709
 }
 
-// Of a surface, dielectric or metal.
+// Reflectance of a surface with a film, dielectric or metal.
 vec3 film_of(surface s, float cosine)
 {
     vec3 dielectric = vec3(square((s.ior - 1.0) / (s.ior + 1.0)));
@@ -65,17 +65,17 @@ vec3 film_of(surface s, float cosine)
     return film_reflectance(cosine, s.film_ior, s.film_nm, mix(dielectric, s.base, s.metallic));
 }
 
-// Its mean over facets, of which three stand for all: Gauss' quadrature over the shares of those whose angle is less. A
-// film's curve bends too often for one of them to do: that made up to 1.14 of the light, or left 0.93.
+// Mean of film_of() over facets, represented by three: Gauss' quadrature over the shares of those with a smaller angle. A
+// film's curve bends too often for a single one: that made up to 1.14 of the light, or left 0.93.
 vec3 film_of_three(surface s, vec3 cosines)
 {
     return (5.0 * film_of(s, cosines.x) + 8.0 * film_of(s, cosines.y) + 5.0 * film_of(s, cosines.z)) / 18.0;
 }
 
-// Of the facets that are seen and lit. The distances between the three, and of the middle one from the view's cosine, are
-// polynomials fitted to integrals over GGX facets (common/facets.glsl) under 45 films of 80 to 1200 nm and of indices up to
-// 2.2: what is mirrored is off by -0.008 to 0.010 for cosines above 0.1, so of white plastic with a film 0.983 to 1.009 is
-// left at an angle, and 0.996 to 0.999 of all of them.
+// Reflectance of the facets that are seen and lit. The distances between the three, and of the middle one from the view's
+// cosine, are polynomials fitted to integrals over GGX facets (common/facets.glsl) under 45 films of 80 to 1200 nm and of
+// indices up to 2.2. The reflectance is off by -0.008 to 0.010 for cosines above 0.1, so white plastic with a film keeps
+// 0.983 to 1.009 of the light at an angle, and 0.996 to 0.999 over all angles.
 vec3 facets_film(surface s, float cosine, float alpha)
 {
     float r = sqrt(alpha), x = cosine / (cosine + alpha);
@@ -89,7 +89,7 @@ vec3 facets_film(surface s, float cosine, float alpha)
     return film_of_three(s, clamp(cosines, 1e-4, 1.0));
 }
 
-// The mean over the hemisphere, cosine-weighted, by as much as they mirror; fitted to that of the former.
+// Mean of facets_film() over the hemisphere, cosine-weighted; fitted.
 vec3 facets_film_mean(surface s, float alpha)
 {
     float r = sqrt(alpha);

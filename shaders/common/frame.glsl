@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The uniforms of every pass of a frame (shared/frame.h).
+// Uniforms of every pass of a frame (shared/frame.h).
 
 #include "shared/frame.h"
 
@@ -17,7 +17,7 @@ frame_uniforms frame_at_start()
     COPY(light_count), COPY(depth), COPY(seed), COPY(group_shift), COPY(view_width), COPY(view_height);
     return f;
 }
-frame_uniforms frame = frame_at_start(); // but for what is found by an index
+frame_uniforms frame = frame_at_start(); // except for members found by an index
 #else
 #define frame frame_in_block
 #endif

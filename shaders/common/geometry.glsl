@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scene's geometry on the device: what gpu_scene_bind() binds. Layouts: shared/geometry.h. NO_COLOURS: see
+// Geometry of the scene on the device, bound by gpu_scene_bind(). Layouts: shared/geometry.h. NO_COLOURS: see
 // common/attributes.glsl.
 #include "shared/bindings.h"
 #include "shared/geometry.h"

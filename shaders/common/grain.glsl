@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The facets of a surface, which may be stretched along a grain (KHR_materials_anisotropy), and what the polynomials of
-// common/facet_albedo.glsl, which know no grain, say of them.
+// Facets of a surface, which may be stretched along a grain (KHR_materials_anisotropy), and their albedo by the
+// polynomials of common/facet_albedo.glsl, which know no grain.
 //
 // Defines: those of common/material.glsl.
 
@@ -20,7 +20,7 @@ vec2 facet_alpha(surface s, float roughness)
 #endif
 }
 
-// For polynomials that know only one: theirs, and how much of what these say is surely lost. Fitted so that a white
+// Roughness for polynomials that know only one, and the share that these surely overlook as lost. Fitted so that a white
 // metal, of any roughness and grain, keeps 0.974 to 1.000 of the light from all around, and at no angle more than 1.005.
 vec2 facet_alpha_mean(vec2 alpha)
 {
@@ -43,7 +43,7 @@ float facets_alpha(surface s)
     return facet_alpha_mean(facet_alpha(s, s.roughness)).x;
 }
 
-// The roughness of a surface without a grain that blurs as much.
+// Roughness of a surface without a grain that blurs as much.
 float blurring_roughness(surface s)
 {
 #ifdef HAS_ANISOTROPY
@@ -53,13 +53,13 @@ float blurring_roughness(surface s)
 #endif
 }
 
-// Whether they are not the surface itself.
+// Whether the facets are rough enough to differ from the surface itself.
 bool facets_are_rough(surface s)
 {
     return facet_alpha(s, s.roughness).x > FACET_ALPHA_MIN;
 }
 
-// Of such facets, to choose one of them: none is the surface itself.
+// Roughness of rough facets for sampling one of them, along and across the grain.
 vec2 sampled_alpha(surface s)
 {
     return max(facet_alpha(s, s.roughness), FACET_ALPHA_MIN);
@@ -76,7 +76,7 @@ void facet_axes(surface s, out vec3 x, out vec3 y)
 #endif
 }
 
-// facets_lost() of a direction to whose cosine, positive, the facets are seen.
+// facets_lost() of a direction; the facets are seen at `cosine`, positive.
 float facets_lost_from(surface s, vec3 direction, float cosine)
 {
 #ifdef HAS_ANISOTROPY
@@ -91,8 +91,8 @@ float facets_lost_from(surface s, vec3 direction, float cosine)
 #endif
 }
 
-// Cook and Torrance 1982, without Fresnel's share: what facets as rough as is said mirror from a light to the eye, per
-// steradian and without the cosine, if they mirror all.
+// Reflection of fully reflecting facets of this roughness from a light to the eye, per steradian and without the cosine:
+// Cook and Torrance 1982, without Fresnel's factor.
 float facets_mirror(surface s, float roughness, vec3 view, float NoV, vec3 light, float NoL)
 {
     vec3 half_way = normalize(view + light);
@@ -103,7 +103,7 @@ float facets_mirror(surface s, float roughness, vec3 view, float NoV, vec3 light
     float seen = length(vec3(alpha * vec2(dot(view, x), dot(view, y)), NoV));
     float lit = length(vec3(alpha * vec2(dot(light, x), dot(light, y)), NoL));
     float density = facet_density_ggx(vec3(dot(half_way, x), dot(half_way, y), dot(half_way, s.normal)), alpha);
-    return density * (0.5 / max(NoL * seen + NoV * lit, 1e-7)); // as V_SmithGGXCorrelated()
+    return density * (0.5 / max(NoL * seen + NoV * lit, 1e-7)); // in the form of V_SmithGGXCorrelated()
 #else
     vec3 across = cross(s.normal, half_way);
     float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), alpha = square(roughness);

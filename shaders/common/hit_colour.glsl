@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The colour of a hit in 32 bits: roots of linear light, so that dark colours are no steps.
+// Packing of a hit's colour.
+
+// Colour of a hit in 32 bits: square roots of linear light, which keep dark colours smooth.
 uint pack_hit_colour(vec4 colour)
 {
     return packUnorm4x8(vec4(sqrt(clamp(colour.rgb, 0.0, 1.0)), colour.a));

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Rays against triangles, spheres and discs. Directions need not be unit: distances are in their lengths.
+// Intersections of rays with triangles, spheres and discs. Directions need not be unit: distances are in their lengths.
 
-// Triangle with the vertices relative to the ray's origin. Distance and the barycentrics of the second and
-// third vertex; both sides count. The edge functions are those of Pluecker coordinates, each computed from the
-// edge's difference and sum, so that two triangles that share an edge get exactly opposite values for it and no
-// ray passes between them; `precise` keeps the compiler from fusing the products differently on each side, and
-// gives all programs the same answer.
-// Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2013; the form is that of Embree's robust mode.
+// Intersects a triangle, whose vertices are relative to the ray's origin. Gives the distance and the barycentrics of the
+// second and third vertex; both sides count. The edge functions are those of Pluecker coordinates, each computed from the
+// edge's difference and sum, so that two triangles that share an edge get exactly opposite values for it and no ray
+// passes between them; `precise` keeps the compiler from fusing the products differently on each side, and gives all
+// programs the same answer. Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2013; the form is that of
+// Embree's robust mode.
 bool intersect_triangle(vec3 direction, vec3 v0, vec3 v1, vec3 v2, out float distance, out vec2 barycentrics)
 {
     precise float w0 = dot(cross(v2 - v1, v2 + v1), direction);
@@ -27,7 +27,7 @@ bool intersect_triangle(vec3 direction, vec3 v0, vec3 v1, vec3 v2, out float dis
 }
 
 // The intersections of the ray's line with a sphere. The discriminant is computed from the distance of the closest
-// point, which loses nothing where the sphere is small or far, and the roots by the form without cancellation. Haines,
+// point, which stays precise where the sphere is small or far, and the roots by the form without cancellation. Haines,
 // Guenther, Akenine-Moeller, Precision Improvements for Ray/Sphere Intersection, Ray Tracing Gems, ch. 7.
 bool intersect_sphere(vec3 origin, vec3 direction, vec3 centre, float radius, out vec2 distances)
 {

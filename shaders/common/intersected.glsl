@@ -4,7 +4,7 @@
 #include "shared/hit.h"
 #include "common/candidate.glsl"
 
-// The last ones, to distinguish one surface with two samples from two surfaces: distances, positive if the ray came
+// The last ones, which distinguish one surface with two samples from two surfaces: distances, positive if the ray came
 // from behind, and materials.
 struct intersected_surfaces {
     vec4 distances;
@@ -16,9 +16,9 @@ intersected_surfaces intersected_nothing()
     return intersected_surfaces(vec4(1e30), uvec4(HIT_NO_PRIMITIVE));
 }
 
-// A surface that transmits `through` of the light is intersected at a distance; `side` is positive if the ray comes
-// from behind. Samples of one surface overlap by the slack, and where images meet by up to a cell: `near`. Adds its
-// own to `optical_depth`, if it is not one of the last, or is opaque.
+// Adds a surface that transmits `through` of the light at a distance to `optical_depth`, unless it is one of the last
+// ones; an opaque one always. `side` is positive if the ray comes from behind. Samples of one surface overlap by the
+// slack, and where images meet by up to a cell: `near`.
 void add_intersected(inout intersected_surfaces intersected, inout vec3 optical_depth, uint material_index,
                      float distance_, float side, float near, vec3 through)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a ray intersects the one triangle that it is known to hit.
+// Intersection of a ray with the triangle that it is known to hit.
 //
 // A rasteriser, and a traversal that tests triangles relative to another point than the ray's origin, decide by their
 // own rounding which triangle is hit, so at an edge the exact test may just miss it: the point is then moved to the
@@ -40,6 +40,6 @@ candidate candidate_triangle(uint instance_index, uint primitive, vec3 origin, v
     vec3 weights = clamped_weights(d, v0, v1, v2);
     found.barycentrics = weights.yz;
     vec3 place = v0 * weights.x + v1 * weights.y + v2 * weights.z;
-    found.distance = dot(place, d) / dot(d, d); // of the point of the ray that is nearest to it
+    found.distance = dot(place, d) / dot(d, d); // distance of the ray's point nearest to it
     return found;
 }

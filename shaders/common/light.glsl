@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lights seen from a point. Units as in the protocol: intensity, irradiance or radiance by kind.
+// Samples of lights seen from a point. Units as in the protocol: intensity, irradiance or radiance by kind.
 // Defines: HAS_AREA_LIGHTS some light is a rectangle or a sphere. LIGHT_GROUPS see render/light_layers.glsl.
 
 #include "shared/bindings.h"
@@ -26,8 +26,8 @@ uint group_of_light(uint index)
 
 struct light_sample {
     vec3 direction;  // unit, towards the light
-    float distance_; // to the point that was chosen on it
-    vec3 irradiance; // of a surface that faces it, without shadows; 0: no light arrives
+    float distance_; // distance to the chosen point
+    vec3 irradiance; // irradiance of a surface that faces the light, without shadows; 0: no light arrives
 };
 
 // KHR_lights_punctual: inverse square, fading to 0 at the range.
@@ -38,7 +38,7 @@ float light_falloff(float distance_, float range)
         float ratio = distance_ / range;
         window = clamp(1.0 - ratio * ratio * ratio * ratio, 0.0, 1.0);
     }
-    return window / max(distance_ * distance_, 1e-12); // at the light itself: very bright, but finite
+    return window / max(distance_ * distance_, 1e-12); // bounded, but very bright, at the light itself
 }
 
 // KHR_lights_punctual's smooth cone.
@@ -57,13 +57,13 @@ light_sample light_sample_rectangle(light l, vec3 position, vec2 u)
     float distance_ = length(to_light);
     vec3 direction = to_light / max(distance_, 1e-12);
     float area = 4.0 * length(cross(half_u, half_v));
-    float facing = max(dot(l.direction_range.xyz, -direction), 0.0); // shines from one side
+    float facing = max(dot(l.direction_range.xyz, -direction), 0.0); // emits from one side only
     return light_sample(direction, distance_,
                         l.colour.rgb * (facing * area / max(distance_ * distance_, 1e-12)));
 }
 
-// Uniform in the cone of directions that meet the sphere (Pharr, Jakob, Humphreys. Physically Based Rendering.
-// 6.2.4). From inside it there is no such cone, and it gives no light.
+// Samples uniformly in the cone of directions that meet the sphere (Pharr, Jakob, Humphreys. Physically Based Rendering.
+// 6.2.4). Inside the sphere there is no such cone, and no light arrives.
 light_sample light_sample_sphere(light l, vec3 position, vec2 u)
 {
     vec3 to_centre = l.position_kind.xyz - position;
@@ -84,8 +84,8 @@ light_sample light_sample_sphere(light l, vec3 position, vec2 u)
     return light_sample(direction, reach, l.colour.rgb * (TWO_PI * one_minus_cos_max));
 }
 
-// The distance at which a ray (unit direction) hits an area light on its emitting side; -1: it misses. `probability`:
-// the density per steradian with which light_sample_at() samples that direction from the ray's origin.
+// Distance at which a ray (unit direction) hits an area light on its emitting side; -1: it misses. `probability`: the
+// density per steradian with which light_sample_at() samples that direction from the ray's origin.
 float light_meet(light l, vec3 origin, vec3 direction, out float probability)
 {
     vec3 to_middle = l.position_kind.xyz - origin;
@@ -94,7 +94,7 @@ float light_meet(light l, vec3 origin, vec3 direction, out float probability)
         vec3 half_u = l.half_u_inner.xyz, half_v = l.half_v_outer.xyz, normal = l.direction_range.xyz;
         float facing = -dot(normal, direction), distance_ = -dot(normal, to_middle) / facing;
         vec3 from_middle = distance_ * direction - to_middle, across = cross(half_u, half_v);
-        float area = dot(across, across); // of a quarter, squared
+        float area = dot(across, across); // squared area of a quarter of the light
         vec2 place = vec2(dot(cross(from_middle, half_v), across), dot(cross(half_u, from_middle), across)) / area;
         if (!(facing > 0.0 && distance_ > 0.0 && abs(place.x) <= 1.0 && abs(place.y) <= 1.0))
             return -1.0;
@@ -111,7 +111,7 @@ float light_meet(light l, vec3 origin, vec3 direction, out float probability)
     return along - sqrt(inside);
 }
 
-// The density of a sample's direction; 0: the light has no extent, and only light_sample_at() finds it.
+// Density of a sample's direction; 0: the light has no extent, and only light_sample_at() finds it.
 float light_probability(light l, light_sample sampled)
 {
     int kind = int(l.position_kind.w);
@@ -122,7 +122,7 @@ float light_probability(light l, light_sample sampled)
 }
 #endif
 
-// `u`: two numbers in [0, 1) that choose the point of an area light.
+// Samples a light. `u`: two numbers in [0, 1) that choose the point of an area light.
 light_sample light_sample_at(uint index, vec3 position, vec2 u)
 {
     light l = light_at(index);

@@ -5,12 +5,12 @@
 #include "common/light.glsl"
 #include "common/scattering.glsl"
 
-// The properties of a surface that weigh its lights.
+// Properties of a surface that weigh its lights.
 struct light_receiver {
     vec3 position, normal, view;
     float scattered, mirrored; // reflectances
-    float alpha;               // of the facets
-    float passed;              // reflectance of what is scattered from the other side
+    float alpha;               // roughness of the facets
+    float passed;              // reflectance of light scattered from the other side
 #ifdef HAS_CLEARCOAT
     vec3 coat_normal;
     float coat_mirrored, coat_alpha;
@@ -19,7 +19,7 @@ struct light_receiver {
 
 light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 view, float NoV)
 {
-    // A slanted mirror is dim at its own angle, but not at that of every facet: never 0.
+    // A slanted mirror is dim at its own angle, but not at that of every facet: the estimate stays above 0.
     return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again + sheen_of(parts)) * INVERSE_PI,
                           (max_component(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
                           square(max(blurring_roughness(s), ROUGHNESS_MIN_LIGHT)), max_component(passed_of(parts)) * INVERSE_PI
@@ -30,17 +30,17 @@ light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 vie
     );
 }
 
-// The highlight of GGX, widened by the light's extent (Karis. Real Shading in Unreal Engine 4. 2013).
+// Highlight of GGX, widened by the light's extent (Karis. Real Shading in Unreal Engine 4. 2013).
 float highlight_estimate(vec3 normal, vec3 half_way, float alpha)
 {
     float NoH = max(dot(normal, half_way), 0.0), wide = alpha * alpha, spread = 1.0 + NoH * NoH * (wide - 1.0) + 1e-6;
     return wide / (PI * spread * spread);
 }
 
-// What is known of a light before a point of it is chosen.
+// Estimates for a light before a point of it is chosen.
 struct light_outlook {
-    float scattered, mirrored; // estimates of its unshadowed radiance at the eye: one is positive wherever the true one is
-    float reach;               // the distance of its points from its centre, as a share of the distance to it
+    float scattered, mirrored; // unshadowed radiance at the eye, estimated: one is positive wherever the true one is
+    float reach;               // radius of its extent, as a share of the distance to its centre
 };
 
 light_outlook light_outlook_of(uint index, light_receiver r)
@@ -89,8 +89,8 @@ float light_estimate(uint index, light_receiver r)
     return outlook.scattered + outlook.mirrored;
 }
 
-// Where there are emitters beside the lights (common/emitter.glsl): the probability of asking for a light. By the
-// estimates of both, which are rough: neither is asked for in less than a tenth of all cases.
+// Probability of choosing a light rather than an emitter, where there are both (common/emitter.glsl). The estimates of
+// both are rough, so neither is chosen in less than a tenth of all cases.
 float lights_share(light_receiver r, float all_lights, float emitters)
 {
     const float SHARE_MIN = 0.1;
@@ -98,14 +98,14 @@ float lights_share(light_receiver r, float all_lights, float emitters)
     return all_lights > 0.0 ? (other > 0.0 ? clamp(share, SHARE_MIN, 1.0 - SHARE_MIN) : 1.0) : 0.0;
 }
 
-// Chooses a light with a probability in proportion to its estimate. `number` in [0, 1) chooses it and comes back
-// stretched to [0, 1) again. Probability 0: no light arrives here.
+// Chooses a light with a probability in proportion to its estimate. `number` in [0, 1) chooses it and is stretched to [0,
+// 1) again. Probability 0: no light arrives here.
 uint light_choose(light_receiver r, uint light_count, inout float number, out float probability, out float sum)
 {
     uint chosen = 0u;
     float own = 0.0;
     sum = 0.0;
-    // Each light gets the lower end of the interval that the ones before it have left.
+    // Each light gets the lower end of the interval left by the ones before it.
     for (uint i = 0u; i < light_count; i++) {
         float estimate = light_estimate(i, r);
         sum += estimate;

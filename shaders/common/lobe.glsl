@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// One ray for all reflection and refraction of a surface: chooses a visible facet, and whether it reflects or refracts.
+// Choice of a single ray for all reflection and refraction of a surface: a visible facet, which reflects or refracts.
 //
 // Facets are distributed as in brdf(): GGX, each a smooth mirror or window by Fresnel's equations (metal: Schlick),
-// with the alpha that glTF has, the square of the roughness. On a smooth surface, the ray's direction and mean weight
-// are those of whitted.
+// with glTF's alpha, the square of the roughness. On a smooth surface, the ray's direction and mean weight are those of
+// whitted.
 //
-// What a facet would mirror into another one: metal mirrors it again, as in brdf(); glass lets it through at the first
-// facet, or, from inside, keeps it as the flat surface would. So glass loses no light at any roughness, and needs no
-// table of what single facets lose.
+// Light that a facet would mirror into another one is mirrored again by metal, as in brdf(); glass transmits it at the
+// first facet, or, from inside, keeps it as the flat surface would. So glass loses no light at any roughness, and needs
+// no table of what single facets lose.
 
 #include "common/environment.glsl"
 #include "common/grain.glsl"
 #include "common/scattering.glsl"
 
-// The minimum chance of a mirror beside a window where surfaces shine, which rays alone find: few samples find them.
+// Minimum chance of a mirror beside a window in scenes with emitters: only rays find them, and few samples do.
 #ifdef HAS_EMITTERS
 const float MIRROR_CHANCE_MIN = 0.125;
 #else
@@ -22,21 +22,21 @@ const float MIRROR_CHANCE_MIN = 0.0;
 
 struct lobe {
     vec3 direction;    // unit
-    vec3 weight;       // of the radiance along it; 0: there is no ray
+    vec3 weight;       // factor of the radiance along it; 0: there is no ray
     float solid_angle; // 1 / the density with which it was chosen, steradians; 0: the surface is smooth
-    vec3 scattered;    // of split_light(), of the facet where glass is seen from inside
+    vec3 scattered;    // split_light()'s, for the facet where glass is seen from inside
     bool back;         // mirrored, once or again
-    float roughness;   // of what sends it on
+    float roughness;   // roughness of the lobe
 };
 
-// The lit share of the visible facets, both correlated by height as in V_SmithGGXCorrelated(). 0 below the horizon.
+// Lit share of the visible facets, correlated by height as in V_SmithGGXCorrelated(). 0 below the horizon.
 float lit_share(float NoV, float NoL, float alpha)
 {
     float a2 = alpha * alpha, v = sqrt(a2 + (1.0 - a2) * NoV * NoV), l = sqrt(a2 + (1.0 - a2) * NoL * NoL);
     return max(NoL, 0.0) * (NoV + v) / max(NoV * l + max(NoL, 0.0) * v, 1e-7);
 }
 
-// A direction by its cosine to the normal, from one number: its upper bits and its lower ones.
+// Cosine-weighted direction about the normal, from one number: its upper bits and its lower ones.
 vec3 again_direction(vec3 normal, float number)
 {
     vec3 x, y;
@@ -45,7 +45,8 @@ vec3 again_direction(vec3 normal, float number)
     return sine * (cos(phi) * x + sin(phi) * y) + sqrt(1.0 - number) * normal;
 }
 
-// What of the light along a direction comes out mirrored more than once, as brdf() has it, by that of all directions.
+// Share of the light along a direction that leaves after multiple reflections, by the model of brdf(), relative to the
+// mean over all directions.
 float again_share(surface s, split parts, vec3 light)
 {
     return facets_lost_from(s, light, dot(light, s.normal)) / max(parts.again_mean, 1e-9) *
@@ -53,7 +54,7 @@ float again_share(surface s, split parts, vec3 light)
 }
 
 #ifdef HAS_CLEARCOAT
-// The lobe of the coat: a visible facet's, or the smooth coat's. `chance`: with which it was chosen.
+// Lobe of the coat: a visible facet's, or the smooth coat's. `chance`: that with which it was chosen.
 lobe coat_lobe(surface s, split parts, vec3 direction, float chance, vec2 u)
 {
     float alpha = square(s.coat_roughness), NoV = coat_cosine(s, -direction), lit = 1.0;
@@ -78,14 +79,14 @@ lobe coat_lobe(surface s, split parts, vec3 direction, float chance, vec2 u)
 }
 #endif
 
-// The frame of facets, and the view in it.
+// Frame of the facets, and the view in it.
 vec3 facet_frame(surface s, float NoV, vec3 direction, out vec3 x, out vec3 y)
 {
     facet_axes(s, x, y);
     return normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
 }
 
-// Of a rough surface.
+// Lit share of a rough surface's facets.
 float facets_lit_share(surface s, float NoV, vec3 direction, vec3 light)
 {
     float NoL = dot(light, s.normal);
@@ -97,7 +98,7 @@ float facets_lit_share(surface s, float NoV, vec3 direction, vec3 light)
 #endif
 }
 
-// A facet of a rough surface that is seen along the direction. `angle`: 1 / the density with which it was chosen.
+// Chooses a facet of a rough surface that is seen along the direction. `angle`: 1 / the density of the choice.
 vec3 facet_seen(surface s, float NoV, vec3 direction, vec2 u, out float angle)
 {
     vec2 alpha = sampled_alpha(s);
@@ -108,18 +109,19 @@ vec3 facet_seen(surface s, float NoV, vec3 direction, vec2 u, out float angle)
     return facet.x * x + facet.y * y + facet.z * s.normal;
 }
 
-// Where the flat surface would send what a facet sends into another one. `side`: the unit normal of the right side.
+// Turns a direction that a facet sends into another one to where the flat surface would send it. `side`: unit normal of
+// the right side.
 vec3 turned_to(vec3 direction, vec3 side)
 {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }
 
-// What a facet, or the smooth surface, does with the light along the view.
+// Shares and directions of the light along the view, at a facet or at the smooth surface.
 struct facet_lobes {
     vec3 reflected, bent;       // directions
-    vec3 mirror, again, window; // shares; again: mirrored more than once
-    SHARE enters;               // neither is mirrored nor metal takes it
-    float window_size;          // of all colours, of which glass may disperse one
+    vec3 mirror, again, window; // shares; again: multiple reflections
+    SHARE enters;               // share that is neither mirrored nor absorbed by metal
+    float window_size;          // sum over all colours, one of which glass may disperse
 };
 
 facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, vec3 facet, bool rough, inout float number)
@@ -145,7 +147,7 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     f.bent = bent_direction(s, disperse(s, number, f.window), direction, facet, s.normal);
     if (rough && leaves)
         f.bent = turned_to(f.bent, -s.normal);
-    if (dot(f.bent, s.geometric) >= 0.0) { // totally reflected, or a tilted normal would send it back
+    if (dot(f.bent, s.geometric) >= 0.0) { // totally reflected, or sent back by a tilted normal
         f.mirror += f.window;
         f.window = vec3(0.0);
         f.window_size = 0.0;
@@ -153,7 +155,7 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     return f;
 }
 
-// What a ray of weight 1 may find that way, by an environment that is an image: at least white.
+// Brightness of an environment image in the direction of a ray of weight 1: at least white.
 float brightness_beyond(vec3 direction)
 {
 #ifdef HAS_ENVIRONMENT_TABLE
@@ -163,11 +165,11 @@ float brightness_beyond(vec3 direction)
 #endif
 }
 
-// The chances of mirror, mirrors in turn and window, by what they send and may find.
+// Chances of mirror, multiple mirrors and window, by their shares and the brightness they may meet.
 vec3 facet_chances(surface s, facet_lobes f)
 {
     float window = f.window_size;
-    if (window > 0.0 && in_glass(s)) // else there is no direction, or it goes into the glass
+    if (window > 0.0 && in_glass(s)) // otherwise there is no direction, or it goes into the glass
         window *= brightness_beyond(f.bent);
     vec3 sizes = vec3(max_component(f.mirror) * brightness_beyond(f.reflected), max_component(f.again), window);
     float all_ = sizes.x + sizes.y + sizes.z;
@@ -183,7 +185,7 @@ vec3 facet_chances(surface s, facet_lobes f)
 }
 
 #ifdef HAS_CLEARCOAT
-// The chance of its lobe among all that are sent on.
+// Chance of the coat's lobe among all of them.
 float coat_chance_of(split parts)
 {
     float below = max_component(parts.mirror + parts.again + parts.refracted);
@@ -191,8 +193,8 @@ float coat_chance_of(split parts)
 }
 #endif
 
-// `parts`: split_light() of the same surface and NoV. `choice` chooses between mirror, window and several mirrors in
-// turn, and comes back stretched; `u` chooses the facet.
+// Chooses a lobe. `parts`: split_light() of the same surface and NoV. `choice` chooses between mirror, window and
+// multiple mirrors, and is stretched to [0, 1) again; `u` chooses the facet.
 lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float choice, vec2 u)
 {
     bool rough = facets_are_rough(s), leaves = in_glass(s);
@@ -205,7 +207,7 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false, s.roughness);
     vec3 chances = facet_chances(s, f);
 #ifdef HAS_CLEARCOAT
-    // Before the facet below, by what is known of all of them.
+    // The coat is chosen before the facet below, by the mean over all facets.
     float coat_chance = coat_chance_of(parts);
     bool coated = choice < coat_chance;
     choice = clamp(coated ? choice / coat_chance : (choice - coat_chance) / (1.0 - coat_chance), 0.0, 0.99999994);
@@ -237,10 +239,10 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     return result;
 }
 
-// Of the surface below a coat, see lobe_mirrored(). The reflectance of the lobes that send light back, from a direction
-// (of light, unit) to the eye, per steradian, times the cosine; and the density with which lobe_choose() sends a ray
-// that way. Both are 0 where the surface is smooth, and for glass seen from inside. Of light that is mirrored more than
-// once, the density is a mean over the facets.
+// Reflectance of the lobes that send light back from the surface below a coat (see lobe_mirrored()), from a direction (of
+// light, unit) to the eye, per steradian, times the cosine; and the density with which lobe_choose() sends a ray that
+// way. Both are 0 where the surface is smooth, and for glass seen from inside. For multiple reflections the density is a
+// mean over the facets.
 vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
 {
     float NoL = dot(s.normal, light);
@@ -259,7 +261,7 @@ vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 ligh
     return f.mirror * mirrored + parts.again * (again_share(s, parts, light) * NoL * INVERSE_PI);
 }
 
-// Whether a lobe of it is no single direction.
+// Whether some lobe of the surface is more than a single direction.
 bool lobes_are_rough(surface s)
 {
 #ifdef HAS_CLEARCOAT
@@ -269,7 +271,7 @@ bool lobes_are_rough(surface s)
     return facets_are_rough(s);
 }
 
-// The same with the coat.
+// Reflectance and density of lobe_mirrored_below() with the coat.
 vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
 {
     vec3 sent = lobe_mirrored_below(s, parts, NoV, view, light, density);
@@ -281,14 +283,14 @@ vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out
         float highlight = coat_highlight(s, parts.coat, view, light, s.coat_roughness);
         float lit = s.coat * fresnel_dielectric(VoH, COAT_IOR) * lit_share(cosine, dot(s.coat_normal, light), alpha);
         sent += highlight;
-        density += chance * highlight / max(lit, 1e-7); // what is sent, by its weight
+        density += chance * highlight / max(lit, 1e-7); // share sent to the coat, by its weight
     }
 #endif
     return sent;
 }
 
 #ifdef HAS_AREA_LIGHTS
-// The surface whose facets mirror lights: none is smoother than a highlight.
+// The surface whose facets mirror lights: at least as rough as a highlight.
 surface surface_of_highlights(surface s)
 {
     s.roughness = max(s.roughness, ROUGHNESS_MIN_LIGHT);
@@ -307,7 +309,7 @@ float coat_share_of_highlights(split parts)
 #endif
 }
 
-// The direction (unit) from which a facet of such a surface, or of its coat, mirrors light to the eye.
+// Chooses a direction (unit) from which a facet of such a surface, or of its coat, mirrors light to the eye.
 vec3 highlight_choose(surface s, split parts, float NoV, vec3 view, vec2 u)
 {
     float unused;
@@ -323,7 +325,7 @@ vec3 highlight_choose(surface s, split parts, float NoV, vec3 view, vec2 u)
     return reflect(-view, facet_seen(s, NoV, -view, u, unused));
 }
 
-// Its density per steradian.
+// Density of highlight_choose(), per steradian.
 float highlight_density(surface s, split parts, float NoV, vec3 view, vec3 light)
 {
     vec3 facet = normalize(view + light), x, y, local_view = facet_frame(s, NoV, -view, x, y);

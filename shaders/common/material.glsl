@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// From a hit to its surface's material: textures applied.
+// Material of the surface at a hit, with its textures.
 //
-// A back face of an opaque material is shaded as if it were two-sided, double_sided or not: a model with a hole in it
-// would surprise more than one whose inside is visible. Only glass distinguishes its sides.
+// A back face of an opaque material is shaded as if it were two-sided, double_sided or not: a hole in a model would
+// surprise more than a visible inside. Only glass distinguishes its sides.
 //
-// Software GL runs both sides of every branch, so features that the scene lacks are left out by defines, and all
-// textures of a material are sampled in one place, in a loop.
+// Software GL runs both sides of every branch, so defines leave out features that the scene lacks, and all textures of a
+// material are sampled in one place, in a loop.
 //
 // Defines: NO_GLASS no material lets light through; NO_BLEND none is blended;
-// HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR the mirror of some
-// dielectric differs from what Fresnel's equations say; HAS_VOLUME some body of glass absorbs light; HAS_CLEARCOAT some
-// surface is varnished; HAS_IRIDESCENCE some has a thin film; HAS_SHEEN some is cloth; HAS_DIFFUSE_TRANSMISSION some scatters
-// light to its other side; HAS_DISPERSION some glass splits colours; HAS_THIN_WALLS some has no body; HAS_ANISOTROPY some material
-// has a grain, HAS_ANISOTROPY_MAP and some grain is a texture; HAS_SPHERES;
-// HAS_SAMPLED the hits of the wave are stored samples, but for those of discs.
+// HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR some dielectric's
+// reflectance differs from Fresnel's equations; HAS_VOLUME some body of glass absorbs light; HAS_CLEARCOAT some surface
+// is varnished; HAS_IRIDESCENCE some has a thin film; HAS_SHEEN some is cloth; HAS_DIFFUSE_TRANSMISSION some scatters
+// light to its other side; HAS_DISPERSION some glass splits colours; HAS_THIN_WALLS some glass has no body;
+// HAS_ANISOTROPY some material has a grain, HAS_ANISOTROPY_MAP some grain is a texture; HAS_SPHERES; HAS_SAMPLED the hits
+// of the wave are stored samples, except those of discs.
 
 #include "shared/hit.h"
 #include "common/cone.glsl"
@@ -25,20 +25,20 @@
 struct surface {
     vec3 position;
     vec3 geometric; // unit normals, world space, on the viewer's side
-    vec3 normal;    // shading; may lean away from the viewer
+    vec3 normal;    // shading normal; may lean away from the viewer
     vec3 base;
     float alpha;    // opacity; 1 unless it is blended
     vec3 emission;
     float metallic, roughness, transmission, ior, occlusion;
 #ifdef HAS_VOLUME
-    vec3 absorption; // of the body behind it, 1 / metre
+    vec3 absorption; // absorption of the body behind the surface, 1 / metre
 #endif
 #ifdef HAS_SPECULAR
-    vec3 specular_colour; // of a dielectric's mirror, seen from above
-    float specular;       // its share
+    vec3 specular_colour; // colour of a dielectric's mirror, seen from above
+    float specular;       // its strength
 #endif
 #ifdef HAS_CLEARCOAT
-    vec3 coat_normal;     // shading, of the varnish
+    vec3 coat_normal;     // shading normal of the varnish
     float coat, coat_roughness;
 #endif
 #ifdef HAS_IRIDESCENCE
@@ -49,19 +49,19 @@ struct surface {
     float sheen_roughness;
 #endif
 #ifdef HAS_DIFFUSE_TRANSMISSION
-    vec3 diffuse_colour;  // of the light that is scattered to the other side
+    vec3 diffuse_colour;  // colour of light scattered to the other side
     float diffuse_transmission;
 #endif
 #ifdef HAS_DISPERSION
     float dispersion;     // 20 / Abbe number
-    vec3 carried;         // the weight of the path that sees it
+    vec3 carried;         // weight of the path that reaches the surface
 #endif
 #ifdef HAS_THIN_WALLS
-    bool thin;            // light goes straight on through it
+    bool thin;            // light passes straight through it
 #endif
 #ifdef HAS_ANISOTROPY
-    vec3 grain;           // direction from the tangent, and strength
-    vec3 along;           // unit, world space, across `normal`: that direction
+    vec3 grain;           // direction relative to the tangent, and strength
+    vec3 along;           // grain direction: unit, world space, across `normal`
 #endif
     float curvature; // 1 / metre, above 0: it bulges towards the viewer; 0 if there are no textures to be filtered
     bool unlit;
@@ -77,7 +77,7 @@ bool is_thin(surface s)
     return false;
 }
 
-// Whether it is glass, seen from inside of its body.
+// Whether the surface is glass, seen from inside of its body.
 bool in_glass(surface s)
 {
 #ifdef NO_GLASS
@@ -86,13 +86,14 @@ bool in_glass(surface s)
     return s.inside && s.transmission > 0.0 && !is_thin(s);
 }
 
-// Index behind / index before, of what is refracted.
+// Index behind / index before, for refracted light.
 float index_ratio(surface s)
 {
     return is_thin(s) ? 1.0 : s.inside ? 1.0 / s.ior : s.ior;
 }
 
-// How far what is mirrored or refracted turns with the facet. The window of a thin wall spreads light as its mirror.
+// Factor by which mirrored or refracted light turns with the facet. The window of a thin wall spreads light as its mirror
+// does.
 float turn_of(surface s, bool mirrored)
 {
     return facet_turn(index_ratio(s), mirrored || is_thin(s));
@@ -106,7 +107,7 @@ vec3 channel_iors(surface s)
 }
 #endif
 
-// What a ray's cone covers of a surface: on a slanted one it is longer in the plane of incidence. Akenine-Moeller et al.
+// Footprint of a ray's cone on a surface: on a slanted one it is longer in the plane of incidence. Akenine-Moeller et al.
 // 2021 (common/cone.glsl), section 5.
 mat2x3 footprint_edges(vec3 geometric, vec3 direction, float width)
 {
@@ -121,7 +122,7 @@ mat2x3 footprint_edges(vec3 geometric, vec3 direction, float width)
 }
 
 #ifdef HAS_TEXTURES
-// How many inputs the features bring.
+// Number of inputs of each feature.
 #ifdef HAS_SPECULAR
 #define INPUTS_SPECULAR 2
 #else
@@ -149,7 +150,8 @@ mat2x3 footprint_edges(vec3 geometric, vec3 direction, float width)
 #endif
 
 #ifdef HAS_ANISOTROPY_MAP
-// KHR_materials_anisotropy: by the texture's direction, and weakened by its strength. Directions are complex numbers.
+// KHR_materials_anisotropy: turns the grain by the texture's direction, and weakens it by the texture's strength.
+// Directions are complex numbers.
 vec3 turned_grain(vec3 grain, vec3 texel, hit h, texture_slot slot)
 {
     vec2 turn = turned_by_slot(h, slot, texel.rg * 2.0 - 1.0);
@@ -194,7 +196,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 #endif
     for (int i = 0; i < uses.length(); i++)
         used |= uses[i] != 0u ? 1u << i : 0u;
-    while (used != 0u) { // not a loop over all: software GL would sample for the missing ones, too
+    while (used != 0u) { // visits used inputs only: in a loop over all, software GL would sample for the unused ones too
         int i = findLSB(used);
         used &= used - 1u;
         texture_slot slot = texture_slot_at(uses[i]);
@@ -260,7 +262,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 #endif
 
 #ifdef HAS_SAMPLED
-// The sample's values of textures and vertex colours, in their place.
+// Applies the sample's stored values in place of textures and vertex colours.
 void apply_sample(inout surface s, inout vec4 colour, material m, uvec4 words)
 {
     surface_sample stored = unpack_sample(words);
@@ -271,14 +273,14 @@ void apply_sample(inout surface s, inout vec4 colour, material m, uvec4 words)
     s.occlusion = stored.occlusion;
     s.emission *= stored.emission;
 #ifdef HAS_SPECULAR
-    if (m.texture_specular_colour != 0u) // which is not stored, and its factor says nothing without it
+    if (m.texture_specular_colour != 0u) // samples do not store it, and its factor alone is meaningless
         s.specular_colour = vec3(1.0);
 #endif
 }
 #endif
 
 #ifdef HAS_ANISOTROPY
-// A point without a tangent gets an arbitrary one.
+// Direction of the grain; an arbitrary one at a point without a tangent.
 vec3 along_grain(hit h, surface s)
 {
     vec3 x, y;
@@ -296,7 +298,7 @@ vec3 along_grain(hit h, surface s)
 }
 #endif
 
-// `width`: of the ray's cone at the hit.
+// Surface at a hit. `width`: of the ray's cone there.
 surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 {
     material m = material_at(h.material & HIT_MATERIAL_MASK);
@@ -364,7 +366,7 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
         apply_textures(s, colour, h, m, uv01, detail.footprint);
 #endif
 #ifdef NO_GLASS
-    s.transmission = 0.0; // as it is: now the compiler knows
+    s.transmission = 0.0; // already 0: tells the compiler so
 #endif
     s.base = clamp(colour.rgb, vec3(0.0), vec3(1.0));
     s.alpha = 1.0;
@@ -382,7 +384,7 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 #ifdef HAS_ANISOTROPY
     s.along = along_grain(h, s);
 #endif
-    if (in_glass(s)) { // where there is neither
+    if (in_glass(s)) { // the inside of glass has neither
 #ifdef HAS_SHEEN
         s.sheen = vec3(0.0);
 #endif

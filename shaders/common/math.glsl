@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Constants, and small functions of numbers and vectors. Software GL compiles what no program calls, too, so what
-// fewer programs need is apart: common/unit.glsl, common/affine.glsl.
+// Constants, and small functions of numbers and vectors. Software GL also compiles functions that no program calls, so
+// common/unit.glsl and common/affine.glsl have those that few programs need.
 
 const float PI = 3.14159265358979;
 const float TWO_PI = 6.28318530717959;
@@ -11,8 +11,8 @@ float square(float x)
     return x * x;
 }
 
-// a / b of whole numbers below 2^24. Software GL divides whole numbers one by one, and floats side by side: rounding can
-// take the quotient to the next number.
+// Quotient of integers below 2^24. Software GL divides integers one by one, and floats side by side: rounding may give
+// the next number.
 uint quotient(uint a, uint b)
 {
     uint q = uint(float(a) / float(b));
@@ -47,13 +47,13 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent)
     bitangent = vec3(b, s + normal.y * normal.y * a, -normal.y);
 }
 
-// Axes x y z as the image that looks along one of them has them: u v depth.
+// Permutes axes x y z to those of the image that looks along `axis`: u v depth.
 vec3 in_image(vec3 p, int axis)
 {
     return axis == 0 ? p.yzx : axis == 1 ? p.zxy : p;
 }
 
-// Whether a share of the cases is meant, by a number that comes back stretched to [0, 1) again.
+// Decides with probability `share`; `number` decides, and is stretched to [0, 1) again.
 bool is_in(float share, inout float number)
 {
     bool in_ = number < share;

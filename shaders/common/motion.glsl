@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Positions at a time: 0 when the shutter opens, 1 when it closes.
 //
-// Defines: HAS_MOTION if something moves meanwhile; without it everything is as the shutter opens, whatever the time.
+// Defines: HAS_MOTION something moves meanwhile; without it all positions are those at which the shutter opens, whatever
+// the time.
 #include "common/geometry.glsl"
 #include "common/math.glsl"
 
@@ -19,7 +20,7 @@ void world_from_object_at(uint first_texel, uint pose_count, float time, out vec
         rows[row] = mix(texelFetch(motions, texel + row), texelFetch(motions, texel + 3 + row), place - before);
 }
 
-// The inverse of an affine transform, and its determinant's sign. Entries are divided by the largest one first, so that
+// Inverts an affine transform, and returns its determinant's sign. Entries are divided by the largest one first, so that
 // products of very small or large ones stay finite. The inverse of a singular one is NaN, and no ray hits anything.
 float invert(vec4 m[3], out vec4 inverse[3])
 {
@@ -62,7 +63,7 @@ uint close_offset_of(uint geometry_index)
 #endif
 }
 
-// A vertex of a geometry whose vertices as the shutter closes lie `close_offset` behind those as it opens.
+// A vertex at a time. The vertices of its geometry at shutter close lie `close_offset` behind those at shutter open.
 vec3 position_at_time(uint vertex, uint close_offset, float time)
 {
     vec3 position = texelFetch(positions, int(vertex)).xyz;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Apart, as few stages read them, and a stage has few samplers.
+// Vertex normals, in a file of their own, as few stages read them, and a stage has few samplers.
 #include "shared/bindings.h"
 
 layout(binding = UNIT_NORMALS) uniform samplerBuffer normals; // xyz, handedness

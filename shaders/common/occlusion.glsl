@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ambient occlusion rays. Their mean is the cosine-weighted share of the directions above a surface in which nothing is
-// near.
+// Ambient occlusion rays. Their mean is the cosine-weighted share of unobstructed directions above a surface.
 //
 // A ray's length is random like its direction: with u uniform, reach * (1 - u^(1 / falloff)) exceeds t with probability
 // (1 - t / reach)^falloff. So an occluder at t has this weight in the mean, though each ray only reports whether it
@@ -8,8 +7,8 @@
 
 #include "common/math.glsl"
 
-// `u`: three numbers in [0, 1). Cosine-weighted about the shading normal; directions below the surface itself are
-// mirrored at it. `geometric`, `normal`: unit, on one side.
+// Direction of a ray, cosine-weighted about the shading normal; directions below the surface itself are mirrored at it.
+// `u`: two numbers in [0, 1). `geometric`, `normal`: unit, on one side.
 vec3 occlusion_direction(vec3 geometric, vec3 normal, vec2 u)
 {
     vec3 x, y;

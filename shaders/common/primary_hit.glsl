@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A pixel's ray against the one primitive that the rasteriser saw there.
+// Intersection of a pixel's ray with the primitive that the rasteriser drew there.
 //
 // At an edge the exact test may just miss what the rasteriser drew (common/intersection.glsl).
 //
@@ -10,7 +10,7 @@
 #include "common/intersect.glsl"
 
 #ifdef HAS_SPHERES
-// The nearest point of a sphere beyond t_min that is not cut out; distance below 0: there is none.
+// Nearest point of a sphere beyond t_min that is not cut out; distance below 0: there is none.
 candidate candidate_sphere(uint instance_index, uint primitive, vec3 origin, vec3 direction, float t_min)
 {
     vec4 rows[3] = instance_at(instance_index).object_from_world;

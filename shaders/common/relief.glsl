@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Shading normals of normal and bump maps.
+// Shading normals from normal and bump maps.
 //
 // Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map.
 
@@ -10,7 +10,7 @@
 #include "common/unit.glsl"
 
 #ifdef HAS_BUMP
-// The derivatives of the position by the texture coordinates of a slot, world space, at a hit.
+// Derivatives of the position by a slot's texture coordinates, world space, at a hit.
 bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 along_v)
 {
     along_u = along_v = vec3(0.0);
@@ -51,8 +51,8 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
 }
 
 // Blinn. Simulation of Wrinkled Surfaces. 1978, in the form of Mikkelsen. Bump Mapping Unparametrized Surfaces on
-// the GPU. 2010: the slope of the height along the surface tilts the normal. The height's derivatives are
-// differences over one texel of the level that the footprint sees.
+// the GPU. 2010: the slope of the height along the surface tilts the normal. The height's derivatives are differences
+// over one texel of the footprint's level.
 vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, texture_footprint footprint)
 {
     texture_slot slot = texture_slot_at(slot_index);
@@ -82,17 +82,17 @@ vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, texture_footpri
 #endif
 
 #ifdef HAS_TEXTURES
-// Whether the tangent at a hit is one of the mesh, which is made for the image as it lies there.
+// Whether the tangent at a hit is the mesh's own, which is made for the image as it lies there.
 bool has_own_tangent(hit h)
 {
     return h.instance != HIT_NO_PRIMITIVE && (geometry_at(instance_at(h.instance).geometry).flags & GEOMETRY_HAS_TANGENTS) != 0u;
 }
 
-// A direction of an image, x along its columns and y up, as one of the texture coordinates, along which the tangent runs:
-// a slot may turn and mirror the image on the surface.
+// Turns a direction of an image, x along its columns and y up, to one of the texture coordinates, along which the tangent
+// runs: a slot may turn and mirror the image on the surface.
 vec2 turned_by_slot(hit h, texture_slot slot, vec2 direction)
 {
-    vec2 along = slot.uv_matrix.wz; // the first row of the inverse, but for its length; v runs down and y up
+    vec2 along = slot.uv_matrix.wz; // first row of the inverse, up to its length; v runs down and y up
     float turns = slot.uv_matrix.x * slot.uv_matrix.w - slot.uv_matrix.y * slot.uv_matrix.z;
     bool keeps = along.y == 0.0 && along.x > 0.0 && turns > 0.0;
     if (keeps || turns == 0.0 || has_own_tangent(h))

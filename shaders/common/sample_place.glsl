@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Where in its view one of a pixel's current samples is, in pixels from the top left, if nothing is rasterised.
+// Place in its view of one of a pixel's current samples, in pixels from the top left, if nothing is rasterised.
 //
-// Defines: SPREAD each pixel has its samples where its own numbers say; else they are in its middle.
+// Defines: SPREAD each pixel places its samples by its own random numbers; else they are in its middle.
 #include "common/camera.glsl"
 #include "common/sequence.glsl"
 
@@ -10,7 +10,7 @@ float filter_place(int i)
     return frame_in_block.filter_places[i >> 2][i & 3];
 }
 
-// The offset of a sample from its pixel's centre, in pixels: server/render/pixel_filter.h.
+// Offset of a sample from its pixel's centre, in pixels, by server/render/pixel_filter.h.
 float filter_offset(float number)
 {
     float side = 2.0 * number - 1.0, at = sqrt(1.0 - abs(side)) * 64.0;

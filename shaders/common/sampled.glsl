@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// A place on a surface as a sampled tracer stores it: the four words of shared/surface_sample.h. They are written when
-// a surface is sampled, and read when a hit is shaded or a shadow ray needs alpha and tint. Shares are factors of the
-// material's own values.
+// Surface samples of sampled tracers: the four words of shared/surface_sample.h. They are written when a surface is
+// sampled, and read when a hit is shaded or a shadow ray needs alpha and tint. Shares are factors of the material's own
+// values.
 #include "shared/surface_sample.h"
 #include "common/colour.glsl"
 #include "common/unit.glsl"
 
 struct surface_sample {
     vec4 base_colour; // share, linear; alpha last
-    vec3 normal;      // shading, normal and bump maps applied; unit, world space, on the outer side
+    vec3 normal;      // shading normal with normal and bump maps; unit, world space, on the outer side
     uint material;    // index
     float metallic, transmission, roughness; // shares
-    float occlusion;  // itself, its strength applied
+    float occlusion;  // occlusion itself, with its strength applied
     vec3 emission;    // share
 };
 

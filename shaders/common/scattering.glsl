@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// How a surface scatters light: the shares of the light along the view that it reflects, scatters and refracts, and its
-// reflectance from a light to the eye.
+// Scattering of light at a surface: the shares of the light along the view that it reflects, scatters and refracts, and
+// its reflectance from a light to the eye.
 //
-// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation, both from rough facets. What a facet
-// sends into another one is not lost: a metal mirrors it again until it comes out, in all directions; at a dielectric it
-// enters. A rough surface has no one mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is
-// faded out and what it carried is replaced by the irradiance about that direction. What is reflected, refracted and
-// scattered adds up to what arrives and never to more, be it from all around (struct split) or from a light (brdf);
-// tests/accuracy/bsdf.c holds both to it.
+// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation, both from rough facets. Light that a
+// facet sends into another one is not lost: a metal mirrors it again until it leaves the surface, in all directions; into
+// a dielectric it enters. A rough surface has no single mirror direction, and one ray cannot blur: as the roughness
+// grows, the mirror ray fades out and the irradiance about that direction takes its place. Reflection, refraction and
+// scattering add up to the arriving light and never to more, be it from all around (struct split) or from a light (brdf);
+// tests/accuracy/bsdf.c checks both.
 //
 // Defines: those of common/material.glsl.
 
@@ -26,11 +26,11 @@ float mirror_ray_share(float roughness)
     return 1.0 - smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, roughness);
 }
 
-// How a surface splits the light along the view; below a coat: what gets through it.
+// Division of the light along the view by a surface; below a coat: of the light that passes the coat.
 struct split {
-    vec3 mirror;       // reflectance of the facets at the first go
-    vec3 again;        // what they mirror more than once
-    vec3 scattered;    // Lambert's albedo times what enters
+    vec3 mirror;       // reflectance of the facets at the first reflection
+    vec3 again;        // reflectance by further reflections
+    vec3 scattered;    // Lambert's albedo times the share that enters
     vec3 refracted;
     SHARE dielectric;  // share that does not enter
     float mirror_ray;  // share of `mirror` that the mirror ray carries; the rest is blurred
@@ -38,18 +38,19 @@ struct split {
     vec3 again_colour; // metal_again()
     SHARE enters_mean; // share of the light from all around that enters
 #ifdef HAS_SHEEN
-    vec3 sheen;          // what fibres send of the light from all around
-    float beneath;       // share of the light along the view that they leave to the rest
-    float beneath_mean;  // and of that from all around
+    vec3 sheen;          // share of the light from all around that fibres reflect
+    float beneath;       // share of the light along the view that fibres let pass
+    float beneath_mean;  // and of the light from all around
 #endif
 #ifdef HAS_DIFFUSE_TRANSMISSION
-    vec3 passed; // what is scattered to the other side
+    vec3 passed; // light scattered to the other side
 #endif
     coating coat;
 };
 
-// What lies over the surface: fibres, and a coat over these. The share of light that they let through along the view; to be
-// mirrored from a direction; and to be scattered from one and back to the view, less that along the view.
+// Layers over the surface: fibres, and a coat over these. Shares of light that they let through: along the view; from a
+// direction, to be mirrored; and from a direction, to be scattered and return to the view, divided by the share along the
+// view.
 #ifdef HAS_SHEEN
 float sheen_leaves(surface s, vec3 direction)
 {
@@ -71,7 +72,7 @@ float over_scattered(surface s, split parts, vec3 light)
     return sheen_leaves(s, light) / parts.beneath_mean * coat_over_scattered(parts.coat, s, light);
 }
 
-// What fibres send from a direction, per steradian, and of the light from all around.
+// Reflection of fibres from a direction, per steradian, and of the light from all around.
 vec3 sheen_sent(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoH = dot(s.normal, normalize(view + light)), NoL = dot(s.normal, light);
@@ -110,7 +111,8 @@ vec3 sheen_of(split parts)
 }
 #endif
 
-// KHR_materials_diffuse_transmission: of what is scattered a share leaves at the other side, as if it had entered there.
+// KHR_materials_diffuse_transmission: a share of the scattered light leaves at the other side, as if it had entered
+// there.
 #ifdef HAS_DIFFUSE_TRANSMISSION
 void scatter_to_other_side(surface s, SHARE entered, inout split parts)
 {
@@ -123,7 +125,7 @@ vec3 passed_of(split parts)
     return parts.passed;
 }
 
-// Of what is scattered, the share that goes to the other side: the chance of asking for light there.
+// Share of the scattered light that goes to the other side: the probability of sampling lights there.
 float passed_share(split parts)
 {
     float size = max_component(parts.passed);
@@ -143,8 +145,8 @@ float passed_share(split parts)
 }
 #endif
 
-// Which side of the surface to ask for light, by a number that comes back stretched to [0, 1) again, with the chance of it:
-// -1 behind it.
+// Chooses the side of the surface on which to sample lights: -1 behind it. `number` chooses and is stretched to [0, 1)
+// again; `chance` is the probability of the choice.
 float side_choose(split parts, inout float number, out float chance)
 {
     chance = 1.0;
@@ -157,7 +159,7 @@ float side_choose(split parts, inout float number, out float chance)
     return 1.0;
 }
 
-// Of a direction that another technique sampled.
+// Probability of side_choose() for the side of a direction that another technique sampled.
 float side_chance(split parts, float cosine)
 {
 #ifdef HAS_DIFFUSE_TRANSMISSION
@@ -184,13 +186,13 @@ void put_below(surface s, vec3 view, float NoV, inout split parts)
 #endif
 }
 
-// `loss`: facets_lost() of the view, whose cosine is NoV.
+// Splits the light at the facets. `loss`: facets_lost() of the view, whose cosine is NoV.
 split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
 {
     bool leaves = in_glass(s);
     float mean = facets_cosine(NoV, alpha);
     split result;
-    // From inside of one direction: total reflection begins at an angle.
+    // From inside, a single direction is enough: total reflection begins at an angle.
     result.dielectric = leaves ? inside_mirror(s, NoV) : facets_outside_mirror(s, NoV, mean, alpha, loss);
     result.again_mean = facets_lost_mean(alpha);
     SHARE mirrored_mean = without_film(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
@@ -219,9 +221,9 @@ split split_light(surface s, vec3 view, float NoV)
     return split_facets(s, view, NoV, facets_alpha(s), facets_lost_from(s, view, NoV));
 }
 
-// How much of the light from a direction enters, by that of the light from all around, per steradian. `loss`: facets_lost()
-// of that direction; what is scattered is reciprocal, as `parts` have the same factors for the view. Shirley et al. A
-// Practitioners' Assessment of Light Reflection Models. 1997.
+// Share of the light from a direction that enters, relative to that of the light from all around, per steradian. `loss`:
+// facets_lost() of that direction; scattering is reciprocal, as `parts` have the same factors for the view. Shirley et
+// al. A Practitioners' Assessment of Light Reflection Models. 1997.
 SHARE spread_entered(surface s, split parts, float NoL, float alpha, float loss)
 {
     SHARE enters = 1.0 - facets_outside_mirror(s, NoL, facets_cosine(NoL, alpha), alpha, loss);
@@ -233,7 +235,7 @@ vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss
     return parts.scattered * spread_entered(s, parts, NoL, alpha, loss);
 }
 
-// What is mirrored again. Kulla, Conty 2017.
+// Reflection after several facets. Kulla, Conty 2017.
 vec3 spread_again(split parts, float loss)
 {
     return parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
@@ -244,7 +246,7 @@ vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
     return spread_scattered(s, parts, NoL, alpha, loss) + spread_again(parts, loss);
 }
 
-// The share of the light that a coat's mirror ray carries.
+// Share of the light that a coat's mirror ray carries.
 float coat_ray_of(surface s, split parts)
 {
 #ifdef HAS_CLEARCOAT
@@ -254,14 +256,14 @@ float coat_ray_of(surface s, split parts)
 #endif
 }
 
-// The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
+// Mirrored direction; about the geometric normal where the shading normal would send it into the surface.
 vec3 mirror_direction(surface s, vec3 direction)
 {
     vec3 mirrored = reflect(direction, s.normal);
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
 }
 
-// Of brdf() what is scattered from the other side.
+// Transmitted part of brdf(): light scattered from the other side.
 vec3 brdf_passed(surface s, split parts, vec3 light)
 {
     float NoL = -dot(s.normal, light);
@@ -271,7 +273,7 @@ vec3 brdf_passed(surface s, split parts, vec3 light)
            over_scattered(s, parts, -light);
 }
 
-// Of brdf() what is scattered, by fibres too, and not mirrored, be it once or again.
+// Scattered part of brdf(), with that of fibres but without single and multiple reflections.
 vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoL = dot(s.normal, light);
@@ -283,12 +285,12 @@ vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
 }
 
 // Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine,
-// and without what a coat mirrors. From below the horizon only what is scattered to the other side, and 0 for glass seen
-// from inside, where no light is sampled. Reciprocal. `parts`: of the same surface and NoV. `shine`: 0 leaves out the
-// highlight.
+// and without a coat's reflection. For a light below the horizon only scattering to the other side counts, and 0 for
+// glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same surface and NoV. `shine`: 0 leaves
+// out the highlight.
 //
-// What is mirrored: facets_mirror(). (1 - F) of the half-way vector alone, as often seen for scattered
-// light, would give out up to 1.7 of what arrives at grazing angles.
+// The mirrored part is facets_mirror(). A factor (1 - F) of the half-way vector alone, as often seen for scattered light,
+// would emit up to 1.7 of the arriving light at grazing angles.
 vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light, float shine)
 {
     float NoL = dot(s.normal, light);
@@ -307,7 +309,7 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
     return brdf(s, parts, view, NoV, light, 1.0);
 }
 
-// The same of all that is there, times the cosine.
+// Value of brdf() with all layers, times the cosine.
 vec3 reflected(surface s, split parts, vec3 view, float NoV, vec3 light, float shine)
 {
     vec3 sent = brdf(s, parts, view, NoV, light, shine) * abs(dot(s.normal, light));

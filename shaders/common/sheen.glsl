@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The fibres of cloth, which stand up from it: Estevez, Kulla. Production Friendly Microfacet Sheen BRDF. 2017, as
-// KHR_materials_sheen has it. What lies beneath gets what they leave, on the way in and on the way out, so the sum is
-// reciprocal and no more than arrives; of a white surface between 0.98 and 1.
+// Upright fibres of cloth: Estevez, Kulla. Production Friendly Microfacet Sheen BRDF. 2017, in the form of
+// KHR_materials_sheen. They dim the surface beneath on the way in and on the way out, so the sum is reciprocal and never
+// exceeds the arriving light; a white surface keeps 0.98 to 1 of it.
 //
 // Defines: HAS_SHEEN some material has fibres.
 
@@ -9,7 +9,7 @@
 
 #ifdef HAS_SHEEN
 
-// More upright ones would send out more than arrives at the horizon.
+// Minimum alpha: more upright fibres would reflect more than the arriving light at the horizon.
 const float SHEEN_ALPHA_MIN = 0.035;
 
 float sheen_alpha(float roughness)
@@ -24,7 +24,7 @@ float sheen_lambda_of(float x, float alpha)
     return a / (1.0 + b * pow(x, c)) + mix(-1.97760, -1.27393, rough) * x + mix(-4.32054, -4.85967, rough);
 }
 
-// Section 3: how much of the fibres others hide from a direction.
+// Masking of fibres by other fibres from a direction, section 3.
 float sheen_lambda(float cosine, float alpha)
 {
     if (cosine < 0.5)
@@ -32,7 +32,7 @@ float sheen_lambda(float cosine, float alpha)
     return exp(2.0 * sheen_lambda_of(0.5, alpha) - sheen_lambda_of(1.0 - cosine, alpha));
 }
 
-// Of white fibres, per steradian. The second factor is at most 1, as in Khronos' sample viewer.
+// Reflectance of white fibres, per steradian. The second factor is at most 1, as in Khronos' sample viewer.
 float sheen_reflectance(float roughness, float NoH, float NoV, float NoL)
 {
     float alpha = sheen_alpha(roughness), sine_squared = max(1.0 - square(NoH), 1e-6);
@@ -41,14 +41,14 @@ float sheen_reflectance(float roughness, float NoH, float NoV, float NoL)
     return density * min(1.0 / (seen * 4.0 * max(NoV * NoL, 1e-7)), 1.0);
 }
 
-// Powers of the roughness that the fits below have.
+// Powers of the roughness for the fits below.
 vec4 sheen_powers(float roughness)
 {
     float r = max(roughness, sqrt(SHEEN_ALPHA_MIN));
     return vec4(1.0, r, r * r, r * r * r);
 }
 
-// The share of the light from all around that white fibres send along a direction: fitted to the integral of the function
+// Share of the light from all around that white fibres reflect along a direction: fitted to the integral of the function
 // above, -0.005 to +0.017 off.
 float sheen_albedo(float cosine, float roughness)
 {
@@ -61,7 +61,7 @@ float sheen_albedo(float cosine, float roughness)
     return min(exp(low + s2 * (middle + s2 * high)), 1.0);
 }
 
-// The mean of that over the hemisphere, cosine-weighted, within 0.002.
+// Mean of sheen_albedo() over the hemisphere, cosine-weighted, within 0.002.
 float sheen_albedo_mean(float roughness)
 {
     vec4 r = sheen_powers(roughness);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The order of the frame's pixels (shared/frame.h), and its views.
+// Order of the frame's pixels (shared/frame.h), and its views.
 
 #include "common/frame.glsl"
 #include "common/math.glsl"
 
-// Pixel of a slot: x to the right, y down. May lie outside the picture at its right and lower edges.
+// Pixel of a slot: x to the right, y down. It may lie outside the picture at its right and lower edges.
 uvec2 pixel_of_slot(uint slot)
 {
     uint tile = slot >> 6, m = slot & 63u;
@@ -20,7 +20,7 @@ uint slot_of_pixel(uvec2 pixel)
     return (tile.y * frame.tiles_across + tile.x) << 6 | m;
 }
 
-// The view of the picture that a pixel belongs to: its number from the left and from above.
+// View of the picture that a pixel belongs to: its number from the left and from above.
 uvec2 view_of_pixel(uvec2 pixel)
 {
     if (frame.view_width == frame.width && frame.view_height == frame.height)
@@ -28,7 +28,7 @@ uvec2 view_of_pixel(uvec2 pixel)
     return uvec2(quotient(pixel.x, frame.view_width), quotient(pixel.y, frame.view_height));
 }
 
-// A pixel within its view, which names its random numbers: they are those of a picture that shows the view alone.
+// Place of a pixel within its view, by which it has the random numbers of a picture of that view alone.
 uvec2 pixel_in_view(uvec2 pixel)
 {
     return pixel - view_of_pixel(pixel) * uvec2(frame.view_width, frame.view_height);

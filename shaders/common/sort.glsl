@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Sorts a run in place: by insertion where its items come nearly in order, as those of things drawn front to back do,
+// Sorts a run in place: by insertion where its items are nearly in order, as those of objects drawn front to back are,
 // else as a heap. No loop here runs more than a few rounds for each item and each doubling of their number: software GL
-// ends an invocation's loops after 65,535 rounds.
-// The including file defines before: SORT_ITEM, a type; struct run with a member `count`; SORT_ITEM load(run, uint),
-// void store(run, uint, SORT_ITEM), bool before(SORT_ITEM, SORT_ITEM).
+// ends an invocation's loops after 65,535 rounds. The including file defines before: SORT_ITEM, a type; struct run with a
+// member `count`; SORT_ITEM load(run, uint), void store(run, uint, SORT_ITEM), bool before(SORT_ITEM, SORT_ITEM).
 
-const uint MOVES_EACH = 4u; // an item: more than the heap is worth
+const uint MOVES_EACH = 4u; // per item: with more moves, a heap is faster
 
-// False: it gave up, and the items are partly sorted.
+// Sorts by insertion. False: it gave up, and the items are partly sorted.
 bool insert_all(run r)
 {
     uint moves = MOVES_EACH * r.count;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
-// How much of what is seen of a surface follows the eye: the share of its radiance that mirrors, glass and highlights
-// have in it, if
+// Share of a surface's radiance that depends on the eye: that of mirrors, glass and highlights, if
 //
-//   all lights shine without shadows, from their middles,
-//   and as much light as they and the environment bring there comes from all around, in equal parts
+//   all lights shine without shadows, from their middles, and the light of these and the environment comes from all
+//   around, in equal parts
 //
-// What is mirrored counts by the share that the mirror ray carries: the rough rest is blurred, and hardly changes within
-// the radius of a key view. What is refracted counts whole, as a window turns light by a fraction of what its facets are
-// turned. What blended surfaces let through counts as well: it lies behind the surface.
+// Reflection counts by the share of the mirror ray: the rough rest is blurred, and hardly changes within the radius of a
+// key view. Refraction counts whole, as a window turns light by a fraction of its facets' turn. Light through blended
+// surfaces counts as well: its source lies behind the surface.
 //
 // Defines: those of common/material.glsl and common/light.glsl.
 
@@ -16,7 +15,8 @@
 #include "common/light.glsl"
 #include "common/scattering.glsl"
 
-// Of a surface that is not glass seen from inside: the highlights, and what the lights bring from all around together.
+// Light of all lights at a surface that is not glass seen from inside: the highlights, and the sum that counts as coming
+// from all around.
 vec2 light_of_lights(surface s, split parts, vec3 view, float NoV)
 {
     vec2 sum = vec2(0.0);
@@ -47,5 +47,5 @@ float sticking_of(surface s, vec3 direction)
     float scattered = around * luminance(parts.scattered + sheen_of(parts) + passed_of(parts));
     float all = mirrored + refracted + scattered + luminance(s.emission) + coat;
     float sticks = parts.mirror_ray * mirrored + refracted + coat;
-    return 1.0 - s.alpha * (1.0 - (all > 0.0 ? min(sticks / all, 1.0) : 0.0)); // also if it is NaN
+    return 1.0 - s.alpha * (1.0 - (all > 0.0 ? min(sticks / all, 1.0) : 0.0)); // NaN counts as 0
 }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From a primitive and a place on it to struct hit. Every exact tracer and the rasterised primary use it, so
-// that all see one surface.
+// Hit at a place on a primitive. All exact tracers and the rasterised primary use it, so that they agree on the surface.
 //
-// Defines: those of common/attributes.glsl; NO_TANGENTS: no mesh has tangents, and no material asks for those that follow
+// Defines: those of common/attributes.glsl; NO_TANGENTS: no mesh has tangents, and no material needs those that follow
 // from texture coordinates; NO_DISCS: there are none.
 #include "common/attributes.glsl"
 #include "common/hit_colour.glsl"
@@ -11,7 +10,7 @@
 
 layout(binding = UNIT_TANGENTS) uniform usamplerBuffer tangents; // octahedral
 
-// Normalised between two.
+// Normal of a vertex at a time, interpolated and normalised.
 vec3 normal_at_time(uint vertex, uint close_offset, float time)
 {
     vec3 normal = texelFetch(normals, int(vertex)).xyz;
@@ -174,7 +173,7 @@ hit surface_miss()
     return hit(-1.0, 0u, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, uvec4(0u), 0u, 0u, 0u, 0u);
 }
 
-// At the time of the ray that found it.
+// Hit of a candidate, at the time of the ray that found it.
 hit surface_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
     if (found.primitive == HIT_NO_PRIMITIVE)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What is small of a scene: its tables in one texel buffer, of which gpu_scene_bind() binds the unit. Layout:
-// shared/tables.h. Structs in texels: software GL reads a storage buffer a word and a lane at a time. Texels of which
-// no member is used are not fetched.
+// Small tables of a scene in one texel buffer, which gpu_scene_bind() binds. Layout: shared/tables.h. Structs are in
+// texels, as software GL reads a storage buffer a word and a lane at a time; texels with unused members only are not
+// fetched.
 #include "shared/bindings.h"
 #include "shared/geometry.h"
 #include "shared/material.h"

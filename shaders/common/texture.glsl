@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Textures, from the one texel buffer that holds them all. Layouts: shared/material.h.
+// Samples of textures, which one texel buffer holds. Layouts: shared/material.h.
 #include "shared/bindings.h"
 #include "common/colour.glsl"
 #include "common/tables.glsl"
 
 layout(binding = UNIT_TEXELS) uniform samplerBuffer texels; // RGBA8 unorm, as stored
 
-// Modes: 0 repeat, 1 clamp, 2 mirror.
+// Wraps a coordinate. Modes: 0 repeat, 1 clamp, 2 mirror.
 float wrap_coordinate(float u, uint mode)
 {
     float repeated = u - floor(u);
@@ -14,14 +14,14 @@ float wrap_coordinate(float u, uint mode)
     return mode == 0u ? repeated : mode == 1u ? clamp(u, 0.0, 1.0) : turned;
 }
 
-// For a texel at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more.
+// Wraps the index of a texel at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more.
 int wrap_neighbour(int i, int size, uint mode)
 {
     int repeated = i < 0 ? i + size : i >= size ? i - size : i;
     return clamp(mode == 0u ? repeated : i, 0, size - 1);
 }
 
-// One level of a texture: its first texel and its size.
+// Level of a texture: its first texel and its size.
 struct texture_level {
     int first_texel;
     ivec2 size;
@@ -50,8 +50,8 @@ vec4 fetch_texel(texture_info info, texture_level level, ivec2 at)
     return texel;
 }
 
-// The loops here have counts that the compiler cannot know: unrolled and inlined wherever a texture is sampled, the
-// fetches took software GL's compiler seconds.
+// Bilinear sample of a level. The loops here have counts that the compiler cannot know: unrolled and inlined wherever a
+// texture is sampled, the fetches took software GL's compiler seconds.
 vec4 sample_level(texture_info info, texture_level level, vec2 uv)
 {
     bool nearest = (info.flags & TEXTURE_NEAREST) != 0u;
@@ -70,20 +70,20 @@ vec4 sample_level(texture_info info, texture_level level, vec2 uv)
     return sum;
 }
 
-// Texture coordinates that a slot sees. `uv01` holds both sets.
+// Texture coordinates of a slot. `uv01` holds both sets.
 vec2 slot_texcoords(texture_slot slot, vec4 uv01)
 {
     vec2 uv = (slot.texture & 0x80000000u) != 0u ? uv01.zw : uv01.xy;
     return vec2(dot(slot.uv_matrix.xy, uv) + slot.offset_u, dot(slot.uv_matrix.zw, uv) + slot.offset_v);
 }
 
-// Where a ray's cone meets a surface, a parallelogram: two edges in texture coordinates, of both sets as uv01 above,
+// Parallelogram in which a ray's cone meets a surface: two edges in texture coordinates, of both sets as in uv01 above,
 // before a slot's matrix.
 struct texture_footprint {
     vec4 along, across;
 };
 
-// The edges in texture coordinates that the slot sees: columns.
+// Edges of the footprint in the slot's texture coordinates: columns.
 mat2 slot_footprint(texture_slot slot, texture_footprint footprint)
 {
     bool second = (slot.texture & 0x80000000u) != 0u;
@@ -92,7 +92,7 @@ mat2 slot_footprint(texture_slot slot, texture_footprint footprint)
                 (second ? footprint.across.zw : footprint.across.xy) * rows);
 }
 
-// The level of which a texel is as large as the footprint.
+// Level whose texels are as large as the footprint.
 int slot_level(texture_slot slot, texture_footprint footprint)
 {
     texture_info info = texture_at(slot.texture & 0x7fffffffu);
@@ -101,11 +101,11 @@ int slot_level(texture_slot slot, texture_footprint footprint)
     return clamp(int(0.5 * log2(max(texels, 1.0)) + 0.5), 0, last);
 }
 
-// A footprint that is longer than wide is covered by this many samples at most, which lie along it, each of a level by
-// its width; a longer one is blurred across, as no sample may lie between two others.
+// Maximum of samples over a footprint that is longer than wide. They lie along it, each of a level by its width; a longer
+// footprint is blurred across, so that no gap is left between two samples.
 const float FOOTPRINT_SAMPLES_MAX = 8.0;
 
-// The mean over a footprint: samples along its longer edge, each blended between the two levels by its width.
+// Mean over a footprint: samples along its longer edge, each blended between the two levels by its width.
 vec4 sample_slot_filtered(texture_slot slot, vec4 uv01, texture_footprint footprint)
 {
     texture_info info = texture_at(slot.texture & 0x7fffffffu);
@@ -133,7 +133,7 @@ vec4 sample_slot_filtered(texture_slot slot, vec4 uv01, texture_footprint footpr
     return sum / float(samples);
 }
 
-// A material's input in full detail: `slot_index` is one of its texture_* fields and not 0.
+// Sample of a material's input in full detail: `slot_index` is one of its texture_* fields and not 0.
 vec4 sample_slot(uint slot_index, vec4 uv01)
 {
     texture_slot slot = texture_slot_at(slot_index);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From linear light to display values.
+// Tone mapping from linear light to display values.
 #include "common/colour.glsl"
 
 #define TONE_MAP_NEUTRAL 0u
@@ -22,8 +22,8 @@ vec3 tone_map_neutral(vec3 colour)
     return mix(colour, vec3(new_peak), g);
 }
 
-// Hill. A fit of the ACES reference and output transforms, 2016: to its colours and back, and of light over 0.6, as viewers
-// of glTF have it ("ACESFilmic" of three.js).
+// Hill. A fit of the ACES reference and output transforms, 2016: to its colours and back, with light divided by 0.6, as
+// viewers of glTF do ("ACESFilmic" of three.js).
 vec3 tone_map_aces(vec3 colour)
 {
     const mat3 from_linear = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777);
@@ -34,7 +34,7 @@ vec3 tone_map_aces(vec3 colour)
 
 vec3 tone_map(vec3 colour, uint kind)
 {
-    // The curves are ratios of squares: beyond this they have long reached 1, and infinity would become NaN.
+    // The curves are ratios of squares: at this limit they have long reached 1, and infinity would become NaN.
     colour = clamp(colour, vec3(0.0), vec3(1e9));
     if (kind == TONE_MAP_NEUTRAL)
         colour = tone_map_neutral(colour);

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Light that is found in two ways, by a shadow ray and by a child, and weighed by multiple importance sampling: Veach,
-// Guibas. Optimally Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic.
+// Weights of light that both a shadow ray and a child may find, by multiple importance sampling: Veach, Guibas. Optimally
+// Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic.
 //
-// A child that hits an emitter has to know how its origin would have asked for it: the normal with which it chooses
-// among them, and of the chance of asking for emitters to the density of the child's direction a code
-// (PATH_RATIO_STEPS). Shadow rays round both alike, so that the weights add up to 1.
+// A child that hits an emitter has to know how its origin would have sampled it: the normal by which it chooses among
+// them, and the ratio of the probability of sampling emitters to the density of the child's direction, as a code
+// (PATH_RATIO_STEPS). Shadow rays round both in the same way, so that the weights add up to 1.
 //
-// Defines: those of common/emitter.glsl; EMITTERS_BY_DISTANCE hits do not tell which of them they are of, so both ways are
-// weighed by a density that the distance alone says.
+// Defines: those of common/emitter.glsl; EMITTERS_BY_DISTANCE hits do not say which emitter they are on, so both ways are
+// weighed by a density that depends on the distance alone.
 
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "common/emitter.glsl"
 
-// The weight of a technique, beside another that might have found the same light.
+// Weight of a technique, beside another one that might have found the same light.
 float heuristic(float own, float other)
 {
     float ratio = other / own;
@@ -39,7 +39,7 @@ vec3 unpack_ray_normal(uint bits)
     return unit_from_octahedral(vec2(p) / PATH_NORMAL_MAX);
 }
 
-// Upper estimate of the light of the emitters. `behind`: chance of asking for those behind the surface.
+// Upper estimate of the emitters' light. `behind`: probability of sampling those behind the surface.
 float emitters_around(vec3 position, vec3 normal, float behind)
 {
     float estimate = emitter_estimate(position, unpack_ray_normal(pack_ray_normal(normal)));
@@ -60,7 +60,7 @@ float ratio_of(uint code)
     return exp2((float(code) - PATH_RATIO_ONE) / PATH_RATIO_STEPS);
 }
 
-// The share of a shadow ray's light, asked for with that chance, where a child has the density `found`.
+// Weight of a shadow ray's light, sampled with probability `chance`, where a child has the density `found`.
 float emitter_share_asked(emitter_sample sampled, float chance, float found)
 {
     float probability = sampled.probability;
@@ -70,7 +70,7 @@ float emitter_share_asked(emitter_sample sampled, float chance, float found)
     return found > 0.0 ? heuristic(ratio_of(ratio_code(chance, found)) * probability, 1.0) : 1.0;
 }
 
-// The share of its emission that a surface sends along a ray, whose origin may have asked for it already. `normal`: packed.
+// Weight of the emission that a ray meets, as its origin may have sampled that already. `normal`: packed.
 float emitter_share_met(uint code, uint normal, hit h, ray r, float time, vec3 emission)
 {
 #ifdef EMITTERS_BY_DISTANCE

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Unit vectors in 32 bits and less.
 
-// 1 for zero too: an octahedron's seam must not fold to nothing.
+// Sign of a number, 1 for zero too: an octahedron's seam must not collapse.
 vec2 sign_not_zero(vec2 v)
 {
     return vec2(v.x >= 0.0 ? 1.0 : -1.0, v.y >= 0.0 ? 1.0 : -1.0);
@@ -23,7 +23,7 @@ vec3 unit_from_octahedral(vec2 p)
     return normalize(v);
 }
 
-// 2 x 16 bit snorm: exact to 0.003 degrees.
+// Packs 2 x 16 bit snorm: exact to 0.003 degrees.
 uint pack_unit(vec3 unit)
 {
     return packSnorm2x16(octahedral_from_unit(unit));
@@ -34,15 +34,15 @@ vec3 unpack_unit(uint bits)
     return unit_from_octahedral(unpackSnorm2x16(bits));
 }
 
-// 2 x 12 bit snorm, in bits 0..23: exact to 0.05 degrees.
+// Packs 2 x 12 bit snorm, in bits 0..23: exact to 0.05 degrees.
 uint pack_unit_24(vec3 unit)
 {
     ivec2 p = ivec2(round(octahedral_from_unit(unit) * 2047.0));
     return uint(p.x) & 0xfffu | (uint(p.y) & 0xfffu) << 12;
 }
 
-// struct hit's tangent: x 16 bits, y 15 bits, lowest bit set where the handedness is negative.
-// packSnorm2x16 puts y in the upper half; here x is the upper half and y's lowest bit is free.
+// Packs struct hit's tangent: x 16 bits, y 15 bits, lowest bit set where the handedness is negative. packSnorm2x16 puts y
+// in the upper half; here x is the upper half and y's lowest bit is free.
 uint pack_tangent(vec3 unit, float handedness)
 {
     uint bits = packSnorm2x16(octahedral_from_unit(unit).yx);

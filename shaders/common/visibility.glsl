@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The answer of a shadow ray: shared/ray.h.
+// Answers of shadow rays (shared/ray.h).
 #include "shared/ray.h"
 
 uint visibility_of(vec3 transmittance)

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Vertices of one mesh that changes its shape: morph targets, then joints, as glTF 2.0 has them (sections 3.7.2.2 and
-// 3.7.3). One invocation per vertex; from the mesh at rest into the scene's vertices, in place. The host's twin is
+// Deforms the vertices of one mesh: morph targets, then joints, by the rules of glTF 2.0 (sections 3.7.2.2 and 3.7.3).
+// One invocation per vertex reads the mesh at rest and writes the scene's vertices in place. The host's twin is
 // scene_deform() of server/scene/deform.c.
 //
 // The host (gpu_scene/deform.c) sets the defines:
 //   HAS_NORMALS     the mesh has normals
-//   HAS_TANGENTS    and tangents
+//   HAS_TANGENTS    the mesh has tangents
 #include "shared/bindings.h"
 #include "common/affine.glsl"
 #include "common/dispatch.glsl"
 #include "common/math.glsl"
 #include "common/unit.glsl"
 
-// At rest, of all meshes one after the other.
+// Attributes at rest, of all meshes one after the other.
 layout(binding = UNIT_REST_POSITIONS) uniform samplerBuffer rest_positions;
 layout(binding = UNIT_REST_NORMALS) uniform samplerBuffer rest_normals;
 layout(binding = UNIT_REST_TANGENTS) uniform samplerBuffer rest_tangents; // handedness in w
@@ -21,7 +21,7 @@ layout(binding = UNIT_JOINT_WEIGHTS) uniform samplerBuffer joint_weights;
 layout(binding = UNIT_TARGET_POSITIONS) uniform samplerBuffer target_positions;
 layout(binding = UNIT_TARGET_NORMALS) uniform samplerBuffer target_normals;
 layout(binding = UNIT_TARGET_TANGENTS) uniform samplerBuffer target_tangents;
-// Joints: rows of world_from_mesh, three texels each. Targets that count: weight, number.
+// Joints: rows of world_from_mesh, three texels each. Active targets: weight, number.
 layout(binding = UNIT_DEFORM_PARAMETERS) uniform samplerBuffer parameters;
 
 layout(binding = IMAGE_POSITIONS, rgba32f) writeonly uniform imageBuffer positions_out;
@@ -32,7 +32,7 @@ uniform uint vertex_count;
 uniform uint first_vertex; // at rest
 uniform uint first_vertex_out;
 uniform uint first_influence;
-uniform uint influence_count; // a vertex; 0: no skin
+uniform uint influence_count; // per vertex; 0: no skin
 uniform uint first_joint;     // texel of the parameters
 uniform uint joint_count;
 uniform uint first_target_vertex;
@@ -42,14 +42,14 @@ uniform uint target_arrays; // 1: positions, 2: normals, 4: tangents
 
 const float FLOAT_MAX = 3.402823466e38;
 
-// Sums that overflow become 0: no tracer could bound them.
+// Replaces sums that overflow by 0: no tracer could bound them.
 vec3 finite_or_zero(vec3 v)
 {
     bvec3 fine = lessThanEqual(abs(v), vec3(FLOAT_MAX));
     return vec3(fine.x ? v.x : 0.0, fine.y ? v.y : 0.0, fine.z ? v.z : 0.0);
 }
 
-// The mean of the joints' matrices by the vertex's weights; false: it has none, and stays as it is given.
+// Mean of the joints' matrices, weighted for the vertex. False: it has no weights, and stays unchanged.
 bool blend(uint vertex, out vec4 rows[3])
 {
     rows = vec4[3](vec4(0.0), vec4(0.0), vec4(0.0));
@@ -70,14 +70,15 @@ bool blend(uint vertex, out vec4 rows[3])
     return sum > 0.0;
 }
 
-// A vector without a direction stays as it is. (The squares of small components would underflow.)
+// Normalises a vector; one without a direction stays unchanged. (The squares of small components would underflow.)
 vec3 unit_or_same(vec3 v)
 {
     float scale = max_component(abs(v));
     return scale > 0.0 && scale <= FLOAT_MAX ? normalize(v / scale) : v;
 }
 
-// By the cofactors, which are the inverse transpose but for a factor; its sign keeps a mirrored normal outside.
+// Transforms a normal by the cofactors, which are the inverse transpose up to a factor; its sign keeps a mirrored normal
+// outside.
 vec3 moved_normal(vec4 rows[3], vec3 normal, float determinant)
 {
     vec3 moved = vec3(dot(cross(rows[1].xyz, rows[2].xyz), normal), dot(cross(rows[2].xyz, rows[0].xyz), normal),

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The point of a primitive at the centre of a texel. Lists hold only its depth and id: the material is evaluated once
-// for each kept sample (sample.comp). Peeling writes the paper's two targets in each pass.
+// Writes the point of a primitive at the centre of a texel. Lists hold only its depth and id: the material is evaluated
+// once for each kept sample (sample.comp). Peeling writes the paper's two targets in each pass.
 // Defines:
 //   those of raster/fragment.glsl
-//   BUILD_PASS 0: each texel's fragments are listed; 1: they are counted only; 2: the nearest of those behind the
+//   BUILD_PASS 0: each texel's fragments are listed; 1: they are only counted; 2: the nearest of those behind the
 //     previous layer is kept (depth peeling)
 //   with BUILD_PASS 2 those of ldc/sample.glsl
 
@@ -24,7 +24,7 @@ layout(binding = IMAGE_LDC_COUNTS, r32ui) uniform uimageBuffer counts;
 #if BUILD_PASS == 0
 uniform uint texel_count;
 uniform uint slots;         // fragments of a texel that have a slot
-uniform uint fragments_max; // capacity without
+uniform uint fragments_max; // capacity for fragments without a slot
 layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer ordered;
 layout(binding = IMAGE_LDC_FRAGMENTS, rgba32ui) writeonly uniform uimageBuffer fragments;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
@@ -49,7 +49,7 @@ void record(float depth_cells)
     imageAtomicAdd(counts, int(texel_number()), 1u);
 }
 #else
-// The nearest of several records of one fragment; there may be none.
+// Nearest of several records of a fragment; there may be none.
 float nearest_cells = LDC_NO_DEPTH;
 
 void record(float depth_cells)
@@ -82,11 +82,11 @@ void main()
     finish();
 }
 #else
-// A surface that leans more to another axis is in that image.
+// A surface that leans more to another axis belongs to that image.
 void main()
 {
     sphere_chord chord = chord_of_sphere();
-    if (chord.half_chord < 0.0) // passes it
+    if (chord.half_chord < 0.0) // the line misses the sphere
         discard;
     for (int side = 0; side < 2; side++) {
         vec3 normal;

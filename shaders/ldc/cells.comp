@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Finds the cells of a cube that samples' planes pass, and these samples: nodes, blocks and entries of ldc/layout.h.
+// Finds the cells that planes of samples pass, and makes the nodes, blocks and entries of ldc/layout.h.
 //
 // Defines, one of them:
 //   CELLS_LIST     records each sample's texel; an item is a texel of the images
@@ -10,7 +10,7 @@
 //   CELLS_FILL     writes the first entry of each cell; an item is a sample
 //   CELLS_FURTHER  writes the further entries of cells; an item is such an entry
 //   CELLS_SORT     sorts the entries of cells that have several; an item is a further entry
-// Then raster/reach.comp adds the empty space around empty nodes.
+// After them raster/reach.comp adds the empty space round empty nodes.
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -20,16 +20,16 @@ uniform int first_node, grid; // nodes along a side
 
 layout(std430, binding = BIND_TRACER_0) buffer count_block {
     uvec4 lower, upper; // occupied nodes
-    uvec4 unused[2];    // apart from the words that all write, as all read these
+    uvec4 unused[2];    // padding: all passes write the words after it and read those before
     uint block_count;
-    uint entry_count;   // a cell's first
+    uint entry_count;   // entries of cells, the first one of each
     uint further_count; // further entries of cells
     uint padding;
 } counts;
 
-// The record of a sample: 12 bits of its texel's u, 12 of v, its axis; then a bit for each of up to four cells, in
-// ascending depth: the sample came first and has the cell's own entry. Behind the records of all samples those of
-// further entries: the sample, and which of its cells.
+// Record of a sample: 12 bits of its texel's u, 12 of v, its axis; then a bit for each of up to four cells, in ascending
+// depth: the sample came first and has the cell's own entry. Records of further entries follow those of all samples: the
+// sample, and which of its cells.
 const uint LIST_CELL_SHIFT = 30u, LIST_SAMPLE_MASK = 0x3fffffffu;
 const uint LIST_V_SHIFT = 12u, LIST_AXIS_SHIFT = 24u, LIST_FIRST_SHIFT = 26u, LIST_MASK = 0xfffu;
 
@@ -62,7 +62,7 @@ layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
 #if defined CELLS_BLOCKS || defined CELLS_MARK
 layout(binding = IMAGE_LDC_NODES, r32ui) uniform uimageBuffer nodes; // words
 #else
-layout(binding = UNIT_TRACER_2) uniform usamplerBuffer nodes_; // passes that only read them are faster
+layout(binding = UNIT_TRACER_2) uniform usamplerBuffer nodes_; // for passes that only read them, which is faster
 #endif
 
 #ifdef CELLS_MARK
@@ -109,7 +109,7 @@ uvec3 words_at(int at)
 #endif
 }
 
-// The place of a part's data in a node or a block: behind those of all occupied parts before it.
+// Place of a part's data in a node or a block: behind those of all occupied parts before it.
 uint place_of(uvec3 words, uvec3 part)
 {
     uint below = (1u << bit_of(part)) - 1u;
@@ -131,7 +131,7 @@ uint entry_of(ivec3 cell)
 #endif
 
 struct listed_sample {
-    uint index, place; // its record
+    uint index, place; // place of its record
     int axis, u, v, first, last; // texel, depths of its cells
     uvec2 geometry;
 };
@@ -199,7 +199,7 @@ void handle(uint item)
 
 #else
 
-// The cell of a further entry.
+// First entry of the cell of a further entry.
 uint first_entry_of(uint item, out listed_sample s)
 {
     uint noted = texelFetch(list, int(sample_count + item)).x;
@@ -221,8 +221,8 @@ void swap_words(uint a, uint b, uint word)
     imageStore(entries, int(4u * b + word), uvec4(of_a));
 }
 
-// Their order of arrival is chance, and of two samples that a ray intersects at the same distance the first counts:
-// sorted by axis and sample, so that the same scene gives the same picture. The last one of a cell sorts them all.
+// Samples arrive in random order, and where a ray intersects two at the same distance, the first counts: they are sorted
+// by axis and sample, so that the same scene gives the same picture. The last entry of a cell sorts them all.
 void handle(uint item)
 {
     if (next_of(first_further + item) != 0u)
@@ -246,7 +246,7 @@ void handle(uint item)
 
 #else
 
-// Inserted in front of the cell's further entries.
+// Inserts an entry in front of the cell's further entries.
 void handle(uint item)
 {
     listed_sample s;

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// The traversal of a cube's cells, all three images at once: from one cell along the ray that a sample's plane passes
-// to the next, so that the first intersection is, up to a cell, the nearest. Cells are described in ldc/layout.h: a
-// node of 16 x 16 x 16 cells knows how far it is empty around it and which of its 64 blocks of 4 x 4 x 4 are occupied,
-// and a block knows its occupied cells.
+// Traversal of a cube's cells for all three images at once: from one occupied cell along the ray to the next, so that the
+// first intersection is, up to a cell, the nearest. Cells are described in ldc/layout.h: a node of 16 x 16 x 16 cells
+// knows the empty space round it and which of its 64 blocks of 4 x 4 x 4 are occupied, and a block knows its occupied
+// cells.
 #include "ldc/found.glsl"
 #include "raster/blocks.glsl"
 
 #ifdef LDC_CELLS
 
-layout(binding = UNIT_TRACER_4) uniform usamplerBuffer ldc_nodes; // and blocks
+layout(binding = UNIT_TRACER_4) uniform usamplerBuffer ldc_nodes; // nodes and blocks
 
 layout(binding = UNIT_TRACER_5) uniform usamplerBuffer ldc_entries;
 
 uniform int ldc_grid[LDC_CUBES]; // nodes along a side
-uniform vec3 ldc_lower[LDC_CUBES], ldc_upper[LDC_CUBES]; // of the occupied cells
+uniform vec3 ldc_lower[LDC_CUBES], ldc_upper[LDC_CUBES]; // bounds of the occupied cells
 
 // Axes are mirrored as in raster/blocks.glsl.
 struct cell_traversal {
@@ -21,12 +21,12 @@ struct cell_traversal {
     ivec3 flip;  // -1: turned
     ivec3 cell;
     float s, s_end;
-    float s_min, s_limit; // between which an intersection counts
-    float begin, scale; // cell_ray's
+    float s_min, s_limit; // range in which intersections count
+    float begin, scale; // those of cell_ray
     int cube, grid, first_node, octant_shift;
 #ifdef LDC_EXACT
-    float beside_max; // how far beyond its texel a sample's plane extends
-    bool is_within;   // the last intersection: at most LDC_SLACK beyond it
+    float beside_max; // extension of a sample's plane beyond its texel
+    bool is_within;   // the last intersection is at most LDC_SLACK beyond its texel
 #endif
     int at, shift; // texel of the current node or block; log2 of the size of its parts: 2 in a node, 0 in a block
 };
@@ -43,13 +43,13 @@ struct found_cell {
     uint entry; // LDC_ENTRY_NONE: there is none
 };
 
-// Not mirrored.
+// Cell of the cube, with mirrored axes turned back.
 ivec3 cube_cell(cell_traversal w, ivec3 cell)
 {
     return turned(cell, w.flip, w.grid << LDC_NODE_SHIFT);
 }
 
-// The lower corner of the node or block that the ray is in.
+// Texel of the node or block that the ray is in, whose lower corner is `cell`.
 int node_at(cell_traversal w, ivec3 cell)
 {
     ivec3 n = cube_cell(w, cell) >> LDC_NODE_SHIFT;
@@ -86,7 +86,7 @@ void begin_cells(trace_ray r, float end, int pass, out cell_traversal w)
     w.shift = 2;
 }
 
-// Tests one of 64 parts of the current node or block, and enters it or passes it; an occupied cell becomes `found` and
+// Tests one of the 64 parts of the current node or block, and enters or passes it; an occupied cell becomes `found` and
 // is passed.
 void step_on(inout cell_traversal w, inout found_cell found, bvec3 down)
 {
@@ -103,7 +103,7 @@ void step_on(inout cell_traversal w, inout found_cell found, bvec3 down)
         } else {
             found.cell = w.cell;
             found.entry = is_set ? words.z + rank : LDC_ENTRY_NONE;
-            // Past the empty parts ahead.
+            // Passes the empty parts ahead.
             int parts = parts_to_pass(words.xy, b & 3u, down);
             ivec3 border = ((w.cell >> w.shift) + parts) << w.shift, end = ((w.cell >> (w.shift + 2)) + 1) << (w.shift + 2);
             border = min(border, end);
@@ -123,8 +123,8 @@ void step_on(inout cell_traversal w, inout found_cell found, bvec3 down)
         }
 }
 
-// Up to two steps towards the next occupied cell. The lanes of a SIMD group wait for the slowest, so cells are tested
-// after few steps: with four steps rays are a seventh slower, with one a tenth, with a loop up to the next cell a
+// Advances up to two steps towards the next occupied cell. The lanes of a SIMD group wait for the slowest, so cells are
+// tested after few steps: with four steps rays are a seventh slower, with one a tenth, with a loop up to the next cell a
 // fifth.
 found_cell next_cell(inout cell_traversal w)
 {

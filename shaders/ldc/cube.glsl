@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A ray among the cells of a cube, and its intersections with samples.
+// Rays in the cells of a cube, and their intersections with samples.
 //
 // The cubes of a scene, `ldc_cubes` of them, are traversed in order; each has its own lower corner, cell size and
 // places in the buffers.
@@ -24,7 +24,7 @@ uniform int ldc_resolution[LDC_CUBES];
 uniform int ldc_first_texel[LDC_CUBES];
 uniform int ldc_first_node[LDC_CUBES];
 
-// A uniform with one index for a whole SIMD group is read once, with an index per lane lane by lane.
+// A uniform with the same index for a whole SIMD group is read once; with an index per lane, lane by lane.
 #if LDC_CUBES == 1
 #define CUBE(number) 0
 #else
@@ -52,7 +52,7 @@ bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 no
     s = min(max(to_sample.z / d.z, max(near.x, near.y)), min(far.x, far.y));
     beside = 0.0;
     bool intersects = abs(s * d.z - to_sample.z) <= LDC_TOLERANCE_CELLS;
-    // A ray that begins as near to a sample's plane leaves that surface.
+    // A ray that begins this near to a sample's plane leaves its surface.
     bool is_own = height * height < LDC_TOLERANCE_CELLS * LDC_TOLERANCE_CELLS * dot(normal, normal);
 #else
     s = height / side;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// From the intersected plane to the surface: the sample's primitive, or that of a sample beside it.
+// Finds the surface behind an intersected plane: the sample's primitive, or that of a sample beside it.
 //
 // A sample's plane covers its whole texel, its triangle may not: beyond an edge the surface is that of another triangle,
-// or there is none. The samples in the cells around the intersection name the triangles that it may be of. If none of
-// these is hit, and none shows that the ray passes, the plane stands for what is too small for a sample.
+// or there is none. The samples in the cells round the intersection name its candidate triangles. If none of these is
+// hit, and none shows that the ray passes, the plane stands for a surface too small for a sample.
 #include "ldc/cells.glsl"
 
 #ifdef LDC_EXACT
@@ -13,11 +13,11 @@
 
 layout(binding = UNIT_TRACER_6) uniform usamplerBuffer ldc_primitives;
 
-// How far behind the plane's intersection that of another triangle may be, in cells.
+// Maximum distance of another triangle's intersection behind the plane's, in cells.
 const float BEHIND = 4.0;
-// In cells: intersections no farther apart are the same one.
+// Maximum distance, in cells, of intersections that count as the same.
 const float AGAIN = 1e-3;
-const int TRIES_MAX = 8; // then the last plane is the answer
+const int TRIES_MAX = 8; // after these the last plane is the answer
 
 // The first entry of a cell, or LDC_ENTRY_NONE.
 uint entry_at(cell_traversal w, ivec3 cell)
@@ -54,7 +54,7 @@ bool settle_sphere(trace_ray r, vec3 o, vec3 d, uint primitive, float end, inout
 }
 #endif
 
-// Replaces the intersected sample by that of the triangle that the ray hits there, before `limit`. False: it passes.
+// Replaces the intersected sample by that of the triangle that the ray hits there, before `limit`. False: the ray passes.
 bool settle(trace_ray r, cell_traversal w, float limit, inout ldc_found found)
 {
     uvec2 which = texelFetch(ldc_primitives, int(found.sample_index)).xy;
@@ -72,7 +72,7 @@ bool settle(trace_ray r, cell_traversal w, float limit, inout ldc_found found)
         found.end = own.distance;
         return true;
     }
-    // The corner of cells that is nearest to the intersection.
+    // Corner of cells nearest to the intersection.
     float s = found.end * w.scale - w.begin;
     vec3 p = w.o + s * w.d;
     ivec3 corner = ivec3(floor(p + 0.5));
@@ -105,13 +105,14 @@ bool settle(trace_ray r, cell_traversal w, float limit, inout ldc_found found)
             }
         }
     }
-    bool stands_before = !is_hit && !own.from_behind; // what leaves a body would begin inside it once more
+    // moved forward, a ray that leaves a body would begin inside it once more
+    bool stands_before = !is_hit && !own.from_behind;
     found.end = stands_before ? max(found.end - LDC_STANDS_BEFORE / w.scale, r.t_min) : found.end;
     return is_hit || !passes && w.is_within;
 }
 
-// The rest of the ray, from an intersection that was none, up to s_end. A plane that is extended beyond its texel may
-// have hidden that of the next texel at the same point.
+// Continues from a rejected intersection up to s_end. A plane extended beyond its texel may have hidden the plane of the
+// next texel at the same point.
 void go_on(inout cell_traversal w, float s, float s_end)
 {
     w.beside_max = w.is_within ? LDC_BEYOND : LDC_SLACK;

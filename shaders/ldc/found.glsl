@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a traversal of cubes does with the samples that a ray intersects.
+// Collects the samples that a ray intersects in a traversal of cubes.
 //
 // Defines: those of trace/wave.comp.
 #include "shared/hit.h"
@@ -7,7 +7,7 @@
 #include "common/sampled.glsl"
 #include "ldc/cube.glsl"
 
-// What a ray has found, and up to where it is still looking.
+// The nearest sample found, and the end of the remaining search.
 struct ldc_found {
     float end; // in lengths of the direction
 #ifdef ANY_HIT
@@ -24,8 +24,8 @@ struct ldc_found {
 #ifdef ANY_HIT
 
 #ifdef HAS_TRANSLUCENT
-// The transmittance of a sample for a shadow ray: transmittance_of() of common/alpha.glsl. Surfaces that a mask cuts
-// away have no samples.
+// Transmittance of a sample for a shadow ray, by transmittance_of() of common/alpha.glsl. Surfaces that a mask cuts away
+// have no samples.
 vec3 transmittance_of_sample(uvec4 words)
 {
     material m = material_at(sample_material(words));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The histogram of fragments per texel; the last bin is 255 and more.
+// Histogram of fragments per texel; the last bin has 255 and more.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The traversal image by image: a DDA through an image's nodes, into the children where the ray's depths meet the
-// node's range and on to the next node where they do not. Paper, section 1.4.
+// Traversal image by image: a DDA through an image's nodes enters the children where the ray's depths meet the node's
+// range, and goes to the next node where they do not. Paper, section 1.4.
 //
 // The image of the ray's dominant axis comes first, as the ray passes the fewest of its texels; an intersection in one
 // image ends the ray in the next.
@@ -10,7 +10,7 @@
 
 #ifndef LDC_CELLS
 
-layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of blocks: minimum and maximum depth
+layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // minimum and maximum depth of blocks
 
 uniform int ldc_row[LDC_CUBES]; // blocks
 
@@ -18,14 +18,14 @@ struct image_traversal {
     vec3 o, d; // cells of the image
     vec2 inverse;
     float s, s_end;
-    float s_min, s_limit; // between which an intersection counts
-    float begin, scale; // cell_ray's
+    float s_min, s_limit; // range in which intersections count
+    float begin, scale; // those of cell_ray
     ivec2 texel;
-    int level; // 0: of texels; 1: of blocks
+    int level; // 0: texels; 1: blocks
     int cube, axis;
 };
 
-// Image number `pass` of all cubes for a ray; if the ray does not enter it, s >= s_end.
+// Begins image number `pass` of all cubes for a ray; if the ray misses it, s >= s_end.
 void begin_image(trace_ray r, float end, int pass, out image_traversal w)
 {
     w.cube = pass / 3;
@@ -61,7 +61,7 @@ int block_index(image_traversal w)
     return ldc_first_node[CUBE(w.cube)] + (w.axis * row + block.y) * row + block.x;
 }
 
-// Where the ray leaves its current node of a level, and by which side.
+// Exit of the ray from its current node of a level, and the side of the exit.
 float node_exit(image_traversal w, int shift, out bool by_u)
 {
     ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
@@ -71,7 +71,7 @@ float node_exit(image_traversal w, int shift, out bool by_u)
     return by_u ? exits.x : exits.y;
 }
 
-// Out of that node, in integers, so that each step advances.
+// Leaves that node, in integers, so that each step advances.
 void leave_node(inout image_traversal w, int shift, float s_out, bool by_u)
 {
     ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
@@ -85,10 +85,10 @@ void leave_node(inout image_traversal w, int shift, float s_out, bool by_u)
     w.s = uint(next.x) >= resolution || uint(next.y) >= resolution ? 1e30 : w.s;
 }
 
-// Rounds before a test for samples: the lanes of a SIMD group wait for the slowest.
+// Rounds before samples are tested: the lanes of a SIMD group wait for the slowest.
 const int IMAGE_ROUNDS = 4;
 
-// On towards the next texel in which the ray may hit something, for some rounds. True: it was reached.
+// Advances towards the next texel in which the ray may hit something, for some rounds. True: it was reached.
 bool next_texel(inout image_traversal w, out uvec4 words, out float z_min, out float z_max)
 {
     words = uvec4(0u);

@@ -9,7 +9,7 @@
  * its normal's dominant axis, and in another only if it leans to that axis almost as much (AXES_OVERLAP), so a
  * sample's depth changes by at most 1 / AXES_OVERLAP cells for each cell of u or of v.
  *
- * The paper has each triangle in one image. Then, where a surface changes from one image to another, there are
+ * In the paper each triangle is in one image. Then, where a surface changes from one image to another, there are
  * texels whose centre is covered neither by the last triangle of the one nor by the first of the other: cracks of
  * up to half a cell, through which a few rays of ten thousand pass. Overlapping images leave none while the
  * surface turns by less than nine degrees from one triangle to the next, and cost a seventh more samples on a
@@ -30,7 +30,7 @@
  *               y  primitive, scene-wide
  *   nodes     the hierarchy by which empty parts of the images are skipped: trace/ldc/levels.h
  *
- * Samples of a texel ascend in depth. Of several at the same depth the first drawn one is kept: the lowest
+ * Samples of a texel ascend in depth. Where several have the same depth, the first drawn one is kept: the lowest
  * instance, then the lowest primitive. The order of texels in `geometry` and `quads` differs from build to build.
  */
 #ifndef FARLIGHT_SHADERS_LDC_LAYOUT_H
@@ -46,45 +46,46 @@
 #define LDC_TEXEL_QUAD_SHIFT 8u
 #define LDC_OF_SPHERES 0x80000000u
 #define LDC_INSTANCE_MASK 0x7fffffffu
-#define LDC_QUADS_MAX 0x01000000u /* of all cubes of a tracer */
+#define LDC_QUADS_MAX 0x01000000u /* for all cubes of a tracer */
 
-/* The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
+/* Extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
  * curved surface. */
 #define LDC_SLACK 0.05f
-/* The maximum deviation of a plane from its sample's depth within its texel and the slack: half a cell and the
+/* Maximum deviation of a plane from its sample's depth within its texel and the slack: half a cell and the
  * slack along u, the same along v, at the maximum slope, 1 / AXES_OVERLAP. */
 #define LDC_SPAN ((1.0f + 2.0f * LDC_SLACK) / AXES_OVERLAP)
-/* Texels by their numbers of fragments; the last bin has those with more, too. */
+/* Bins of texels by their numbers of fragments; the last bin also has those with more. */
 #define LDC_HISTOGRAM_BINS 256u
 /* A block: 8 x 8 texels of an image. */
 #define LDC_BLOCK_SHIFT 3
-/* How near to a sample's depth a ray hits it in the paper's form: there 0.001 of bodies about 1 wide, in images of
- * 1024 texels. */
+/* Distance from a sample's depth at which a ray hits it in the paper's form: there 0.001 for bodies about 1
+ * wide, in images of 1024 texels. */
 #define LDC_TOLERANCE_CELLS 1.0f
-/* The rounding error of depths and positions, in cells: some units in the last place of 4096. */
+/* Rounding error of depths and positions, in cells: some units in the last place of 4096. */
 #define LDC_ROUNDING 0.002f
-/* That of the planes of closest hits, which are verified with triangles (ldc/exact.glsl): between planes that end
- * nearer, rays pass where surfaces bend. On a dragon of 48,000 triangles at 1024 cells 0.05 lets one ray in 300
- * through, 0.25 one in 1300, 0.5 one in 2400, 1 one in 2800. */
+/* Extension of planes for closest hits, which are verified with triangles (ldc/exact.glsl), in cells: between
+ * shorter planes, rays pass where surfaces bend. On a dragon of 48,000 triangles at 1024 cells 0.05 lets one
+ * ray in 300 through, 0.25 one in 1300, 0.5 one in 2400, 1 one in 2800. */
 #define LDC_BEYOND 0.5f
-/* A plane that stands for triangles without samples is moved towards the ray's origin, in cells: in a hollow it
- * would lie behind them, and shadow rays from there would begin inside the body. */
+/* Distance, in cells, by which a plane that stands for triangles without samples is moved towards the ray's
+ * origin: in a hollow it would lie behind them, and shadow rays from there would begin inside the body. */
 #define LDC_STANDS_BEFORE 0.03f
 /* A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit the surface
- * that it leaves. So near its origin (LDC_OWN_WAY cells) a ray ignores planes that pass the origin within this
- * distance. From behind, as a ray that leaves a body would hit its own surface, the distance is generous. From the
- * front, as a ray in a corner hits the other wall, and a refracted ray its own surface, it suffices for a
- * curvature radius of six cells: 1.5^2 / (2 * 6). */
+ * that it leaves. So within LDC_OWN_WAY cells of its origin a ray ignores planes that pass the origin within these
+ * distances. The one for planes hit from behind, as a ray that leaves a body would hit its own surface, is
+ * generous. The one for planes hit from the front, as a ray in a corner hits the other wall, and a refracted ray
+ * its own surface, suffices for a curvature radius of six cells: 1.5^2 / (2 * 6). */
 #define LDC_OWN_WAY 1.5f
 #define LDC_OWN_BEHIND 0.5f
 #define LDC_OWN_BEFORE 0.2f
 
 /* clang-format off */
-/* Cells: the ones that the plane of a sample of any image passes. The buffer of nodes, RGBA32UI, begins with the nodes,
- * a grid of blocks (raster/layout.h) of 16 x 16 x 16 cells whose parts are 4 x 4 x 4 cells; `z` of an occupied one is
- * the texel of its first occupied part, the others follow in the order of their bits. Then these parts, called blocks:
- *   x, y  the ones of its 64 cells that a plane passes
- *   z     entry of the first of these, the others follow
+/* Cells that the plane of a sample of any image passes. The buffer of nodes, RGBA32UI, begins with the nodes, a
+ * grid of blocks (raster/layout.h) of 16 x 16 x 16 cells whose parts are 4 x 4 x 4 cells; `z` of an occupied
+ * node is the texel of its first occupied part, the others follow in the order of their bits. After the nodes come
+ * these parts, called blocks:
+ *   x, y  bits of its 64 cells that a plane passes
+ *   z     entry of the first of these cells, the others follow
  *   w     unused
  * Entries, RGBA32UI:
  *   x     sample, bits 30 and 31 its image
@@ -96,26 +97,26 @@
 #define LDC_ENTRY_SAMPLE_MASK 0x3fffffffu
 #define LDC_ENTRY_NONE 0xffffffffu
 
-/* Data between the passes that build a cube, and for the host: counted while it is built. */
+/* Data between the passes that build a cube, and for the host: counts of the build. */
 struct ldc_build_counts {
     uint unslotted;              /* fragments without a slot, also those beyond the capacity */
-    uint fragments;              /* all */
+    uint fragments;              /* fragments in total */
     uint layers_needed;          /* maximum per texel */
     uint occupied;               /* texels with fragments */
-    uint places;                 /* for kept fragments without a slot */
-    uint samples_max, quads_max; /* if no two fragments coincide */
-    uint samples, quads;         /* kept: coincident ones count once */
-    uint samples_lost; /* fragments beyond the maximum number of samples of their texels, also those that coincide
-                          with a kept one */
-    uint fragments_wraps; /* overflows of `fragments`: times that it reached 2^32; it and the counts beside it are
-                             then void */
+    uint places;                 /* places of kept fragments without a slot */
+    uint samples_max, quads_max; /* maxima, reached if no two fragments coincide */
+    uint samples, quads;         /* kept ones: coincident fragments count once */
+    uint samples_lost;    /* fragments beyond the maximum number of samples of their texels, including those that
+                             coincide with a kept one */
+    uint fragments_wraps; /* overflows of `fragments`: the number of times that it reached 2^32; it and the
+                             counts beside it are then void */
     uint pad0;
 };
 SHARED_SIZE(ldc_build_counts, 48)
 
-/* Occupied texels that one invocation packs: their samples are contiguous, so that one atomic places them all. */
+/* Occupied texels that one invocation packs: their samples are contiguous, so one atomic places all of them. */
 #define LDC_PACK_TEXELS 8u
-/* Texels of at most this number of fragments are sorted by the same invocation. */
+/* Maximum of a texel's fragments that the same invocation sorts. */
 #define LDC_PACK_SORTS 32u
 /* Texels that one invocation of places.comp tests. */
 #define LDC_PLACES_TEXELS 32u
@@ -125,15 +126,16 @@ SHARED_SIZE(ldc_build_counts, 48)
  *   counts     R32UI, one per texel: its fragments
  *   occupied   R32UI: texels that have fragments, as bits: 0..11 u, 12..23 v, 24..25 axis
  *   ordered    RG32UI: depth (float, cells), id. The first `slots` fragments of each texel have a slot: slot after
- *              slot, in each all texels. Then the places of the others, those of a texel together
+ *              slot, each with all texels. The places of the others follow, those of a texel together
  *   places     R32UI, one per texel with more fragments than slots: the place of the first of the others
- *   fragments  RGBA32UI, those others in the order of their arrival: texel, number in the texel, depth, id
+ *   fragments  RGBA32UI, the fragments without a slot in the order of their arrival: texel, number in the texel,
+ *              depth, id
  *   found      R32UI, one per texel: layers peeled so far
- *   surface    of the cube: until sample.comp writes it, of each sample: texel, as in `occupied`, depth, id, 0
+ *   surface    the cube's; until sample.comp writes it, each sample has: texel, as in `occupied`, depth, id, 0
  *   peeled     RGBA32UI, two per peeled sample: the words of `surface`; those of `primitives`, 0, 0 */
 /* clang-format on */
 
-/* Binding points. */
+/* Binding points of the passes that build. */
 #define BIND_LDC_BUILD_COUNTS BIND_TRACER_0 /* struct ldc_build_counts */
 #define BIND_LDC_HISTOGRAM BIND_TRACER_1
 #define IMAGE_LDC_COUNTS 0 /* ldc/build.*, and the passes after it */
@@ -152,12 +154,12 @@ SHARED_SIZE(ldc_build_counts, 48)
 #define IMAGE_LDC_ENTRIES 1
 #define UNIT_LDC_COUNTS UNIT_TRACER_0
 #define UNIT_LDC_PLACES UNIT_TRACER_1
-#define UNIT_LDC_FRAGMENTS UNIT_TRACER_2 /* in the passes of lists */
-#define UNIT_LDC_FOUND UNIT_TRACER_2     /* in those of peeling */
+#define UNIT_LDC_FRAGMENTS UNIT_TRACER_2 /* passes of lists */
+#define UNIT_LDC_FOUND UNIT_TRACER_2     /* passes of peeling */
 #define UNIT_LDC_DRAWN UNIT_TRACER_4
 #define UNIT_LDC_LAYER UNIT_TRACER_5
 #define UNIT_LDC_OCCUPIED UNIT_TRACER_6
-#define UNIT_LDC_LAYER_SURFACE UNIT_TRACER_2 /* in peeled.comp */
+#define UNIT_LDC_LAYER_SURFACE UNIT_TRACER_2 /* peeled.comp */
 #define UNIT_LDC_PEELED_SURFACE UNIT_TRACER_3
 
 #endif

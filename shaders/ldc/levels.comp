@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: MIT
-// Ranges of depth over blocks of texels of an image, of all its layers (paper, section 1.3). A ray whose depths do not
-// meet the range hits nothing in the block: a range covers the extended planes of its samples, not only the samples.
+// Finds the ranges of depth over blocks of texels of an image, with all its layers (paper, section 1.3). A ray whose
+// depths do not meet the range hits nothing in the block: a range covers the extended planes of its samples, not only the
+// samples.
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 #include "ldc/plane.glsl"
 
-// The number of a texel's samples whose planes are evaluated; with more, the maximum deviation is assumed. Software GL
-// ends an invocation's loops after 65,535 rounds.
+// Maximum of samples in a texel whose planes are evaluated; with more, the maximum deviation is assumed. Software GL ends
+// an invocation's loops after 65,535 rounds.
 const uint PLANES_MAX = 32u;
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
 layout(binding = IMAGE_LDC_NODES, rg32f) writeonly uniform imageBuffer ranges;
 
-uniform uint first_texel, first_block; // of the cube
+uniform uint first_texel, first_block; // those of the cube
 uniform uint resolution;               // texels along a side of an image
 uniform uint row;                      // blocks along a side
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Moves the fragments without a slot, which came in any order, to their texels' places.
+// Moves the fragments without a slot, which arrived in any order, to their texels' places.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"

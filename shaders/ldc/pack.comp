@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// From the fragments of texels to their samples: sorted by depth and id, without duplicates, the nearest if there are
-// more than the limit. Writes texels and quads, and the input of sample.comp. Define: PEELED they are sorted and
+// Packs the fragments of texels into samples: sorted by depth and id, without duplicates, the nearest if there are more
+// than the limit. Writes texels and quads, and the input of sample.comp. Define: PEELED the fragments are sorted,
 // distinct, and samples already
 
 #include "ldc/layout.h"
 #include "common/dispatch.glsl"
 #include "ldc/run.glsl"
 
-uniform uint first_texel, first_sample, first_quad; // of the cube
+uniform uint first_texel, first_sample, first_quad; // those of the cube
 uniform uint layers_max;                            // at most 255
 
 #ifdef PEELED
@@ -30,8 +30,8 @@ void in_order(inout uvec2 a, inout uvec2 b)
     a = minimum;
 }
 
-// The first four in registers, the rest by insertion: most texels have few, and many often come nearly in order. True:
-// some may coincide.
+// Sorts the first four in registers, the rest by insertion: most texels have few fragments, and many are often nearly in
+// order. True: some may coincide.
 bool sort(run r)
 {
     const uvec2 NONE = uvec2(0xffffffffu);
@@ -52,7 +52,7 @@ bool sort(run r)
             store(r, 3u, d);
         coincide = a.x == b.x || r.count > 2u && b.x == c.x || r.count > 3u && c.x == d.x;
     }
-    if (r.count > LDC_PACK_SORTS) // sorted by sort.comp
+    if (r.count > LDC_PACK_SORTS) // sort.comp has sorted it
         return true;
     for (uint i = 4u; i < r.count; i++) {
         uvec2 moved = load(r, i);
@@ -70,7 +70,7 @@ bool sort(run r)
     return coincide;
 }
 
-// The number of distinct ones among sorted ones.
+// Counts the distinct fragments in a sorted run.
 uint count_kept(run r, bool coincide)
 {
     uint kept = coincide ? 0u : r.count < layers_max ? r.count : layers_max, last = LDC_NO_DEPTH_BITS;
@@ -121,7 +121,7 @@ void main()
     if (begin >= occupied_count)
         return;
     uint end = begin + LDC_PACK_TEXELS < occupied_count ? begin + LDC_PACK_TEXELS : occupied_count;
-    uvec2 bytes = uvec2(0u); // what each of the eight keeps
+    uvec2 bytes = uvec2(0u); // indices of the eight that are kept
     uint samples = 0u, quads = 0u;
     for (uint k = begin; k < end; k++) {
         run r = run_of(k);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Appends a peeled layer of the scene to its texels' records. A texel has as many places as fragments were counted in it:
-// what another program draws beyond them is lost, and said to be.
+// fragments that another program draws beyond them are lost, and counted as lost.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lists the texels that have fragments, counts these, and places those without a slot.
+// Lists the texels that have fragments, counts the fragments, and places those without a slot.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"
@@ -8,7 +8,7 @@
 uniform uint texel_count;
 uniform uint texels_along; // a side of the images
 uniform uint slots;          // fragments of a texel that have a slot
-uniform uint fragments_kept; // of one texel
+uniform uint fragments_kept; // maximum in a texel
 
 layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
 layout(binding = IMAGE_LDC_PLACES, r32ui) writeonly uniform uimageBuffer places;

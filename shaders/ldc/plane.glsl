@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The plane of a sample and its extent.
+// Plane of a sample and its extent.
 #include "ldc/layout.h"
 #include "common/math.glsl"
 
-// Not unit: for ratios.
+// Direction in ratios: not normalised.
 vec3 direction_from_octahedral(uint bits)
 {
     vec2 p = unpackSnorm2x16(bits);
@@ -13,7 +13,7 @@ vec3 direction_from_octahedral(uint bits)
     return v;
 }
 
-// The deviation of the plane of a sample in an axis's image from the sample's depth.
+// Deviation of the plane of a sample in an axis's image from the sample's depth.
 float plane_reach(uint normal_bits, int axis)
 {
     vec3 normal = abs(in_image(direction_from_octahedral(normal_bits), axis));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A texel's fragments in `ordered`: those with slots, then those without. The host binds counts, places, occupied and
+// Fragments of a texel in `ordered`: those with slots, then those without. The host binds counts, places, occupied and
 // ordered, and sets the uniforms below.
 #include "ldc/layout.h"
 #include "shared/bindings.h"
@@ -15,7 +15,7 @@ layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
 layout(binding = IMAGE_LDC_ORDERED, rg32ui) uniform uimageBuffer ordered;
 
 struct run {
-    uint bits; // as in `occupied`
+    uint bits; // texel, encoded as in `occupied`
     uint texel, place, count;
 };
 

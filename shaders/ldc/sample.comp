@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// The surface's material at each sample that the lists of fragments gave.
+// Evaluates the surface's material at each sample from the lists of fragments.
 // Defines: those of ldc/sample.glsl.
 
 #include "common/dispatch.glsl"
 #include "ldc/sample.glsl"
 
-uniform uint sample_count, first_sample; // of the cube
+uniform uint sample_count, first_sample; // those of the cube
 uniform uint drawn_count;
 
 layout(binding = UNIT_LDC_DRAWN) uniform usamplerBuffer drawn;
 layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
-layout(binding = IMAGE_LDC_SURFACE, rgba32ui) uniform uimageBuffer surface_; // what is to be sampled, then its words
+layout(binding = IMAGE_LDC_SURFACE, rgba32ui) uniform uimageBuffer surface_; // the point to be sampled, then its words
 layout(binding = IMAGE_LDC_PRIMITIVES, rg32ui) writeonly uniform uimageBuffer primitives_out;
 
-// The entry of `drawn` of an id.
+// Entry of `drawn` for an id.
 uvec4 drawn_of(uint id)
 {
     uint first = 0u, count = drawn_count;

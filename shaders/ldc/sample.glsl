@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The surface's material at a point of a primitive: the words of shared/surface_sample.h. Textures are applied,
-// filtered to the size of a cell, as in common/material.glsl; the material's own factors are not.
+// Material of the surface at a point of a primitive: the words of shared/surface_sample.h. Textures are applied, filtered
+// to the size of a cell, as in common/material.glsl; the material's own factors are not.
 // Defines: those of common/material.glsl; HAS_COLOURS: some mesh has vertex colours.
 
 #include "ldc/layout.h"
@@ -14,7 +14,7 @@ float cross_2d(vec2 a, vec2 b)
     return a.x * b.y - a.y * b.x;
 }
 
-// The point of a primitive at the centre of a texel.
+// A primitive's point at the centre of a texel.
 struct point {
     uint instance_index, primitive;
     uint flags; // DRAWN_*
@@ -29,13 +29,13 @@ point make_point(uint instance_index, uint primitive, uint flags, int axis, vec2
                  depth_cells);
 }
 
-// Its words of `primitives`.
+// Words of the point for `primitives`.
 uvec2 primitive_words(point p)
 {
     return uvec2(p.instance_index | ((p.flags & DRAWN_SPHERES) != 0u ? LDC_OF_SPHERES : 0u), p.primitive);
 }
 
-// A triangle's corners, in cells, and the barycentrics of the point.
+// Corners of a triangle, in cells, and the barycentrics of the point.
 struct placed_triangle {
     uvec4 vertices; // and the material
     vec4 world_from_object[3];
@@ -43,7 +43,7 @@ struct placed_triangle {
     vec2 barycentrics;
 };
 
-// Drawn edges differ a little from exact ones: the point is clamped to the triangle.
+// Places the triangle and the point. Drawn edges differ a little from exact ones: the point is clamped to the triangle.
 placed_triangle place_triangle(point p)
 {
     placed_triangle t;
@@ -65,7 +65,8 @@ placed_triangle place_triangle(point p)
 }
 
 #if !defined HAS_TEXTURES && !defined HAS_BUMP
-// As surface_triangle() of common/surface.glsl with half of its fetches: no texture coordinates, no tangent.
+// Does the work of surface_triangle() in common/surface.glsl with half of its fetches: no texture coordinates, no
+// tangent.
 struct plain_surface {
     vec3 geometric, shading;
     uint material_index;
@@ -86,7 +87,7 @@ plain_surface plain_triangle(point p)
         vec4 rows[3] = t.world_from_object;
         float maximum = max_component(max(abs(rows[0].xyz), max(abs(rows[1].xyz), abs(rows[2].xyz))));
         vec3 r0 = rows[0].xyz / maximum, r1 = rows[1].xyz / maximum, r2 = rows[2].xyz / maximum;
-        // Cofactors: the transposed inverse but for the determinant, of which only the sign matters.
+        // The cofactors are the transposed inverse up to the determinant, whose sign alone matters.
         vec3 interpolated = side * vec3(dot(cross(r1, r2), sum), dot(cross(r2, r0), sum), dot(cross(r0, r1), sum));
         float squared = dot(interpolated, interpolated);
         if (squared > 0.0)
@@ -162,7 +163,7 @@ void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
 #endif
     geometry_words = uvec2(floatBitsToUint(p.depth_cells), h.normal_geometric);
     surface_words = words_of(s, colour, h.material);
-#else // packing and unpacking would be wasted
+#else // avoids packing and unpacking
     plain_surface found = plain_triangle(p);
     s.normal = found.shading;
     geometry_words = uvec2(floatBitsToUint(p.depth_cells), pack_unit(found.geometric));

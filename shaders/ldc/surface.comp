@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// From the intersections of a closest-hit wave to hits: the second half of tracing layered depth cubes, in place of
+// Turns the intersections of a closest-hit wave into hits: the second half of tracing layered depth cubes, in place of
 // trace/surface.comp. A sample's words are copied into the hit, with the normals of its primitive where the ray hits it:
-// those at the sample's place are off where facets bend within a cell, most on spheres of few cells. Normals of maps are
-// kept as they were sampled. Discs, which no cube holds, become hits as for every tracer.
+// those at the sample's place are off where facets bend within a cell, most of all on spheres of few cells. Normals from
+// maps stay as they were sampled. Discs, which no cube holds, become hits as for every tracer.
 //
 // Defines: HAS_SPHERES, HAS_DISCS as the scene has them; those of common/range.glsl and common/surface.glsl.
 #include "common/dispatch.glsl"
@@ -12,10 +12,11 @@
 #include "common/surface.glsl"
 #include "ldc/layout.h"
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer sample_surfaces;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer sample_primitives;
-layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
+// three texels per hit; the first one is the intersection
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits;
 
 hit surface_sampled(uint sample_index, float distance_, vec3 origin, vec3 direction)
 {

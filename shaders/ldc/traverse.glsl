@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The traversal of layered depth cubes (ldc/layout.h). Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary
+// Traversal of layered depth cubes (ldc/layout.h). Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary
 // Effects. 2007.
 //
-// The host (trace/ldc/trace.c) sets, besides the defines of trace/wave.comp, those that the files included here name.
+// The host (trace/ldc/trace.c) sets the defines of trace/wave.comp and those of the files included here.
 //
 // Define: LDC_CELLS the traversal is that of ldc/cells.glsl, else that of ldc/images.glsl.
 #if defined LDC_CELLS && !defined ANY_HIT
@@ -37,7 +37,7 @@ void conclude(ldc_found found, inout answer a)
 #endif
 }
 
-// Up to the first intersection.
+// Traverses a cube up to the first intersection.
 void traverse_cube(inout TRAVERSAL w, inout ldc_found found)
 {
     while (w.s < w.s_end) {
@@ -87,7 +87,7 @@ void traverse(trace_ray r, inout answer a)
     conclude(found, a);
 }
 
-// Called by trace/wave.comp.
+// trace/wave.comp calls this for each ray.
 #ifdef ANY_HIT
 
 bool trace_any(trace_ray r, inout vec3 optical_depth)

@@ -6,7 +6,7 @@
 #include "common/candidate.glsl"
 
 uniform uint instance_count;
-// Where the part begins, and how many tests it has: entering an instance is one.
+// Beginning of the part, and its number of tests: entering an instance is one.
 uniform uint part_first_instance, part_first_primitive, part_tests;
 
 #ifdef NAIVE_PARTS

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Where the rays of a tile of an eye's pixels may meet something first: with all before that left out, a ray looks at
-// a third of the nodes. Of each tile an RGBA32F texel: the greatest w at which there may be something; the level of the
-// node that rays begin in, and QUADTREE_BEAM_INSIDE; how far along them there is something, metres; unused.
+// Finds where the rays of a tile of an eye's pixels may first meet something: rays that skip everything before it visit a
+// third of the nodes. Writes an RGBA32F texel per tile: the maximum w at which there may be something; the level of the
+// node that rays begin in, and QUADTREE_BEAM_INSIDE; the distance along the rays before which there is nothing, metres;
+// unused.
 //
-// The rays of a tile pass through a rectangle at each w. Between two of them lies what they may meet; what the nodes
-// there hold brings these two closer, and so on.
+// The rays of a tile pass through a rectangle at each w. Between two of these rectangles lies what they may meet; the
+// nodes there bring the two closer, and so on.
 #include "common/dispatch.glsl"
 #include "common/camera.glsl"
 #include "quadtree/eye.glsl"
@@ -13,17 +14,17 @@ layout(binding = IMAGE_QUADTREE_BEAMS, rgba32f) writeonly uniform imageBuffer be
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
 
 uniform uint first_tile, tile_count;
-uniform float eye_reach; // how far samples are from the middles of their pixels, pixels
-uniform float eye_near; // where rays begin, along the eye's view, metres
-uniform float eye_far;  // beyond all that the face sees, from its eye, metres
+uniform float eye_reach; // maximum distance of samples from the middles of their pixels, pixels
+uniform float eye_near; // distance along the eye's view at which rays begin, metres
+uniform float eye_far;  // distance from the face's eye beyond everything that it sees, metres
 
 const int ROUNDS = 6;
 const float ROUNDING = 1e-3; // a share of w, and a texel
 
 struct beam {
-    vec4 far;  // of its rays: least and greatest
+    vec4 far;  // minimum and maximum of its rays
     vec3 eye;  // in units
-    float w_near; // where they begin, or come before the eye of the face
+    float w_near; // w at which rays begin, or come before the eye of the face
 };
 
 beam beam_through(uvec2 first, uvec2 last)
@@ -42,7 +43,7 @@ beam beam_through(uvec2 first, uvec2 last)
     return b;
 }
 
-// Least and greatest place of its rays.
+// Minimum and maximum place of a beam's rays at w.
 vec4 places_at(beam b, float w)
 {
     vec4 middle = quadtree.scale_centre.zwzw;
@@ -50,7 +51,7 @@ vec4 places_at(beam b, float w)
     return middle + (b.far - middle) * shrinks + w * b.eye.xyxy + ROUNDING * vec4(-1.0, -1.0, 1.0, 1.0);
 }
 
-// Least and greatest w of a node.
+// Maximum and minimum w of a node.
 vec2 node_range(uint level, ivec2 place)
 {
     uvec2 node = texelFetch(quadtree_nodes, int(node_index(0u, level, uvec2(place)))).xy;
@@ -91,7 +92,7 @@ void main()
     }
     vec4 start = places_at(b, w_greatest);
     bool is_inside = is_one_view && all(greaterThanEqual(start.xy, vec2(0.0))) && all(lessThan(start.zw, vec2(size)));
-    // Somewhat smaller than what the tile sees: such nodes are nearer to the surface than large ones, and seen as fast.
+    // Slightly smaller nodes than the tile's extent are nearer to the surface than large ones, and read as fast.
     int begins = (is_one_view ? max(level - 2, 0) : QUADTREE_TOP) + (is_inside ? QUADTREE_BEAM_INSIDE : 0);
     vec3 eye = eye_of(view_of_pixel(first));
     float reach = length(vec3(eye.xy / quadtree.scale_centre.xy, eye.z)) + eye_far;

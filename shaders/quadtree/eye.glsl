@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: MIT
-// The rays of pinhole eyes near that of a view, in the space of its face (quadtree/layout.h).
+// Rays of pinhole eyes near a view's own eye, in the space of its face (quadtree/layout.h).
 //
-// In a face (x, y) is linear in w along a ray: far + w * along. `far` is where the ray goes, far away, and follows from
+// In a face (x, y) is linear in w along a ray: far + w * along. `far` is the ray's place at infinity, and follows from
 // its direction alone.
 #include "quadtree/node.glsl"
 
-// Of pixels of the eye's view from its top left: right, down and forward in the face, the first two in texels.
+// Directions of pixels in the eye's view: the top left corner and the steps to the right and down, as right, down and
+// forward of the face, the first two in texels.
 uniform vec3 eye_corner, eye_right, eye_down;
-// Of the eye of the picture's first view, from that of the face, likewise; and from it to those of the next ones.
+// Offset of the eye of the picture's first view from the face's eye, in the same units; and the steps to the eyes of the
+// next views.
 uniform vec3 eye_first, eye_across, eye_below;
 
 struct eye_line {
     vec2 far, along;
-    float cosine; // of its angle with the forward direction
+    float cosine; // cosine of its angle with the forward direction
 };
 
 vec3 eye_of(uvec2 view)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Where the rays of pinhole eyes meet the layers of a view (shared/eye_hit.h): what traverse.glsl finds, of rays that
-// are made on the way from planes alone.
+// Finds where the rays of pinhole eyes meet the layers of a view (shared/eye_hit.h): the answers of traverse.glsl, for
+// rays that are made on the fly, from planes alone.
 //
-// Defines: SPREAD as common/sample_place.glsl has it; QUADTREE_LAYERS how many layers the face has.
+// Defines: SPREAD of common/sample_place.glsl; QUADTREE_LAYERS the number of layers of the face.
 #include "shared/eye_hit.h"
 #include "common/dispatch.glsl"
 #include "common/sample_place.glsl"
@@ -20,19 +20,19 @@ layout(std430, binding = BIND_QUADTREE_COUNTS) buffer count_block
 uniform uint first_slot, first_item, end_item;
 
 const int START = QUADTREE_TOP;
-const float NEVER = -1.0; // of a w: behind all that a ray may meet
+const float NEVER = -1.0; // w behind everything that a ray may meet
 
-// A ray on its way through a layer, from greater w to lesser.
+// March of a ray through a layer, from greater to smaller w.
 struct eye_walk {
-    vec2 far, along, inverse; // a place of it is far + w * along
+    vec2 far, along, inverse; // places on it are far + w * along
     float w, w_end;
-    int level; // of the first node
+    int level; // level of the first node
     bool is_before;
-    float w_met; // where it meets a plane
-    float w_behind; // where it came behind the layer for more than a texel
-    float w_fill; // where it was last before the first layer that it came behind
+    float w_met; // w where it meets a plane
+    float w_behind; // w where it first came behind the layer for more than a texel
+    float w_fill; // w where it was last before the first layer that it came behind
     uint fill_layer;
-    bool ends_behind; // the first layer
+    bool ends_behind; // the end is behind the first layer
 };
 
 void walk_layer(uint layer, inout eye_walk walk)
@@ -44,9 +44,9 @@ void walk_layer(uint layer, inout eye_walk walk)
     int level = walk.level, first = int(layer * quadtree.slice_nodes);
     ivec2 cell = clamp(ivec2(floor(far + w * along)), ivec2(0), padded - 1) >> level;
     walk.w_met = walk.w_behind = NEVER;
-    // Where lanes go side by side, a loop that begins with its condition does all once more for the last of them. Two ways
-    // out, which assign w_met differently: with one at the end, lanes that were done sooner had wrong values behind the loop
-    // (Mesa's llvmpipe 22.3).
+    // Lanes in lockstep execute a loop that begins with its condition once more for the last of them. This loop has two
+    // exits, which assign w_met differently: with a single one at the end, lanes that had finished earlier had wrong
+    // values after the loop (Mesa's llvmpipe 22.3).
     while (true) {
         bool is_on_way = w > w_end;
         uvec2 node = texelFetch(quadtree_nodes, first + int(node_index(0u, uint(level), uvec2(cell)))).xy;
@@ -56,10 +56,10 @@ void walk_layer(uint layer, inout eye_walk walk)
         vec2 slopes = plane_slopes(node), range = box_range(node);
         float height = plane_w(node) + dot(slopes, far - node_centre(uint(level), uvec2(cell)));
         float growth = dot(slopes, along) - 1.0;
-        float gap = w_out > range.x ? -1.0 : w < range.y ? range.y - w : 0.0; // of a box; 0: in it
+        float gap = w_out > range.x ? -1.0 : w < range.y ? range.y - w : 0.0; // distance to a box; 0: in it
         float gap_in = is_plane ? height + growth * w : gap, gap_out = is_plane ? height + growth * w_out : gap;
         bool goes_down = !is_plane && gap == 0.0, passes = (gap_in > 0.0) != (gap_out > 0.0);
-        // Or between two planes that do not quite meet.
+        // The ray may also pass between two planes that do not quite meet.
         bool is_met = is_on_way && is_plane && (passes || is_before && gap_in > 0.0 &&
                                             gap_in <= QUADTREE_EDGE_SHARE * plane_w(node) + quadtree.bounds.x);
         if (is_met) {
@@ -98,7 +98,8 @@ void walk_layer(uint layer, inout eye_walk walk)
     }
 }
 
-// As traverse.glsl has it: nothing is taken to be before the view where the ray comes in near it, or by the near plane.
+// Whether everything before the view counts as empty, by the rule of traverse.glsl: where the ray enters near the view's
+// eye, or through the near plane.
 bool is_free_before(eye_walk walk, float w_enters, float w_begins)
 {
     if (w_enters >= w_begins)
@@ -107,8 +108,8 @@ bool is_free_before(eye_walk walk, float w_enters, float w_begins)
     return length(vec3(place, 1.0)) <= QUADTREE_FREE_RADII * quadtree.bounds.w * w_enters;
 }
 
-// The texel of a sample; `beam`: of its tile; `code`: what is counted of it.
-vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
+// Texel of a sample. `beam`: that of its tile; `code`: the count that it adds to.
+vec4 trace_sample(vec3 eye, vec2 place, vec4 beam, out uint code)
 {
     eye_line line = line_of(eye, direction_through(place));
     float w_last = quadtree.depths.x / max(eye.z + beam.z * line.cosine, quadtree.depths.w);
@@ -134,7 +135,7 @@ vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
     for (uint layer = 0u; layer < QUADTREE_LAYERS && goes_on; layer++) {
         layers = layer + 1u;
         walk_layer(layer, walk);
-        // A ray that comes into the view behind what is seen has passed that beside the view.
+        // A ray that enters the view behind the first surface has passed that beside the view.
         has_left = has_left || layer == 0u && walk.w_behind == w_first && w_enters < beam.x;
         if (walk.w_met > walk.w_end) {
             walk.w_end = w_hit = walk.w_met;
@@ -171,7 +172,7 @@ void main()
     if (pixel.x < frame.width && pixel.y < frame.height) {
         vec2 place = place_of_sample(pixel_in_view(pixel), k & (1u << frame.sample_shift) - 1u);
         vec4 beam = texelFetch(beams, int((slot >> 6) - (first_slot >> 6)));
-        found = look(eye_of(view_of_pixel(pixel)), place, beam, code);
+        found = trace_sample(eye_of(view_of_pixel(pixel)), place, beam, code);
     }
     imageStore(eye_hits, int(k), found);
     if (code != 0u)

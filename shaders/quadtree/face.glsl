@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// A ray in the space of a face (quadtree/layout.h), where it is a segment.
+// Rays in the space of a face (quadtree/layout.h), where they are segments.
 #include "quadtree/node.glsl"
 #include "common/candidate.glsl"
 
-// The part of a ray that lies in a face. A point u of it, from 0 to 1, is at from + u * along.
+// Part of a ray that lies in a face. A point u of it, from 0 to 1, is at from + u * along.
 struct face_segment {
     vec3 from, along;  // x, y, w
     float t_from, t_to; // distances along the ray at both ends
-    float q_from, q_to; // 1 / Z there; of an orthographic face 1
+    float q_from, q_to; // 1 / Z at both ends; for an orthographic face 1
 };
 
 vec3 face_vector(uint face, vec3 v)
@@ -22,7 +22,7 @@ bool is_orthographic()
     return quadtree.depths.z != 0.0;
 }
 
-// x, y, w of a point along right, down and forward from the eye.
+// Converts a point along right, down and forward from the eye to x, y, w.
 vec3 face_place(vec3 p, float q)
 {
     float w = is_orthographic() ? (quadtree.depths.y - p.z) / (quadtree.depths.y - quadtree.depths.x)
@@ -35,7 +35,7 @@ float face_q(vec3 p)
     return is_orthographic() ? 1.0 : 1.0 / p.z;
 }
 
-// Leaves of [t.x, t.y] what is not below 0 of a + t * b.
+// Clips [t.x, t.y] to the range where a + t * b is not below 0.
 void clip_range(float a, float b, inout vec2 t)
 {
     float at = -a / b;
@@ -47,7 +47,7 @@ void clip_range(float a, float b, inout vec2 t)
         t = vec2(1.0, 0.0);
 }
 
-// Where from distance t.x to t.y a ray is in a face; empty: it is not.
+// Range of distances within [t.x, t.y] in which a ray is in a face; empty: it is not.
 vec2 clip_to_face(vec3 origin, vec3 direction, vec2 t)
 {
     float z_of_sides = is_orthographic() ? 0.0 : 1.0;
@@ -83,7 +83,7 @@ float distance_at(face_segment s, float u)
     return (s.t_from * from + s.t_to * to) / (from + to);
 }
 
-// The place of a distance that is not before the segment.
+// Place at a distance that is not before the segment.
 float place_at(face_segment s, float t)
 {
     if (t >= s.t_to)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rays that begin at the eye of a view: what one of its layers shows where they pass, as intersections.
+// Intersects rays that begin at the eye of a view with the surfaces of one of its layers.
 //
 // Defines: HAS_SPHERES as the scene has them; those of common/range.glsl.
 #include "shared/hit.h"
@@ -10,13 +10,15 @@
 #include "common/math.glsl"
 #include "quadtree/face.glsl"
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
-layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer hits; // three texels each; an intersection is the first
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
+// three texels per hit; the first one is the intersection
+layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer hits;
 layout(binding = UNIT_QUADTREE_VISIBLE) uniform usampler2DArray quadtree_visible;
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
 
 uniform uint layer;
-uniform uint only_within_reach; // 1: of the layers behind the first, what some eye within the radius sees: the layer'th
+// 1: of the layers behind the first, the layer'th one that some eye within the radius sees
+uniform uint only_within_reach;
 
 uvec2 leaf(uint slice, ivec2 texel)
 {
@@ -31,15 +33,16 @@ const mat2 NEXT_DIRECTION = mat2(TURN, vec2(-TURN.y, TURN.x));
 const int DISTANCES = 4;
 const float REACH_MAX = 128.0; // texels
 
-// Along a ray from a hidden surface towards an eye at the radius w grows by `growth` a texel, until it meets the plane of
-// what hides that surface. The eye sees past that if the ray is before what is seen somewhere on that way: there is an
-// edge between. Looked for at some places: what that misses is narrow.
+// Whether an eye in a direction at the radius sees past the surface that hides another one. Along a ray from the hidden
+// surface towards that eye w grows by `growth` per texel, until it meets the plane of the hiding surface. The eye sees
+// past that if the ray is before the visible surface somewhere on the way: then there is an edge between. Some places are
+// tested: a gap that they miss is narrow.
 bool is_seen_past(uint hiding, ivec2 texel, vec2 towards, float w, float growth)
 {
     uvec2 hides = leaf(hiding, texel);
     float reach = min((plane_w(hides) - w) / max(growth - dot(plane_slopes(hides), towards), 1e-9), REACH_MAX);
     for (int k = 1; k <= DISTANCES; k++) {
-        ivec2 way = ivec2(towards * (reach * float(k) / float(DISTANCES))); // no farther than it
+        ivec2 way = ivec2(towards * (reach * float(k) / float(DISTANCES))); // at most the full reach
         float of_ray = w + length(vec2(way)) * growth;
         float of_plane = plane_w(hides) + dot(plane_slopes(hides), vec2(way));
         if (of_ray < of_plane && plane_w(leaf(hiding, texel + way)) < of_ray)
@@ -53,14 +56,16 @@ bool is_within_reach(uint hidden, ivec2 texel)
     float growth = 1.0 / (quadtree.scale_centre.x * quadtree.bounds.w), w = plane_w(leaf(hidden, texel));
     vec2 towards = vec2(1.0, 0.0);
     for (int i = 0; i < DIRECTIONS && w > 0.0; i++) {
-        towards = NEXT_DIRECTION * towards; // angles would take longer than what is looked up along them
+        // turns by a fixed step: angles would take longer than the texels read along them
+        towards = NEXT_DIRECTION * towards;
         if (is_seen_past(0u, texel, towards, w, growth) && (hidden < 2u || is_seen_past(1u, texel, towards, w, growth)))
             return true;
     }
     return false;
 }
 
-// Bodies have two sides: the far one of what is seen is next behind it, but few eyes see that.
+// Number of the layer shown. Bodies have two sides: the far side of the visible surface is next behind it, but few eyes
+// see that.
 uint shown_layer(ivec2 texel)
 {
     if (only_within_reach == 0u)
@@ -74,7 +79,7 @@ uint shown_layer(ivec2 texel)
     return NO_LAYER;
 }
 
-// How far along the ray the plane of the texel is.
+// Distance along the ray to the plane of the texel.
 float leaf_distance(uint slice, vec3 origin, vec3 direction, uvec2 texel)
 {
     float w = plane_w(texelFetch(quadtree_nodes, int(node_index(slice, 0u, texel))).xy);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The leaves of one slice: at each texel the plane of the primitive that is seen there, in (x, y, w), from the primitive
+// Makes the leaves of one slice: for each texel the plane of the visible primitive, in (x, y, w), from the primitive
 // itself and not from differences of depths (section 3.2 of the paper, "g-buffer normals"). nodes.comp writes them to the
-// tree, with their flags. An invocation makes four leaves: most often they show one primitive, which is fetched once.
+// tree, with their flags. An invocation makes four leaves: most often they show the same primitive, which is fetched
+// once.
 //
 // Defines: HAS_SPHERES, HAS_DISCS as the scene has them; HAS_CUTOUT if spheres may have holes.
 #include "shared/path.h"
@@ -16,17 +17,17 @@ layout(binding = UNIT_QUADTREE_VISIBLE) uniform usampler2DArray visible;
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer nodes;
 layout(binding = IMAGE_QUADTREE_PLANES, rg32ui) writeonly uniform uimageBuffer planes;
 
-uniform uint first_item; // of the dispatch
+uniform uint first_item; // first item of the dispatch
 uniform uint first_leaf; // in `planes`
 uniform uint slice;
-uniform uint layer; // of the face; its slice comes just behind that of the layer before
+uniform uint layer; // layer of the face; its slice follows that of the layer before
 
-// What a depth that a node has is rounded by, as a share of it.
+// Rounding of a node's depth, as a share of it.
 const float BEHIND_SHARE = 3.8147e-6; // 2^-18
-// The plane of a sliver is uncertain. Where it leaves the sliver's depths by more than this share of w it is none.
+// Share of w by which a sliver's plane may leave the sliver's depths; beyond it the plane is too uncertain to be used.
 const float PLANE_SHARE = 0.001953125; // 2^-9
 
-// Along the axes of the face from the eye.
+// Vector along the axes of the face, from the eye.
 vec3 face_vector(vec3 world)
 {
     uint row = 3u * (slice / quadtree.layers);
@@ -39,13 +40,13 @@ bool is_orthographic()
     return quadtree.depths.z != 0.0;
 }
 
-// X / Z in the middle of a texel, or X of an orthographic view, and Y likewise.
+// X / Z in the middle of a texel, or X in an orthographic view; Y by analogy.
 vec2 across_of(uvec2 place)
 {
     return (vec2(place) + 0.5 - quadtree.scale_centre.zw) / quadtree.scale_centre.xy;
 }
 
-// What is seen along the middle of a texel: the points `begin` + Z * `step` of the face.
+// Line of sight through the middle of a texel: the points `begin` + Z * `step` of the face.
 struct sight_line {
     vec3 begin, step;
 };
@@ -68,14 +69,14 @@ float z_of(float w)
     return is_orthographic() ? quadtree.depths.y - w * (quadtree.depths.y - quadtree.depths.x) : quadtree.depths.x / w;
 }
 
-// Of a primitive, along the axes of the face from the eye: its plane, and the range of its depths.
+// Plane of a primitive, along the axes of the face from the eye, and the range of its depths.
 struct plane {
     vec3 normal, point;
     float z_min, z_max;
 };
 
-// Of the texel at `place`, that to the right of it, and those below: both words of their nodes, if they show this plane.
-// Seen on edge it is none: then w is in the range nevertheless, and the slopes are 0.
+// Nodes of the texel at `place`, of that to the right, and of those below, if they show this plane. A plane seen on edge
+// has none: w is clamped to the range nevertheless, and the slopes are 0.
 void nodes_of(plane p, uvec2 place, out uvec4 heads, out uvec4 tails)
 {
     vec2 first = across_of(place), last = across_of(place + 1u);
@@ -95,7 +96,7 @@ void nodes_of(plane p, uvec2 place, out uvec4 heads, out uvec4 tails)
     uint tail = plane_tail(abs(slopes.x) + abs(slopes.y) < 1e30 ? slopes : vec2(0.0));
     tails = mix(uvec4(0u), uvec4(tail), greaterThan(w, vec4(w_min - slack)));
     tails = mix(uvec4(0u), tails, lessThan(w, vec4(w_max + slack)));
-    w = mix(vec4(w_min), w, greaterThan(w, vec4(w_min))); // in this order: not a number is none
+    w = mix(vec4(w_min), w, greaterThan(w, vec4(w_min))); // in this order NaN becomes w_min
     w = mix(vec4(w_max), w, lessThan(w, vec4(w_max)));
     heads = plane_heads(max(w, 0.0));
 }
@@ -114,7 +115,7 @@ plane triangle_plane(uint instance_index, uint triangle)
 }
 
 #ifdef HAS_SPHERES
-// The nearer intersection, unless it is cut out, or the layer before shows it at this texel or what is behind it.
+// Depth of the nearer intersection, unless it is cut out, or the layer before shows it, or one behind it, at this texel.
 float sphere_depth(vec2 depths, uvec2 place, uvec2 what, vec3 begin_world, vec3 step_world)
 {
     if (is_cut_out(candidate(depths.x, what.y, what.x - 1u, vec2(0.0)), begin_world, step_world, 0.0))
@@ -129,7 +130,7 @@ float sphere_depth(vec2 depths, uvec2 place, uvec2 what, vec3 begin_world, vec3 
     return before == what || depths.x < z_before - rounding ? depths.y : depths.x;
 }
 
-// Tangent at the point that is seen. Where rounding lets the line miss, that is where the line comes closest.
+// Tangent plane at the visible point. Where rounding makes the line miss, that is its closest point.
 plane sphere_plane(uvec2 place, uvec2 what)
 {
     sight_line line = sight_line_of(place);
@@ -186,7 +187,7 @@ void main()
     uvec2 a = what_at(place), b = what_at(place + uvec2(1u, 0u)), c = what_at(place + uvec2(0u, 1u)), d = what_at(place + 1u);
     uvec4 instances_left = uvec4(a.x, b.x, c.x, d.x), primitives = uvec4(a.y, b.y, c.y, d.y);
     uvec4 heads = plane_heads(vec4(0.0)), tails = uvec4(0u), own_heads, own_tails;
-    // A turn for each primitive, or texel of a sphere.
+    // Runs a turn for each primitive, or texel of a sphere.
     while (instances_left != uvec4(VISIBLE_NOTHING)) {
         bvec4 is_left = notEqual(instances_left, uvec4(VISIBLE_NOTHING));
         uint first = is_left.x ? 0u : is_left.y ? 1u : is_left.z ? 2u : 3u;

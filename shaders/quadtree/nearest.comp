@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Behind the last pass of a build: how near the surfaces of each face come, that is the greatest w of its first layer,
-// before which rays need not look at any node. An invocation does a face.
+// Finds, as the last pass of a build, the maximum w in the first layer of each face, before which rays need no nodes. An
+// invocation does a face.
 #define GROUP_SIZE 1
 #include "common/dispatch.glsl"
 #include "quadtree/node.glsl"

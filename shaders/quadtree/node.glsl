@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Nodes of the quadtrees: where they lie and what their 64 bits mean (quadtree/layout.h).
+// Places of the quadtrees' nodes and the meaning of their 64 bits (quadtree/layout.h).
 #include "quadtree/layout.h"
 
 layout(std140, binding = UNIFORM_QUADTREE) uniform quadtree_block { quadtree_uniforms quadtree; };
 
-// Of a view, which is one face, nothing beside it is known; beside the faces of a cube there is nothing.
+// Whether the face is a single view, beside which nothing is known; beside the faces of a cube there is nothing.
 #ifdef QUADTREE_VIEW
 #define IS_VIEW true
 #define FACES 1u
@@ -15,15 +15,15 @@ layout(std140, binding = UNIFORM_QUADTREE) uniform quadtree_block { quadtree_uni
 #define FACE(face) (face)
 #endif
 
-// The first node of a level, counted from the first of its slice. A slice is a multiple of 4^QUADTREE_TOP texels, so
-// that no division leaves a rest: S + S / 4 + S / 16 .. below the level. Of a multiple of 3 a third is a product.
+// Index of the first node of a level within its slice. A slice is a multiple of 4^QUADTREE_TOP texels, so the sum S + S /
+// 4 + S / 16 .. of the levels below has no remainder. A third of a multiple of 3 is a product.
 uint node_level_first(uint level)
 {
     uint texels = quadtree.padded_width * quadtree.padded_height;
     return (texels - (texels >> (2u * level))) * 0xaaaaaaabu * 4u;
 }
 
-// Of node `place` of a level, by column and row. Of one slice the index grows by node_row(level) from row to row.
+// Index of node `place` (column, row) of a level. Within a slice it grows by node_row(level) from row to row.
 uint node_row(uint level)
 {
     return quadtree.padded_width >> level;
@@ -34,13 +34,13 @@ uint node_index(uint slice, uint level, uvec2 place)
     return slice * quadtree.slice_nodes + node_level_first(level) + place.y * node_row(level) + place.x;
 }
 
-// What is said of a face as a whole lies behind the nodes.
+// Index of a face's own entry, behind the nodes.
 uint face_index(uint face)
 {
     return quadtree.faces * quadtree.layers * quadtree.slice_nodes + face;
 }
 
-// In texel coordinates of the face.
+// Centre of a node, in texel coordinates of the face.
 vec2 node_centre(uint level, uvec2 place)
 {
     return (vec2(place) + 0.5) * float(1u << level);
@@ -71,7 +71,7 @@ bool plane_is_at_edge(uvec2 node)
     return (node.x & 1u) != 0u;
 }
 
-// The first words of planes without flags; `w` not negative.
+// First words of planes without flags; `w` not negative.
 uvec4 plane_heads(vec4 w)
 {
     return (floatBitsToUint(w) & 0x7ffffffeu) | 0x80000000u;
@@ -90,25 +90,25 @@ uvec2 plane_node(float w, vec2 slopes, bool at_edge)
 
 // ---- boxes ----
 
-// Greatest and least w of what there is.
+// Maximum and minimum w of the surfaces.
 vec2 box_range_of_surfaces(uvec2 node)
 {
     return uintBitsToFloat(node & 0x7fffffffu);
 }
 
-// Whether there is nothing somewhere.
+// Whether the box has gaps, where there is no surface.
 bool box_has_gaps(uvec2 node)
 {
     return int(node.y) < 0;
 }
 
-// Greatest and least w.
+// Maximum and minimum w.
 vec2 box_range(uvec2 node)
 {
     return box_has_gaps(node) ? vec2(uintBitsToFloat(node.x), 0.0) : uintBitsToFloat(node);
 }
 
-// Of surfaces.
+// Node of a box round surfaces.
 uvec2 box_node(float w_max, float w_min, bool has_gaps)
 {
     return floatBitsToUint(vec2(w_max, w_min)) & 0x7fffffffu | uvec2(0u, has_gaps ? 0x80000000u : 0u);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// One level of the quadtrees from the level below it (section 3.3 of the paper): four planes that are one, within the
-// bound, become one; else a box. An invocation makes a node.
+// Makes a level of the quadtrees from the level below it (section 3.3 of the paper): four planes that agree, within the
+// bound, become one; otherwise they become a box. An invocation makes a node.
 //
-// What a plane may be off is measured against the planes of the leaves, in all their corners, and after it was rounded
-// to the bits of a node. A level adds how far its plane is from its children's to how far those are off at most, so
-// that errors of several levels cannot exceed the bound. Of a smooth surface, which is off by four times as much from
-// level to level, that is at most a third more than it is off in truth.
+// A plane's error is measured against the planes of the leaves, in all their corners, after it is rounded to the bits of
+// a node. A level adds the distance between its plane and its children's to the children's maximum error, so that errors
+// of several levels cannot exceed the bound. On a smooth surface, whose error grows fourfold from level to level, this
+// sum exceeds the true error by at most a third.
 //
 // Defines:
 //   NODES_OF_LEAVES   level 1 of one slice, from `planes`; and its leaves themselves, whose flags are found here
@@ -23,15 +23,15 @@ layout(binding = IMAGE_QUADTREE_NODES, rg32ui) writeonly uniform uimageBuffer ma
 layout(binding = IMAGE_QUADTREE_ERRORS, r32f) writeonly uniform imageBuffer made_errors;
 
 uniform uint level;
-uniform uint first_item; // of the dispatch
+uniform uint first_item; // first item of the dispatch
 
 const float FLOAT_MAX = 3.4e38;
-// Of w, for what rounds where a plane is made and evaluated.
+// Share of w that rounding takes where a plane is made and evaluated.
 const float ROUNDING = 2.384e-7; // 2^-22
-// Half a step of half floats, or one if a device cuts off, as a share of a slope; and of the smallest ones.
+// Half a step of half floats, or one if a device truncates, as a share of a slope; and for the smallest ones.
 const float SLOPE_ROUNDING = 9.766e-4, SLOPE_STEP = 6.104e-5 / QUADTREE_SLOPE_SCALE; // 2^-10, 2^-14
 
-// Of nodes (0, 0), (1, 0), (0, 1), (1, 1): their words, and how far planes are off at most.
+// Nodes (0, 0), (1, 0), (0, 1), (1, 1): their words, and the maximum errors of planes.
 struct children {
     uvec4 head, tail;
     vec4 error;
@@ -51,8 +51,8 @@ uvec2 plane_at(ivec2 place)
     return texelFetch(planes, place.y * int(quadtree.padded_width) + place.x).xy;
 }
 
-// How far the planes of two leaves differ in the middle of their border; `along` leads from one to the other. The
-// border of the face is none.
+// Whether the planes of two leaves differ in the middle of their border; `along` leads from one to the other. The border
+// of the face is no edge.
 bool is_edge(uvec2 a, uvec2 b, vec2 along)
 {
     float w_a = plane_w(a), w_b = plane_w(b);
@@ -60,7 +60,7 @@ bool is_edge(uvec2 a, uvec2 b, vec2 along)
     return abs(difference) > QUADTREE_EDGE_SHARE * max(w_a, w_b) + quadtree.bounds.x;
 }
 
-// Where there is nothing there is no flag either.
+// Flag of a leaf; an empty one has none.
 uint flag_of(uvec2 node, bool is_at_edge)
 {
     return is_at_edge && plane_w(node) > 0.0 ? 1u : 0u;
@@ -71,7 +71,7 @@ void write_leaf(ivec2 place, uvec2 node)
     imageStore(made_nodes, int(node_index(slice, 0u, uvec2(place))), uvec4(node, 0u, 0u));
 }
 
-// Also writes the leaves.
+// Reads the children of a node, and writes them if they are leaves.
 children children_of(uvec2 place)
 {
     ivec2 first = 2 * ivec2(place);
@@ -81,7 +81,7 @@ children children_of(uvec2 place)
     uvec2 d = texelFetch(planes, at + int(quadtree.padded_width) + 1).xy;
     const vec2 right = vec2(1.0, 0.0), down = vec2(0.0, 1.0);
     children four;
-    // Nothing lies beyond the face, and its leaves have no flags: no matter what they are compared with.
+    // Nothing lies beyond the face, and its leaves have no flags, so any neighbour will do.
     bool inside_x = first.x + 1 < int(quadtree.width), inside_y = first.y + 1 < int(quadtree.height);
     bool ab = inside_x && is_edge(a, b, right), cd = inside_x && is_edge(c, d, right);
     bool ac = inside_y && is_edge(a, c, down), bd = inside_y && is_edge(b, d, down);
@@ -129,28 +129,28 @@ float min_of(vec4 v)
     return min(min(v.x, v.y), min(v.z, v.w));
 }
 
-// How many times the bound applies where the planes are at w on average: it grows linearly with distance (section 6).
+// Factor of the bound for planes at w on average: it grows linearly with distance (section 6).
 float growth_of(float w_mean)
 {
     float doubled_at = quadtree.bounds.z;
     return doubled_at == 0.0 ? 1.0 : 1.0 + doubled_at / max(w_mean, doubled_at / (QUADTREE_GROWTH_MAX - 1.0));
 }
 
-// An eye that is up to the radius nearer to the surface sees a difference of w as more pixels.
+// Tolerance of w. An eye that is nearer to the surface, by up to the radius, sees a difference of w as more pixels.
 float tolerance_of(float w_mean, float w_max)
 {
     float nearness = max(1.0 - quadtree.bounds.w * w_max, 0.0);
     return quadtree.bounds.x * nearness * nearness * growth_of(w_mean);
 }
 
-// The normal, of any length, of a plane that has these slopes and w at the axis of the view.
+// Normal, of any length, of a plane that has these slopes and w at the axis of the view.
 vec3 normal_of(vec2 slopes, float w_axis)
 {
     vec2 across = slopes * quadtree.scale_centre.xy;
     return quadtree.depths.z != 0.0 ? vec3(across * (quadtree.depths.y - quadtree.depths.x), 1.0) : vec3(across, w_axis);
 }
 
-// Section 3.3, condition 2: the plane `slopes`, w in `centre`, against the four children.
+// Section 3.3, condition 2: whether the plane `slopes`, w in `centre`, is turned against one of the four children.
 bool is_turned(vec2 centre, float h, float w, vec2 slopes, vec4 w4, vec4 sx, vec4 sy, float growth)
 {
     if (quadtree.bounds.y <= 0.0)
@@ -182,7 +182,7 @@ void main()
         return;
     children four = children_of(slice, place);
 #endif
-    // Half a side of a child: also from the centre of the node to those of the children.
+    // Half a side of a child; also the distance from the centre of the node to those of the children along an axis.
     float h = 0.25 * float(1u << level);
     const vec4 side_x = vec4(-1.0, 1.0, -1.0, 1.0), side_y = vec4(-1.0, -1.0, 1.0, 1.0);
     bvec4 is_plane = lessThan(ivec4(four.head), ivec4(0));
@@ -193,10 +193,10 @@ void main()
     vec4 reach = (abs(sx) + abs(sy)) * h;
     bvec4 is_something = greaterThan(w4, vec4(0.0));
 #ifdef NODES_OF_LEAVES
-    // Rounding of the leaves themselves, whose exact planes are known no more.
+    // Rounding of the leaves themselves, whose exact planes are no longer known.
     four.error = mix(vec4(0.0), w4 * ROUNDING + (reach * SLOPE_ROUNDING + 2.0 * h * SLOPE_STEP), is_something);
 #endif
-    // Least squares of w at the four centres, summed up in the order of client/warp.
+    // Least squares of w at the four centres, summed in the order of client/warp.
     float w = ((w4.x + w4.y) + (w4.z + w4.w)) * 0.25;
     vec2 slopes = vec2((w4.y - w4.x) + (w4.w - w4.z), (w4.z - w4.x) + (w4.w - w4.y)) * (0.25 / h);
     uvec2 node = plane_node(w, slopes, any(notEqual(four.head & 1u, uvec4(0u))));
@@ -208,16 +208,16 @@ void main()
     float error = max_of(off) + ROUNDING * w_max;
     bool merges = all(is_plane) && error <= tolerance_of(w, w_max) && all(is_something) &&
                   !is_turned(node_centre(level, place), h, w, slopes, w4, sx, sy, growth_of(w));
-    if (all(is_plane) && !any(is_something)) { // nothing
+    if (all(is_plane) && !any(is_something)) { // empty
         merges = true;
         error = 0.0;
     }
     if (!merges) {
-        // Also over the planes below, which rays are tested against.
+        // The range includes the planes below, which rays are tested against.
         vec4 upper = mix(uintBitsToFloat(four.head), w4 + reach + four.error, is_plane);
         bvec4 is_gap = mix(bvec4(false), not(is_something), is_plane);
         bool has_gaps = any(mix(lessThan(ivec4(four.tail), ivec4(0)), is_gap, is_plane));
-        // A surface goes on by up to a texel into a gap beside it. Seen on edge, its slopes are not known.
+        // A surface extends by up to a texel into a gap beside it. Seen on edge, its slopes are unknown.
         vec4 steepness = abs(sx) + abs(sy);
         vec4 beside = has_gaps ? mix(steepness, vec4(FLOAT_MAX), equal(steepness, vec4(0.0))) : vec4(0.0);
         vec4 lower = mix(uintBitsToFloat(four.tail & 0x7fffffffu), w4 - reach - four.error - beside, is_plane);

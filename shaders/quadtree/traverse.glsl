@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Rays through the surfaces that a view sees (quadtree/layout.h). Widmer, Pajak, Schulz, Pulli, Kautz, Goesele, Luebke.
+// Traversal of the visible surfaces of a view (quadtree/layout.h). Widmer, Pajak, Schulz, Pulli, Kautz, Goesele, Luebke.
 // An Adaptive Acceleration Structure for Screen-space Ray Tracing. 2015, section 4.
 //
-// A ray is traced through the first layer of a face. Where it is behind what that layer holds, what it may hit there is
-// in the next one, and only there is it traced through that. Where it is behind the last layer, nothing is known.
+// A ray is traced through the first layer of a face. Where it is behind that layer, the next one holds what it may hit,
+// and only there is it traced through that one. Behind the last layer, nothing is known.
 //
 // Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive;
 // QUADTREE_VIEW there is one face.
@@ -24,45 +24,45 @@ uniform uint ray_kind;
 #define found_type candidate
 #endif
 
-const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
+const float SAME_DISTANCE = 1e-5; // maximum difference between intersections with one surface, as a share
 const float FLOAT_MAX = 3.4e38;
 const float NEVER = 2.0; // beyond the end of a segment
-const float BRUSHES = 6.0; // texels: a surface is not met farther than this from where it is seen
-const int LEVEL_AT_SURFACES = 2; // of the node that rays begin in beside a surface
-const int STEPS_TOGETHER = 256; // of rays side by side, before what some of them have met is looked at
+const float BRUSHES = 6.0; // texels: maximum distance at which a surface is met from the place where it is seen
+const int LEVEL_AT_SURFACES = 2; // level of the node that rays begin in beside a surface
+const int STEPS_TOGETHER = 256; // steps of neighbouring rays before their findings are tested
 const int MEETINGS_MAX = 1 << 20;
 const int LAYERS_MAX = 32; // more than all faces have
 
-// A ray on its way through a layer of a face.
+// March of a ray through a layer of a face.
 struct layer_walk {
     face_segment s;
     vec3 origin;  // x, y, w of the ray's origin; w below 0: it is not in this face
-    vec2 inverse; // of s.along.xy
+    vec2 inverse; // inverse of s.along.xy
     uint face, layer;
-    float u, u_end; // where the ray is, and where it ends, as far as is known
-    ivec2 cell;     // of the node that it is in
+    float u, u_end; // place of the ray, and its end as far as known
+    ivec2 cell;     // place of the current node
     int level;
-    bool is_before, is_behind; // neither: it has just begun
-    bool was_close;            // to the plane that it left last
-    bool hits_alone;           // count for it, and not where it is behind the layer and meets nothing
-    float u_before;            // where it was last before the layer
-    float u_since;             // since when it is behind it; NEVER: it is not
-    float u_behind;            // where it came behind it for more than a texel
-    float u_last;              // where it was behind it last, or came before it
-    float u_fill;              // where it was last before the first layer that it came behind: before the background
-    uint fill_layer;           // that layer
-    float u_beside;            // where it last met a plane at an edge, but none of the primitives there
-    vec2 offered;              // distances of the last two intersections, none of which counts twice
+    bool is_before, is_behind; // neither: the march has just begun
+    bool was_close;            // the ray was close to the last plane
+    bool hits_alone;           // only hits count for it: not where it is behind the layer and meets nothing
+    float u_before;            // last place before the layer
+    float u_since;             // beginning of its way behind the layer; NEVER: it is before it
+    float u_behind;            // place where it was first behind the layer for more than a texel
+    float u_last;              // last place behind the layer, or where it came before it
+    float u_fill;              // last place before the first layer that it came behind, and so before the background
+    uint fill_layer;           // number of that layer
+    float u_beside;            // last place where it met a plane at an edge, but none of the primitives there
+    vec2 offered;              // distances of the last two intersections, neither of which counts twice
 };
 
-// Where a ray is in a node.
+// Passage of a ray through a node.
 struct node_passage {
     uvec2 node;
     bool is_plane;
     float u_out, w_out;
-    float gap_in, gap_out; // how far the surface is before the ray there, in w: above 0 the ray is behind it
-    bool skips_gaps; // of a box: a ray that is behind all surfaces in it passes it, though before nothing somewhere
-    float reach; // of a plane: a ray that is farther from it than this meets nothing of the surface within a texel
+    float gap_in, gap_out; // distance of the surface before the ray, in w: above 0 the ray is behind it
+    bool skips_gaps; // box: a ray behind all its surfaces passes it, though somewhere it is before nothing
+    float reach; // plane: a ray farther from it than this meets nothing of the surface within a texel
 };
 
 uint walk_flags = 0u;
@@ -80,14 +80,14 @@ bool is_met_before(layer_walk walk, float distance_)
     return min(apart.x, apart.y) <= SAME_DISTANCE * abs(distance_);
 }
 
-// What the ray meets elsewhere counts there.
+// Whether the distance is in this face: what the ray meets elsewhere counts there.
 bool is_in_face(layer_walk walk, float distance_)
 {
     float slack = SAME_DISTANCE * abs(distance_);
     return distance_ >= walk.s.t_from - slack && distance_ <= walk.s.t_to + slack;
 }
 
-// True if the ray ends there.
+// Offers a hit. True: the ray ends there.
 bool offer(trace_ray r, candidate met, inout layer_walk walk, inout found_type found)
 {
 #ifdef ANY_HIT
@@ -101,11 +101,11 @@ bool offer(trace_ray r, candidate met, inout layer_walk walk, inout found_type f
     if (found.distance >= before)
         return false;
     walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
-    return false; // the walk ends where the ray now does
+    return false; // the march ends where the ray now does
 #endif
 }
 
-// The primitive that a texel shows; false: none that is a hit of its own.
+// Gets the primitive that a texel shows. False: none that is a hit of its own.
 bool visible_at(ivec2 texel, uint slice, out uvec2 visible)
 {
     ivec2 last = ivec2(quadtree.width, quadtree.height) - 1;
@@ -113,7 +113,7 @@ bool visible_at(ivec2 texel, uint slice, out uvec2 visible)
     return visible.x != VISIBLE_NOTHING && visible.x != VISIBLE_DISC;
 }
 
-// Of a sphere the root that is nearer to `near`.
+// Intersects the visible primitive; for a sphere at the root that is nearer to `near`.
 bool intersect_visible(trace_ray r, uvec2 visible, float near, out candidate met)
 {
     object_ray o = object_from_world_ray(r, visible.x - 1u);
@@ -131,8 +131,8 @@ bool intersect_visible(trace_ray r, uvec2 visible, float near, out candidate met
     return intersect_primitive(r, o, visible.y, visible.x - 1u, met);
 }
 
-// The primitives of the texel and of those beside it on the side of the place; the first that is met is enough where
-// surfaces go on from texel to texel. True: the ray ends.
+// Offers the primitives of the texel and of those beside it on the side of the place; the first one that is met is enough
+// where surfaces continue from texel to texel. True: the ray ends.
 bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout layer_walk walk, inout found_type found,
                       out bool has_met)
 {
@@ -145,7 +145,7 @@ bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout 
     left |= visible_at(texel + towards, slice, d) && d != a && d != b && d != c ? 8u : 0u;
     has_met = false;
     bool ends = false;
-    // As many turns as the ray among those side by side takes that tries most.
+    // The loop runs for as many turns as the neighbouring ray with the most attempts needs.
     for (int i = 0; i < 4; i++) {
         uint first = left & -left;
         uvec2 visible = first == 1u ? a : first == 2u ? b : first == 4u ? c : d;
@@ -161,7 +161,7 @@ bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout 
     return ends;
 }
 
-// A plane through a neighbour of the surface that the ray begins on may pass beside its origin: no hit.
+// Whether a plane through a neighbour of the surface that the ray begins on passes beside its origin, which is no hit.
 bool is_own_surface(layer_walk walk, vec3 place, vec2 slopes)
 {
     vec3 away = abs(place - walk.origin);
@@ -169,24 +169,24 @@ bool is_own_surface(layer_walk walk, vec3 place, vec2 slopes)
            away.z <= QUADTREE_OWN_WAY * (abs(slopes.x) + abs(slopes.y)) + QUADTREE_EDGE_SHARE * place.z;
 }
 
-// Where the ray's w passes from before the node to behind it, or back: true.
+// True where the ray's w passes from before the node to behind it, or back.
 bool is_met(node_passage p)
 {
     return p.is_plane && (p.gap_in > 0.0) != (p.gap_out > 0.0);
 }
 
-// What the ray meets in a node: its plane, or primitives beside the edge that it passes. True: it ends. One call of
-// offer_primitives(), as rays side by side take all of them.
+// Meets the surface in a node: its plane, or primitives beside the edge that it passes. True: the ray ends. There is a
+// single call of offer_primitives(), as neighbouring rays execute every call.
 bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_type found)
 {
     bool passes = is_met(p);
-    // Or goes on between two planes that do not quite meet.
+    // The ray may also pass between two planes that do not quite meet.
     bool meets = passes || walk.is_before && p.gap_in <= QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
     float u = passes ? mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0)) : walk.u;
     vec3 place = walk.s.from + u * walk.s.along;
     float near = distance_at(walk.s, u);
 #ifndef QUADTREE_PLANES
-    // Within a texel of an edge its middle sees the other side.
+    // Within a texel of an edge the texel's middle sees the other side.
     bool is_at_edge = plane_is_at_edge(p.node), has_met;
     if (offer_primitives(r, place.xy, near, is_at_edge || !meets, walk, found, has_met))
         return true;
@@ -198,7 +198,7 @@ bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_typ
         !visible_at(ivec2(floor(place.xy)), slice_of(walk), visible))
         return false;
 #ifndef QUADTREE_PLANES
-    // Beside the edge of the surface, or through primitives that are finer than texels.
+    // The ray passed the edge of the surface, or primitives finer than texels.
     if (is_at_edge) {
         walk.u_beside = u;
         return false;
@@ -207,9 +207,9 @@ bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_typ
     return offer(r, candidate(near, visible.y, visible.x - 1u, vec2(0.0)), walk, found);
 }
 
-// ---- the walk through a layer ----
+// ---- march through a layer ----
 
-// From `level` down: rays that begin at a surface have to come down to it.
+// Begins a layer at `level` and below: rays that begin at a surface must descend to it.
 void begin_layer(uint layer, float u, int level, inout layer_walk walk)
 {
     ivec2 last = ivec2(quadtree.padded_width, quadtree.padded_height) - 1;
@@ -239,17 +239,18 @@ node_passage look(layer_walk walk)
     p.w_out = walk.s.from.z + walk.s.along.z * p.u_out;
     vec2 slopes = plane_slopes(p.node), centre = node_centre(uint(walk.level), uvec2(walk.cell));
     float w = plane_w(p.node) + dot(slopes, walk.s.from.xy - centre), growth = dot(slopes, walk.s.along.xy);
-    // Not just behind a surface: whether the ray stays there, or has passed its edge, the next texels say.
+    // Just behind a surface the question is open: the next texels say whether the ray stays there or has passed its edge.
     bool is_undecided = walk.was_close || walk.u_since < walk.u_behind;
     p.skips_gaps = walk.hits_alone && !is_undecided && !p.is_plane && box_has_gaps(p.node);
     vec2 range = p.skips_gaps ? box_range_of_surfaces(p.node) : box_range(p.node);
     vec2 of_ray = vec2(min(w_in, p.w_out), max(w_in, p.w_out));
-    float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0; // of a box; 0: in it
+    // distance to a box; 0: in it
+    float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0;
     p.gap_in = p.is_plane ? w + growth * walk.u - w_in : gap;
     p.gap_out = p.is_plane ? w + growth * p.u_out - p.w_out : gap;
     float steepness = abs(slopes.x) + abs(slopes.y);
     p.reach = BRUSHES * steepness + QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
-    if (steepness == 0.0 && plane_w(p.node) > 0.0) // seen on edge, its slopes are not known
+    if (steepness == 0.0 && plane_w(p.node) > 0.0) // seen on edge: its slopes are unknown
         p.reach = FLOAT_MAX;
     if (!p.is_plane)
         p.reach = 0.0;
@@ -263,8 +264,8 @@ void go_down(inout layer_walk walk)
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u)) >> walk.level, low, low + 1);
 }
 
-// A ray that is behind a plane's extension beyond the surface comes before its neighbour's within a texel: it counts as
-// behind the layer where it stays so.
+// Notes on which side the ray is. A ray behind a plane's extension beyond the surface comes before its neighbour's within
+// a texel: it counts as behind the layer where it stays so.
 void note_side(node_passage p, inout layer_walk walk)
 {
     walk.is_before = p.gap_out <= 0.0;
@@ -289,7 +290,8 @@ void note_side(node_passage p, inout layer_walk walk)
     }
 }
 
-// To the successor across the side that the ray leaves the node by, one level below the last node that both are in.
+// Moves to the successor across the side at which the ray leaves the node, one level below the last node that contains
+// both.
 void leave(node_passage p, inout layer_walk walk)
 {
     ivec2 size = ivec2(quadtree.padded_width, quadtree.padded_height), next = walk.cell;
@@ -306,8 +308,8 @@ void leave(node_passage p, inout layer_walk walk)
     walk.cell = next >> up;
 }
 
-// Nodes that the ray passes, until it may meet something in one of them: true. The end of the loop has two ways out:
-// with one, software GL gave rays that were through sooner the values of their neighbours.
+// Passes nodes until the ray may meet something in one of them: true. The loop ends with two exits: with one, software GL
+// gave rays that had finished earlier the values of their neighbours.
 bool walk_on(inout layer_walk walk, out node_passage p)
 {
     bool meets = false;
@@ -315,9 +317,10 @@ bool walk_on(inout layer_walk walk, out node_passage p)
         p = look(walk);
         bool goes_down = !p.is_plane && p.gap_in == 0.0;
         bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
-        // Most rays that pass an edge are far behind or before both of its sides: not one in ten of them meets either.
+        // Most rays that pass an edge are far behind or before both of its sides: fewer than one in ten of them meets
+        // either.
         bool is_close = walk.was_close || abs(p.gap_in) <= p.reach;
-        // Where a ray begins before a surface that goes on from texel to texel, and moves away from it, it meets none of it.
+        // A ray that begins before a continuous surface, and moves away from it, meets none of it.
         bool moves_away = !(walk.is_before || walk.is_behind) && p.gap_out <= p.gap_in && p.gap_in <= 0.0 &&
                           !plane_is_at_edge(p.node);
         meets = p.is_plane && (is_met(p) || is_other_side && is_close && !moves_away);
@@ -337,27 +340,26 @@ bool walk_on(inout layer_walk walk, out node_passage p)
 
 // ---- faces ----
 
-// What is known of a ray in all faces.
+// State of a ray in all faces.
 struct view_walk {
-    float t_last;    // how far along the ray something may be that the view sees
-    float t_leaves;  // where it leaves the last face that it passes, or ends in it; -1: it passes none
+    float t_last;    // maximum distance along the ray of anything visible
+    float t_leaves;  // distance where it leaves the last face that it passes, or ends in it; -1: it passes none
     uint last_face;
-    vec4 begins;     // where it comes into the faces 0 to 3 that it has not been in yet; FLOAT_MAX: never
-    vec2 begins_4_5; // and into the others
-    vec2 t_face;     // where it is in the face, of which there is one
-    float t_unknown; // from where on nothing is; 1e30: all is known
-    uint layers;     // that it had to look at
-    bool has_left;   // it is unknown as the ray is outside what the view sees
-    bool ends_behind; // what the view sees first, at its end
-    bool is_filled;   // by what follows
-    float t_fill;    // where it is taken to meet what a texel shows, and which
+    vec4 begins;     // distances where it enters those of the faces 0 to 3 that it has not been in yet; FLOAT_MAX: never
+    vec2 begins_4_5; // and faces 4 and 5
+    vec2 t_face;     // range of distances in the face, if there is one
+    float t_unknown; // distance from which on nothing is known; 1e30: everything is
+    uint layers;     // number of layers that it had to read
+    bool has_left;   // unknown because the ray is outside the view
+    bool ends_behind; // the ray ends behind the first layer
+    bool is_filled;   // the values below fill the unknown part
+    float t_fill;    // distance where it is assumed to meet a texel's surface
     uint fill_slice;
-    ivec2 fill_texel; // x -1: the one where it leaves the face, or ends
+    ivec2 fill_texel; // the texel; x -1: the one where it leaves the face, or ends
 };
 
-// Whether a ray that comes into the view at t has passed nothing that the view does not see. Of one from an eye within
-// the radius that is taken for granted, but no farther than QUADTREE_FREE_RADII from the view's own eye, and before the
-// near plane.
+// Whether a ray that enters the view at t has passed only visible, or empty, space. For a ray from an eye within the
+// radius that is assumed, up to QUADTREE_FREE_RADII from the view's own eye, and before the near plane.
 bool is_free_before(trace_ray r, float t)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz, entry = from_eye + t * r.direction;
@@ -366,7 +368,7 @@ bool is_free_before(trace_ray r, float t)
            (length(entry) <= QUADTREE_FREE_RADII * radius || z <= quadtree.depths.w * (1.0 + SAME_DISTANCE));
 }
 
-// A view, which is one face, does not see what is beside it.
+// Notes that the ray leaves a view with one face, which sees nothing beside it.
 void note_outside(trace_ray r, float t_end, inout view_walk seen)
 {
     if (!IS_VIEW)
@@ -381,7 +383,7 @@ void note_outside(trace_ray r, float t_end, inout view_walk seen)
     }
 }
 
-// How far along a ray something may be that the view sees: planes may lie beyond the surfaces by the bound.
+// Maximum distance along a ray of anything visible: planes may lie beyond the surfaces by the bound.
 float last_distance(trace_ray r)
 {
     float far = quadtree.depths.y;
@@ -401,7 +403,7 @@ float last_distance(trace_ray r)
 #define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
 #endif
 
-// Whether neighbours of a primitive may lie between the middles of texels, seen by none: one as narrow as it.
+// Whether neighbours of a primitive may lie between the middles of texels, unseen, as it is so narrow itself.
 bool is_finer_than_texels(uint face, uvec2 visible)
 {
 #ifdef HAS_SPHERES
@@ -423,8 +425,7 @@ bool is_finer_than_texels(uint face, uvec2 visible)
     return abs(a.x * b.y - a.y * b.x) < QUADTREE_FINE * longest;
 }
 
-// A ray that stays behind a layer has met it, also where it passed between primitives that are finer than texels. True: it
-// ends.
+// Meets the layer that a ray stays behind, even where it passed between primitives finer than texels. True: the ray ends.
 bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
 {
     if (!(walk.u_behind < walk.u_end) || walk.u_behind != walk.u_beside)
@@ -437,20 +438,20 @@ bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
     return offer(r, candidate(distance_at(walk.s, walk.u_beside), visible.y, visible.x - 1u, vec2(0.0)), walk, found);
 }
 
-// The greatest w of a face; 0: it sees nothing.
+// Maximum w of a face; 0: it sees nothing.
 float nearest_w(uint face)
 {
     return uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(FACE(face)))).x);
 }
 
-// To where surfaces of the face may be: before the nearest one there is nothing.
+// Clips a range to where surfaces of the face may be: before the nearest one there is nothing.
 void clip_to_surfaces(float w, vec3 origin, vec3 direction, inout vec2 t)
 {
     float far = quadtree.depths.y, z = is_orthographic() ? far - w * (far - quadtree.depths.x) : quadtree.depths.x / w;
     clip_range(origin.z - z, direction.z, t);
 }
 
-// Where the ray comes into each of the faces.
+// Finds where the ray enters each of the faces.
 void begin_faces(trace_ray r, float t_end, inout view_walk seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
@@ -470,7 +471,7 @@ void begin_faces(trace_ray r, float t_end, inout view_walk seen)
     }
 }
 
-// The face that the ray comes into next, and where; FLOAT_MAX: none.
+// Next face of the ray, and where it enters; FLOAT_MAX: none.
 float next_face(inout view_walk seen, out uint face)
 {
     float begin = seen.begins.x;
@@ -485,13 +486,13 @@ float next_face(inout view_walk seen, out uint face)
     return begin;
 }
 
-// The first layer of the next face that the ray passes. False: there is none before its end.
+// Begins the first layer of the next face that the ray passes. False: there is none before its end.
 bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
 {
     float t_end = min(seen.t_last, NEAREST(found, r)), begin = FLOAT_MAX;
     vec3 from_eye = r.origin - quadtree.eye_world.xyz, origin, direction;
     vec2 t = vec2(1.0, 0.0);
-    // A GPU may round what begin_faces() found to be a ray's short way through a face to none: the next one follows.
+    // A GPU may round a short way through a face to none: the next face follows.
     for (uint i = 0u; i < FACES; i++) {
         begin = next_face(seen, walk.face);
         origin = face_vector(walk.face, from_eye);
@@ -512,8 +513,8 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
     return begin < t_end && t.x < t.y;
 }
 
-// What is unknown is filled with what the ray was last before: the background of what hides it (section 4.1). One that
-// was before nothing, with what hides it where it ends.
+// Fills an unknown part with the surface that the ray was last before: the background of what hides it (section 4.1); if
+// it was before none, with the hiding surface at its end.
 void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
 {
     float t = distance_at(walk.s, min(walk.u_behind, 1.0));
@@ -527,17 +528,17 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
     seen.fill_texel = was_before ? ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u_fill)) : ivec2(-1);
 }
 
-// The next layer where the ray is behind this one. False: it has been through all of the face.
+// Begins the next layer where the ray is behind this one. False: the face is finished.
 bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inout view_walk seen)
 {
-    // A ray that comes into the view behind what is seen has passed that beside the view.
+    // A ray that enters the view behind the first surface has passed that beside the view.
     if (IS_VIEW && walk.layer == 0u && walk.u_behind == 0.0 && walk.s.t_from > r.t_min &&
         walk.s.t_from < seen.t_unknown) {
         seen.t_unknown = walk.s.t_from;
         seen.has_left = true;
     }
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
-        // Before this layer it is before all that come behind it. Edges of these may be off by its own way.
+        // A ray before this layer is also before all layers behind it. Their edges may be off by its own way.
         float own_way = QUADTREE_OWN_WAY * min(abs(walk.inverse.x), abs(walk.inverse.y));
         walk.u_end = min(walk.u_end, walk.u_last + own_way);
         begin_layer(walk.layer + 1u, walk.u_behind, LEVEL_AT_SURFACES, walk);
@@ -548,14 +549,14 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
     return false;
 }
 
-// What has no direction meets nothing.
+// Whether the ray has a direction; otherwise it meets nothing.
 bool is_ray(trace_ray r)
 {
     return all(lessThan(abs(r.origin), vec3(FLOAT_MAX))) && all(lessThan(abs(r.direction), vec3(FLOAT_MAX))) &&
            r.direction != vec3(0.0);
 }
 
-// Through a layer. True: the ray ends in it.
+// Traces through a layer. True: the ray ends in it.
 bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
 {
     node_passage p;
@@ -565,7 +566,8 @@ bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
             ends = meet_in(r, p, walk, found);
             SHORTEN(walk, found);
             if (walk.u_end < p.u_out) {
-                // Also behind a plane that it meets from its back: a node may be as large as all that it hides.
+                // The ray counts as behind also after a plane that it meets from the back: a node may be as large as
+                // everything that it hides.
                 walk.u_last = p.gap_in > 0.0 ? walk.u_end : walk.u_last;
                 walk.u = walk.u_end;
             } else {
@@ -579,7 +581,7 @@ bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
     return ends;
 }
 
-// Whether the ray is behind what the view sees first where it ends.
+// Whether the end of the ray is behind the first layer.
 bool ends_behind_first(trace_ray r, view_walk seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
@@ -590,8 +592,8 @@ bool ends_behind_first(trace_ray r, view_walk seen)
     return seen.t_leaves >= 0.0 && plane_w(node) + dot(plane_slopes(node), place.xy - node_centre(0u, texel)) > place.z;
 }
 
-// True: the ray ends before its end. Three loops in one another: software GL runs the code of both sides of a branch for
-// all rays side by side, so that what is done once for a layer would be paid for at each step.
+// Traces through a view. True: the ray ends early. Three loops are nested: software GL executes both sides of a branch
+// for all neighbouring rays, so in a single loop each step would pay for work done once per layer.
 bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 {
     layer_walk walk;
@@ -634,12 +636,12 @@ void count(view_walk seen, bool is_unknown)
         atomicAdd(counts_of_kinds[ray_kind].behind_last, 1u);
 }
 
-// ---- called by trace/wave.comp ----
+// ---- interface to trace/wave.comp ----
 
 #ifdef ANY_HIT
 
-// Of rays that came where nothing is known, those that come out again are taken to pass, and those that end behind what
-// the view sees first to be stopped.
+// Shadow rays through unknown space: those that come out again count as unobstructed, those that end behind the first
+// layer as blocked.
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     if (!is_ray(r))
@@ -654,7 +656,8 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
 
 #else
 
-// A ray that met nothing. If it came out again from behind what the view sees, it has left the scene, as far as is known.
+// Handles a ray that met nothing. If it came out again from behind the visible surfaces, it has left the scene, as far as
+// is known.
 void fill(trace_ray r, view_walk seen, inout candidate best)
 {
     uint face = seen.fill_slice / quadtree.layers;

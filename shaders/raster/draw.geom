@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Sends a triangle to the image whose axis its normal leans to most, or to those where images overlap, with its plane
-// in cells; a sphere to all three, as its bounding square. Burger, Hertel, Kruger, Westermann. GPU Rendering of
+// Sends a triangle to the image whose axis its normal leans to most, and to others where images overlap, with its plane
+// in cells; a sphere goes to all three, as its bounding square. Burger, Hertel, Kruger, Westermann. GPU Rendering of
 // Secondary Effects. 2007, figure 5.
 // Defines:
 //   PRIMITIVE_KIND  0 triangles, 1 spheres
 //   HAS_CUTOUT      triangles may have holes
-//   ALL_IMAGES      a triangle is in all three images, wherever it has an area, and comes with FACE_* bits; it faces the
-//                   front (gl_FrontFacing) where its outside does, towards greater depths
-//   WITHOUT_STEEP   with ALL_IMAGES: only in those that show it well (raster/face.glsl)
+//   ALL_IMAGES      a triangle is in all three images, wherever it has an area, with FACE_* bits; it faces the front
+//                   (gl_FrontFacing) where its outside does, towards greater depths
+//   WITHOUT_STEEP   with ALL_IMAGES: a triangle is only in the images that show it well (raster/face.glsl)
 
 #include "shared/bindings.h"
 #include "shared/geometry.h"
@@ -19,7 +19,7 @@
 
 uniform float resolution; // cells along a side of the cube
 
-// Of common/geometry.glsl, whose storage blocks a geometry shader need not have.
+// Declared here and not by common/geometry.glsl, whose storage blocks a geometry shader need not support.
 layout(binding = UNIT_INSTANCES) uniform usamplerBuffer instances;
 #if PRIMITIVE_KIND == 0
 layout(binding = UNIT_TRIANGLES) uniform usamplerBuffer triangles;
@@ -37,12 +37,12 @@ layout(triangle_strip, max_vertices = 12) out;
 
 layout(location = 0) flat in uvec4 primitive_in[];
 
-// A pass counts with one program what another draws with a second one: both must cover the same texels at the same
-// depths.
+// Invariant, as a pass counts with one program the fragments that another draws: both must cover the same texels at the
+// same depths.
 invariant gl_Position;
 #if PRIMITIVE_KIND == 0
 layout(location = 0) flat invariant out vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
-layout(location = 1) flat invariant out vec3 depths; // of that point; minimum, maximum
+layout(location = 1) flat invariant out vec3 depths; // depth of that point; minimum, maximum
 #ifdef HAS_CUTOUT
 layout(location = 3) invariant out vec2 barycentrics;
 #endif
@@ -75,7 +75,7 @@ void emit(vec2 uv_cells, float depth_cells, int axis)
 }
 
 #if PRIMITIVE_KIND == 0
-// In texels: more than a rasteriser's rounding of corners.
+// Margin in texels: more than a rasteriser's rounding of corners.
 const float SNAP_CELLS = 1.0 / 32.0;
 
 float cross_2d(vec2 a, vec2 b)
@@ -99,7 +99,7 @@ bool may_cover(vec2 a, vec2 b, vec2 c)
            side * cross_2d(ca, middle - c) >= -SNAP_CELLS * (abs(ca.x) + abs(ca.y));
 }
 
-// Slopes beyond this say nothing: such a plane passes more cells in a texel than the cube has.
+// Maximum slope: a plane beyond it passes more cells in a texel than the cube has.
 const float SLOPE_MAX = 65536.0;
 
 // Slopes of the depth along u and v.
@@ -114,7 +114,7 @@ vec2 slopes_of(vec3 normal, int axis, int u, int v)
 }
 
 #ifdef ALL_IMAGES
-// The normal may have any length; a needle's may be zero: it counts as steep everywhere.
+// FACE_* bits of a triangle. The normal may have any length; a needle's may be zero: it counts as steep everywhere.
 uint face_of_triangle(vec3 normal)
 {
     float maximum = max_component(abs(normal));
@@ -179,8 +179,7 @@ void main()
     }
 }
 #else
-// The square is a little larger than the sphere, so that rounding does not cut the sphere's rim. Its depth does not
-// matter, if only it is in the cube.
+// Margin of a sphere's square, so that rounding does not cut the rim. Its depth may be anywhere in the cube.
 const float SQUARE_MARGIN = 1.0001;
 
 void main()

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Primitives of instances that are drawn into images along the axes, one vertex each: the primitive's number. The
-// geometry shader fetches the rest, once. The one attribute advances with the instance.
+// Vertices of instances drawn into images along the axes, one per primitive: its number. The geometry shader fetches the
+// rest, once. The only attribute advances with the instance.
 
 layout(location = 0) in uvec4 drawn; // raster/layout.h
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A surface's orientation to the axes: FACE_* bits of raster/layout.h.
+// Orientation of a surface to the axes: FACE_* bits of raster/layout.h.
 #include "raster/layout.h"
 #include "common/math.glsl"
 #include "common/unit.glsl"
 
-// `unit` points to the outside.
+// FACE_* bits of a normal; `unit` points to the outside.
 uint face_of(vec3 unit)
 {
     vec3 lean = abs(unit);
@@ -17,13 +17,13 @@ uint face_of(vec3 unit)
     return face;
 }
 
-// Whether an image shows it well.
+// Whether an image shows the surface well.
 bool is_shown(uint face, int axis)
 {
     return (face & FACE_STEEP << axis) == 0u || (face & FACE_LEANS << axis) != 0u;
 }
 
-// The dominant axis, of equal ones the first.
+// Dominant axis; the first of equal ones.
 int axis_of(vec3 lean)
 {
     return lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The point of a primitive at the centre of a texel of the images along the axes, from the outputs of raster/draw.geom.
-// It is `precise`, as the fragments that one program counts are drawn by another.
+// Point of a primitive at the centre of a texel in the images along the axes, from the outputs of raster/draw.geom. It is
+// `precise`, as one program counts the fragments that another draws.
 // Defines: PRIMITIVE_KIND 0 triangles, 1 spheres; HAS_CUTOUT: they may have holes; HAS_SPHERES with PRIMITIVE_KIND 1.
 #include "shared/bindings.h"
 #include "common/alpha.glsl"
@@ -10,7 +10,7 @@ uniform uint texels_along; // a side of the images
 
 #if PRIMITIVE_KIND == 0
 layout(location = 0) flat in vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
-layout(location = 1) flat in vec3 depths; // of that point; minimum, maximum
+layout(location = 1) flat in vec3 depths; // depth of that point; minimum, maximum
 #ifdef HAS_CUTOUT
 layout(location = 3) in vec2 barycentrics;
 #endif
@@ -22,7 +22,7 @@ uint texel_number()
     return (uint(gl_Layer) * texels_along + uint(gl_FragCoord.y)) * texels_along + uint(gl_FragCoord.x);
 }
 
-// Depths of geometry on the sides of the cube may be rounded out of it.
+// Clamps a depth: geometry on the sides of the cube may be rounded out of it.
 float depth_in_cube(float depth_cells)
 {
     return min(max(depth_cells, 0.0), float(texels_along));
@@ -44,17 +44,17 @@ float triangle_depth_cells()
     precise float along_u = (gl_FragCoord.x - plane.z) * plane.x;
     precise float along_v = (gl_FragCoord.y - plane.w) * plane.y;
     precise float depth_cells = depths.x + along_u + along_v;
-    // Clamped to the triangle's range, as the plane of a thin one is uncertain, and to the cube.
+    // The depth is clamped to the triangle's range, as the plane of a thin one is uncertain, and to the cube.
     depth_cells = min(max(depth_cells, depths.y), depths.z);
     return depth_in_cube(depth_cells);
 }
 #else
-// The line along the axis through the texel's centre, and its intersections with the sphere.
+// Line along the axis through the texel's centre, and its intersections with the sphere.
 struct sphere_chord {
     vec3 origin, direction; // world space; a cell long, as depths are in cells
     vec4 rows[3];           // object_from_world
     float nearest, half_chord; // cells; below 0: the line misses the sphere
-    vec3 closest, step_object; // from its centre, object space
+    vec3 closest, step_object; // from the sphere's centre, object space
 };
 
 sphere_chord chord_of_sphere()
@@ -73,7 +73,7 @@ sphere_chord chord_of_sphere()
     precise float squared = dot(step_object, step_object);
     precise float nearest = -dot(from_centre, step_object) / squared;
     precise vec3 closest = from_centre + nearest * step_object;
-    // Asked before the root is taken: some compilers take a NaN for whatever suits them.
+    // The comparison comes before the root: some compilers replace NaN by anything.
     precise float half_squared = (sphere.w * sphere.w - dot(closest, closest)) / squared;
     precise float half_chord = half_squared >= 0.0 && squared > 0.0 ? sqrt(half_squared) : -1.0;
     c.origin = origin;
@@ -85,7 +85,7 @@ sphere_chord chord_of_sphere()
     return c;
 }
 
-// side 0: where the line enters; 1: where it leaves. The normal may have any length.
+// Intersection where the line enters (side 0) or leaves (1). The normal may have any length.
 float intersection_of(sphere_chord c, int side, out vec3 normal_world)
 {
     precise float reach = side == 0 ? -c.half_chord : c.half_chord;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The line of a ray and a triangle, also where it passes it: what samples of triangles are verified with.
+// Intersection of a ray's line with a triangle's plane, also beside the triangle: samples of triangles are verified with
+// it.
 #include "common/intersection.glsl"
 
-// Of a triangle of one instance, in whose object space the ray is.
+// Intersection of a line with the plane of an instance's triangle, in object space.
 struct line_intersection {
     vec3 v0, v1, v2; // from the ray's origin
     vec3 weights;    // barycentric, where the line intersects the triangle's plane
-    float distance;  // there
+    float distance;  // distance of the intersection
     bool from_behind;
 };
 
@@ -32,7 +33,7 @@ bool has_corner(line_intersection c, vec3 v)
     return c.v0 == v || c.v1 == v || c.v2 == v;
 }
 
-// Whether the edge beyond which the line passes the one triangle is an edge of the other, too.
+// Whether the edge beyond which the line passes the one triangle is also an edge of the other.
 bool is_beyond_edge_of(line_intersection c, line_intersection other)
 {
     bvec3 has = bvec3(has_corner(other, c.v0), has_corner(other, c.v1), has_corner(other, c.v2));

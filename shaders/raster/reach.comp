@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT
-// The size of the empty space around the empty blocks of a grid (raster/layout.h). One invocation per block. Defines,
-// one per pass, in this order: REACH_X, REACH_Y, REACH_Z.
+// Finds the size of the empty space round the empty blocks of a grid (raster/layout.h). One invocation per block.
+// Defines, one per pass, in this order: REACH_X, REACH_Y, REACH_Z.
 #include "raster/layout.h"
 #include "common/dispatch.glsl"
 
 layout(binding = IMAGE_BLOCKS, rgba32ui) uniform uimageBuffer blocks;
 
-uniform int first_texel, block_texels, grid; // the grid's first texel; of a block; blocks along a side
-uniform uint first_item, end_item;           // of the blocks
+uniform int first_texel, block_texels, grid; // first texel of the grid; texels of a block; blocks along a side
+uniform uint first_item, end_item;           // blocks of the dispatch
 
-// The number of empty blocks from this one on in one direction of an axis; then of empty squares, then of cubes: the
-// largest n for which n adjacent rows (squares) are empty over n. For up to four octants at once, whose 4 bits begin at
-// `shift`. A block's own words are written by no other invocation.
+// Number of empty blocks from this one on in one direction of an axis; then of empty squares, then of cubes: the largest
+// n for which n adjacent rows (squares) are empty over n. It is found for up to four octants at once, whose 4 bits begin
+// at `shift`. No other invocation writes a block's own words.
 uint reach(int at, int left, int step_, uint shift)
 {
     uvec4 counts = uvec4(BLOCK_REACH_MAX);
     for (uint k = 0u; any(greaterThan(counts, uvec4(k))); k++) {
-        // Beyond the grid all is empty.
+        // Everything beyond the grid is empty.
         uvec4 beside = uvec4(BLOCK_REACH_MAX);
         if (int(k) < left) {
             uvec4 block = imageLoad(blocks, at + int(k) * step_);

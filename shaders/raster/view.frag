@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Which primitive a pixel sees: its instance + 1 and its scene-wide number. PRIMITIVE_KIND as in view.vert;
-// HAS_CUTOUT: it may have holes. Of layers, where a surface counts once at each depth, the one drawn first:
-//   HAS_LAYERS   what lies behind the layer before, if there is one (depth peeling)
-//   K_BUFFER     the first 2 or 3 of them, in one pass, without a test of depth. Bavoil, Callahan, Lefohn, Comba, Silva.
+// Writes the primitive that a pixel sees: its instance + 1 and its scene-wide number. PRIMITIVE_KIND as in view.vert;
+// HAS_CUTOUT: it may have holes. In layers a surface counts once at each depth, for the first one drawn:
+//   HAS_LAYERS   the surface behind the previous layer, if there is one (depth peeling)
+//   K_BUFFER     the first 2 or 3 surfaces, in one pass, without a depth test. Bavoil, Callahan, Lefohn, Comba, Silva.
 //                Multi-Fragment Effects on the GPU using the k-Buffer. 2007.
 
 #include "shared/path.h"
@@ -11,14 +11,14 @@
 
 uniform uint instance_index;
 uniform uint first_primitive;
-uniform uint first_row; // of the strip that is drawn, in the picture
-uniform uint layer;     // the sample that is drawn, of the current ones
+uniform uint first_row; // first row of the strip in the picture
+uniform uint layer;     // index of the current sample that is drawn
 
 #ifdef K_BUFFER
 #ifdef GL_EXT_shader_framebuffer_fetch
 #define KEPT inout
 #else
-#define KEPT out // to check the rest of the program
+#define KEPT out // lets the rest of the program be checked without the extension
 #endif
 layout(location = 0) KEPT uvec2 visible;
 layout(location = 1) KEPT uvec2 visible_second;
@@ -33,12 +33,12 @@ layout(location = 0) out uvec2 visible;
 #endif
 
 #ifdef HAS_LAYERS
-// One program draws all layers, so that a surface compares equal to itself in the next one.
+// A single program draws every layer, so that a surface compares equal to itself in the next one.
 layout(binding = UNIT_TRACER_2) uniform sampler2D depths_before;
 uniform uint has_before;
 #endif
 
-// Whether it may be seen there. Depth is reversed.
+// Whether the surface may be visible there. Depth is reversed.
 bool is_wanted(float depth)
 {
 #ifdef K_BUFFER
@@ -55,7 +55,7 @@ void see(float depth, uvec2 what)
 #ifdef K_BUFFER
     if (!is_wanted(depth))
         return;
-    depth = min(depth, 1.0); // as a depth buffer has it
+    depth = min(depth, 1.0); // a depth buffer clamps too
     bool is_first = depth > depths.x, is_second = depth > depths.y;
     if (depth == depths.x || depth == depths.y)
         return;
@@ -74,7 +74,7 @@ void see(float depth, uvec2 what)
 }
 
 #if PRIMITIVE_KIND == 1
-// As clip_from_world_point() computes it.
+// Depth by the formula of clip_from_world_point().
 float depth_of(float distance_, vec3 direction)
 {
     vec3 axis = world_from_view_vector(vec3(0.0, 0.0, -1.0));
@@ -117,7 +117,7 @@ void main()
         see(depth_of(found.distance, direction), what);
 #else
 #ifdef HAS_LAYERS
-    if (found.distance >= 0.0 && !is_wanted(depth)) { // the sphere's far side is a surface of its own
+    if (found.distance >= 0.0 && !is_wanted(depth)) { // the far side of the sphere is a surface of its own
         found = candidate_sphere(instance_index, primitive, origin, direction, found.distance);
         depth = depth_of(found.distance, direction);
     }

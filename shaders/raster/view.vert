@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Primitives of one instance, fetched from the scene's texel buffers by the vertex number; there are no vertex
+// Vertices of an instance's primitives, fetched from the scene's texel buffers by vertex number; there are no vertex
 // attributes. PRIMITIVE_KIND: 0 triangles, 1 spheres as their bounding boxes, 2 discs as squares.
 
 #include "common/camera.glsl"
@@ -7,18 +7,18 @@
 #include "common/math.glsl"
 
 uniform uint instance_index;
-uniform uint first_primitive; // of this draw, scene-wide
-uniform uint layer;           // the sample that is drawn, of the current ones
+uniform uint first_primitive; // first primitive of this draw, scene-wide
+uniform uint layer;           // index of the current sample that is drawn
 
 #if PRIMITIVE_KIND == 1
-// Corners of a cube by bit (x 1, y 2, z 4), two triangles a side, counter-clockwise from outside.
+// Corners of a cube by bit (x 1, y 2, z 4), two triangles per side, counter-clockwise from outside.
 const uint BOX_CORNERS[36] = uint[36](0u, 4u, 6u, 0u, 6u, 2u, 1u, 3u, 7u, 1u, 7u, 5u, 0u, 1u, 5u, 0u, 5u, 4u,
                                       2u, 6u, 7u, 2u, 7u, 3u, 0u, 2u, 3u, 0u, 3u, 1u, 4u, 5u, 7u, 4u, 7u, 6u);
-// The box is a little larger than the sphere, so that rounding does not cut the sphere's rim.
+// Margin of a sphere's box, so that rounding does not cut the rim.
 const float BOX_MARGIN = 1.0001;
 #endif
 
-invariant gl_Position; // surfaces that coincide are drawn by several programs
+invariant gl_Position; // several programs draw surfaces that coincide
 
 void main()
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is known of the rays of a wave: rayspace/layout.h, RAYSPACE_ANSWER_BYTES.
+// Answers for the rays of a wave so far: rayspace/layout.h, RAYSPACE_ANSWER_BYTES.
 //
 // Defines: ANY_HIT.
 #include "common/optical_depth.glsl"
@@ -8,7 +8,7 @@
 
 layout(std430, binding = BIND_RAYSPACE_ANSWERS) buffer answer_block { uvec4 answers[]; };
 
-// Order as the floats do, also negative ones.
+// Bits that have the order of the floats, also of negative ones.
 uint ordered_bits(float value)
 {
     uint bits = floatBitsToUint(value);
@@ -20,7 +20,7 @@ float float_of_ordered(uint bits)
     return uintBitsToFloat((bits & 0x80000000u) != 0u ? bits & 0x7fffffffu : ~bits);
 }
 
-// How far a ray needs to go on, at most `t_max`; if nothing can change its answer, before its begin.
+// Distance up to which a ray needs to be traced, at most `t_max`; before its beginning if nothing can change its answer.
 float distance_left(uint ray, float t_max)
 {
 #ifdef ANY_HIT

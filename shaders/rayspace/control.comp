@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Between two passes, by one invocation: takes what the last one wrote, or halves it where it did not fit; then says
-// what the next one takes, and whether leaves are tested before it.
+// Runs between two passes, by one invocation: accepts the output of the last one, or halves the pass where it did not
+// fit; then sets the size of the next one, and whether leaves are tested before it.
 #define GROUP_SIZE 1
 #include "common/dispatch.glsl"
 #include "rayspace/control.glsl"
@@ -8,16 +8,18 @@
 layout(std430, binding = BIND_RAYSPACE_STOPPED) buffer stopped_block { uint stopped[]; };
 
 uniform uint last_from, last_to; // the stacks of the last pass
-uniform uint from, to;           // and of the next one
+uniform uint from, to;           // stacks of the next pass
 uniform uint capacity;         // pairs of a stack, and of the leaves
-uniform uint leaves_wanted;    // so many are worth a dispatch; 0: all are tested, 0xffffffff: none can be now
+// number of leaves that is worth a dispatch; 0: test all, 0xffffffff: none can be tested now
+uniform uint leaves_wanted;
 uniform uint limit_max;        // pairs of a pass
-// The last places of a stack are for passes of one pair: one after another, these go down to the leaves with few.
+// Places at the end of a stack that are kept for passes of one pair: one after another, these descend to the leaves in
+// few.
 uniform uint reserve;
-uniform uint children; // that a pass has room for, of each pair that it takes; 0: it takes what it can
-uniform uint seeds;        // pairs that were put onto stack `from` since
+uniform uint children; // children that must fit for each pair of a pass; 0: it takes as many pairs as there are
+uniform uint seeds;        // pairs pushed onto stack `from` since
 uniform uint ends;         // RAYSPACE_END_*
-uniform uint stopped_word; // in `stopped`; 0xffffffff: the slice cannot be stopped
+uniform uint stopped_word; // word of `stopped`; 0xffffffff: the slice cannot be stopped
 
 void main()
 {

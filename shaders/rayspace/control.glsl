@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the passes of a wave share.
+// Control of a wave's passes, which all of them share.
 #include "rayspace/layout.h"
 #include "shared/bindings.h"
 #include "shared/wave.h"
@@ -11,7 +11,7 @@ uint waiting_on(uint stack)
     return stack == 0u ? control.waiting_0 : control.waiting_1;
 }
 
-// The work groups of a dispatch with an invocation for `each` items, as common/dispatch.glsl counts them.
+// Work groups of a dispatch with an invocation for `each` items, counted as in common/dispatch.glsl.
 uvec3 groups_of(uint count, uint each)
 {
     uint groups = (count + 64u * each - 1u) / (64u * each), x = min(groups, WAVE_GROUPS_MAX);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Behind the last pass of a wave, by one invocation: adds what was counted to the sums of the frame.
+// Runs after the last pass of a wave, by one invocation: adds its counts to the sums of the frame.
 #define GROUP_SIZE 1
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
@@ -7,7 +7,7 @@
 
 layout(std430, binding = BIND_RAYSPACE_COUNTS) buffer counts_block { rayspace_counts counts_of_kinds[]; };
 
-uniform uint kind; // of the wave's rays
+uniform uint kind; // kind of the wave's rays
 
 void add(inout uint low, inout uint high, uint number)
 {
@@ -19,7 +19,7 @@ void add(inout uint low, inout uint high, uint number)
 void main()
 {
     uint wave_rays = ray_end;
-    if (wave_rays == 0u) // it was queued in case there are any
+    if (wave_rays == 0u) // the wave was queued in case there are rays
         return;
     rayspace_counts c = counts_of_kinds[kind];
     c.waves++;

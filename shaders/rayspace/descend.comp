@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A pass: pairs of nodes and elements that may meet become pairs of their children that may. Test and stream reduction
-// in one: an invocation takes RAYSPACE_CHUNK pairs and asks once for places for all that is left of them.
+// Descends a level: pairs of nodes and elements that may meet become pairs of their children that may. Test and stream
+// reduction are one pass: an invocation takes RAYSPACE_CHUNK pairs and reserves places for all remaining children at
+// once.
 //
 // Defines: those of rayspace/place.glsl, rayspace/meet.glsl and rayspace/tree.glsl, HAS_MOTION, and
-//   RAYSPACE_TO_SLOTS  passes of their own reduce the stream (section 4, rayspace/reduce.h)
+//   RAYSPACE_TO_SLOTS  separate passes reduce the stream (section 4, rayspace/reduce.h)
 //   RAYSPACE_FLAT      elements are primitives, and nodes alone are divided (section 3.3)
 #include "common/dispatch.glsl"
 #include "rayspace/control.glsl"
@@ -13,7 +14,7 @@
 #include "rayspace/item.glsl"
 #include "rayspace/tree.glsl"
 
-layout(binding = UNIT_RAYSPACE_PAIRS) uniform usamplerBuffer pairs; // of the stack that is taken from
+layout(binding = UNIT_RAYSPACE_PAIRS) uniform usamplerBuffer pairs; // pairs of the stack that is read
 #ifdef RAYSPACE_TO_SLOTS
 layout(std430, binding = BIND_RAYSPACE_SLOTS) writeonly buffer slot_block { uvec4 slots_written[]; };
 #else
@@ -23,10 +24,10 @@ layout(std430, binding = BIND_RAYSPACE_LEAVES) writeonly buffer leaf_block { uve
 
 uniform uint level_first[16]; // RAYSPACE_LEVELS: node of each level
 uniform uint level_count[16];
-uniform uint to; // the stack that is written to
+uniform uint to; // number of the stack that is written
 
-// The node is divided while it is wider than a fraction of the element, by that factor: what is coarse on both sides
-// costs tests and culls little.
+// Factor of the element's size above which the wider node is divided: a test that is coarse on both sides costs time and
+// culls little.
 uniform float split_factor;
 
 bundle bundle_at(uint node)
@@ -37,15 +38,14 @@ bundle bundle_at(uint node)
 
 #ifndef RAYSPACE_FLAT
 
-// Whether a ray that meets the element goes on alone, as a pair of a ray and a leaf does (rayspace/subtree.glsl).
+// Whether a ray that meets the element continues alone, as in a pair of a ray and a leaf (rayspace/subtree.glsl).
 bool is_for_one_ray(bool is_top, uint element, uint link)
 {
     return is_leaf(link) ? !is_instance(link) : !is_top && link - element <= RAYSPACE_SUBTREE_MAX;
 }
 
-// Whether the node of a pair is to be divided, rather than the element: also whatever its width where its rays may go
-// on alone, so that each has few pairs. On software GL a pair of a pass takes as long as a ray its whole way through a
-// tree.
+// Whether the node of a pair is divided rather than the element; whatever its width where its rays may continue alone, so
+// that each has few pairs. On software GL a pair of a pass takes as long as a ray's whole way through a tree.
 bool divides_node(uint level, bundle node, bool for_one, uint link, bounds b)
 {
     if (level == 0u)
@@ -65,11 +65,11 @@ uint after(uint element, uint link)
 
 const uint KEPT_MAX = RAYSPACE_CHUNK_SLOTS;
 
-// What is left of the pairs of this invocation. No parameter: software GL takes minutes to compile an array that is
-// handed over.
+// Pairs that this invocation keeps. They are no parameter: software GL takes minutes to compile an array that is passed
+// on.
 uvec4 kept[KEPT_MAX];
 uint kept_count = 0u;
-uint leaf_mask = 0u; // a bit for each
+uint leaf_mask = 0u; // a bit for each kept pair
 uint tests = 0u;
 
 void test(uvec4 pair, bool is_ray_leaf, bundle b, bounds what)
@@ -104,7 +104,7 @@ void take(uvec4 pair)
     bool for_one = is_for_one_ray(tree.is_top, pair.y, link);
     bool itself = level == 0u && for_one;
     bool by_node = itself || divides_node(level, b, for_one, link, bounds_);
-    if (!by_node && is_leaf(link)) { // the only instance of a scene: its tree's root is the one child
+    if (!by_node && is_leaf(link)) { // a scene with one instance: the root of its tree is the only child
         made.z = link & BVH_LEAF_FIRST_MASK;
         tree = tree_of(made.z);
         next = 0u;
@@ -135,7 +135,7 @@ void take(uvec4 pair)
             next = after(next, link);
         }
         bool is_top = tree.is_top;
-        if (is_instance(link)) { // its tree's root is as large, and has its turn at once
+        if (is_instance(link)) { // the root of its tree is as large, and is tested at once
             one.yz = uvec2(0u, link & BVH_LEAF_FIRST_MASK);
             is_top = false;
             if (!root_link_of(one.z, link))
@@ -147,7 +147,7 @@ void take(uvec4 pair)
 #endif
         test(one, is_ray_leaf, b, bounds_);
     }
-    if (!by_node && next < end) // the rest of many children
+    if (!by_node && next < end) // remaining children
         kept[kept_count++] = uvec4(pair.xyz, made.w + RAYSPACE_CHILDREN);
 }
 

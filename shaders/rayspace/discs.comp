@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Before the descent: rays end at the nearest disc, or have no light left behind one, so that nodes do not go on beyond
-// it. The answer itself is made at the end (trace/wave.comp), where discs come before primitives at one distance.
+// Tests discs before the descent: rays end at the nearest disc, or lose all light behind one, so that nodes need not
+// extend beyond it. The answer itself is made at the end (trace/wave.comp), where discs come before primitives at one
+// distance.
 //
 // Defines: those of common/discs.glsl and rayspace/trace_ray.glsl.
 #include "common/dispatch.glsl"

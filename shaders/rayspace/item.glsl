@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Primitives of the batch in hand: rayspace/layout.h, RAYSPACE_ITEM_TEXELS.
+// Primitives of the current batch: rayspace/layout.h, RAYSPACE_ITEM_TEXELS.
 //
-// Defines: RAYSPACE_FLAT there are any.
+// Defines: RAYSPACE_FLAT there are batches.
 #include "rayspace/meet.glsl"
 
 #ifdef RAYSPACE_FLAT

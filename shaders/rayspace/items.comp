@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A batch of primitives for the flat descent: what bounds each, and its pair with the root of the hierarchy. Nothing of it
-// is kept: the first picture costs what any other one does.
+// Makes a batch of primitives for the flat descent: bounds of each, and its pair with the root of the hierarchy. No batch
+// is kept: the first picture costs as much as any other.
 //
 // Defines: HAS_MOTION.
 #include "common/dispatch.glsl"
@@ -13,8 +13,8 @@ layout(std430, binding = BIND_RAYSPACE_PAIRS) writeonly buffer pair_block { uvec
 uniform uint batch_first, batch_count; // ranks
 uniform uint root;                     // node
 
-// Of the corners on their way from one pose to the next: a point stays within the hull of where each pose has it, as the
-// shutter opens and as it closes.
+// Hull of the corners on their way from one pose to the next: a point stays within the hull of its places in the poses,
+// at shutter open and close.
 struct hull {
     vec3 lower, upper;
 };
@@ -30,7 +30,7 @@ void include(inout hull h, vec4 rows[3], vec3 centre, vec3 half_size)
     }
 }
 
-// The smallest sphere around a triangle: half the longest edge, or the circumsphere where all angles are acute.
+// Smallest sphere round a triangle: half the longest edge, or the circumsphere where all angles are acute.
 vec4 sphere_around(vec3 a, vec3 b, vec3 c)
 {
     vec3 squared = vec3(dot(b - c, b - c), dot(c - a, c - a), dot(a - b, a - b));
@@ -40,7 +40,7 @@ vec4 sphere_around(vec3 a, vec3 b, vec3 c)
     if (distance(from, centre) > 0.5 * distance(s, t)) {
         vec3 u = s - from, v = t - from, n = cross(u, v);
         vec3 to_centre = cross(dot(u, u) * v - dot(v, v) * u, n) / (2.0 * dot(n, n));
-        if (dot(to_centre, to_centre) < dot(squared, vec3(1.0))) // not where it is seen on edge
+        if (dot(to_centre, to_centre) < dot(squared, vec3(1.0))) // false for a triangle seen on edge
             centre = from - to_centre;
     }
     return vec4(centre, max(distance(a, centre), max(distance(b, centre), distance(c, centre))));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A ray against the primitives that a pair leads to.
+// Tests of a ray against the primitives of a pair.
 //
 // Defines: RAYSPACE_FLAT a pair leads to one primitive; else to a part of a tree (rayspace/subtree.glsl).
 #include "common/candidate.glsl"
@@ -17,27 +17,27 @@ layout(binding = UNIT_TRACER_2) uniform usamplerBuffer tree_primitives;
 #define ASK_MATERIALS
 #endif
 
-// The ray of a pair in the pair's instance.
+// Ray of a pair in the pair's instance.
 struct leaf_ray {
     trace_ray world;
     object_ray object;
     uint instance_index, first_primitive;
-    uint first_rank; // of the instance
+    uint first_rank; // rank of the instance's first primitive
 };
 
-// Intersections whose materials are to be asked. Software GL runs the code that asks for all rays of a SIMD group, hit or
-// no hit: it stands outside of the loops over elements and primitives.
+// Intersections whose materials must be evaluated. Software GL executes the evaluating code for all rays of a SIMD group,
+// hit or no hit: it stands outside of the loops over elements and primitives.
 struct noted_hits {
     uint count;
     candidate first;
-    float second; // distance of the far side of a sphere
+    float second; // distance of a sphere's far side
 };
 
 uint triangle_tests = 0u, box_tests = 0u;
 
 #ifdef ANY_HIT
 
-// The optical depth of what the pair leads to.
+// Optical depth found for the pair.
 #define pair_answer vec3
 
 bool is_done(pair_answer found)
@@ -63,9 +63,9 @@ bool is_of_interest(leaf_ray r, float distance_, pair_answer found)
 #else
 
 struct pair_answer {
-    float distance; // of the pair's nearest hit
-    uint rank;      // RAYSPACE_NO_RANK: there is none
-    float known;    // the distance of the ray's nearest hit so far; that of its end
+    float distance; // distance of the pair's nearest hit
+    uint rank;      // RAYSPACE_NO_RANK: none
+    float known;    // distance of the ray's nearest hit so far; that of its end
 };
 
 bool is_done(pair_answer found)
@@ -73,7 +73,7 @@ bool is_done(pair_answer found)
     return false;
 }
 
-// How far the ray needs to go on: hits at one distance count too, as ranks decide among them.
+// Distance up to which the ray needs to be traced: hits at the same distance count too, as ranks decide among them.
 float end_of(leaf_ray r, pair_answer found)
 {
     return found.known + abs(found.known) * (PRUNE_SLACK - 1.0);
@@ -115,7 +115,7 @@ void offer_or_note(leaf_ray r, candidate hit, inout pair_answer found, inout not
 #endif
 }
 
-// The first of the noted hits; the other one becomes the first.
+// Settles the first of the noted hits; the second one becomes the first.
 void settle_one(leaf_ray r, inout pair_answer found, inout noted_hits noted)
 {
     offer(r, noted.first, found);
@@ -163,8 +163,8 @@ void test_pair(uvec4 pair, leaf_ray r, inout pair_answer found)
 
 #else
 
-// The primitive i in the order of the tree, which has a copy of its corners. As these are those of the shutter's opening,
-// a shape that moves takes the geometry's own.
+// Tests primitive i in the order of the tree, which has a copy of its corners. The copy is from shutter open, so a shape
+// that moves uses the geometry's own.
 void test_in_order(leaf_ray r, subtree part, uint i, bool is_sphere, inout pair_answer found, inout noted_hits noted)
 {
     triangle_tests++;
@@ -191,7 +191,8 @@ void test_in_order(leaf_ray r, subtree part, uint i, bool is_sphere, inout pair_
 #endif
 }
 
-// All invocations of a SIMD group first find their leaf, then all test primitives, and then all ask materials.
+// Tests a pair. The invocations of a SIMD group first find their leaves, then test primitives, and then evaluate
+// materials, all at the same time.
 void test_pair(uvec4 pair, leaf_ray r, inout pair_answer found)
 {
     subtree part = subtree_of(r.instance_index, pair.y, r.object);
@@ -246,7 +247,7 @@ leaf_ray leaf_ray_of(uvec4 pair, uint ray)
 
 #ifdef ANY_HIT
 
-// Adds to the depths of a ray, up to the maximum, so that they cannot overflow.
+// Adds to the optical depths of a ray, up to the maximum, so that they cannot overflow.
 void deepen(uint ray, uint channel, uint steps)
 {
     uint expected = answers[ray][channel];
@@ -278,7 +279,7 @@ void test_leaf_any(uvec4 pair, uint ray)
 
 #else
 
-// The nearest hit: its distance, as ordered_bits(), and the rank. None where a nearer one of the ray is known.
+// Nearest hit: its distance, as ordered_bits(), and the rank. None where a nearer one of the ray is known.
 uvec2 test_leaf_closest(uvec4 pair, uint ray)
 {
     leaf_ray r = leaf_ray_of(pair, ray);

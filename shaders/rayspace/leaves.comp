@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Rays against the primitives of the leaves that they may meet: the test is that of brute force (common/candidate.glsl),
-// and so is the choice among surfaces at one distance, whatever the order of the pairs. An invocation has a pair.
+// Tests rays against the primitives of leaves that they may meet, by the test of brute force (common/candidate.glsl). The
+// choice among surfaces at one distance, too, does not depend on the order of the pairs. An invocation has a pair.
 //
-// Closest hits take three passes over the pairs, for a least rank is only known when the least distance is. The defines
-// of common/candidate.glsl, and:
-//   LEAVES_TEST    the pair's nearest hit; the least distance of each ray
-//   LEAVES_RANK    the least rank at that distance
-//   LEAVES_SETTLE  the one pair that has it writes the hit down
+// Closest hits take three passes over the pairs, as the minimum rank is known only after the minimum distance. The
+// defines of common/candidate.glsl, and:
+//   LEAVES_TEST    the pair's nearest hit; the minimum distance of each ray
+//   LEAVES_RANK    the minimum rank at that distance
+//   LEAVES_SETTLE  the pair with that rank writes the hit
 #include "common/dispatch.glsl"
 #include "rayspace/control.glsl"
 #include "rayspace/place.glsl"

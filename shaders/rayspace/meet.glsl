@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Whether a ray of a bundle may meet what a sphere and a box bound. Errs towards it alone; NaN counts as a meeting.
+// Whether a ray of a bundle may meet a bounding sphere and box. Errs towards a meeting only; NaN counts as one.
 #include "rayspace/ray.glsl"
 
-// World space.
+// Bounds in world space.
 struct bounds {
     vec3 centre;
     float radius;
     vec3 lower, upper;
 };
 
-// The cone from the sphere's centre against the sphere that is larger by the radius of the origins (section 3.3.1).
-// The distance from the axis is that of a difference, not of squares: near the axis these cancel.
+// Tests the cone from the sphere's centre against the sphere enlarged by the radius of the origins (section 3.3.1). The
+// distance from the axis is that of a difference, not of squares: near the axis these cancel.
 bool cone_meets_sphere(bundle b, vec3 centre, float radius)
 {
     vec3 q = centre - b.centre;
@@ -21,19 +21,19 @@ bool cone_meets_sphere(bundle b, vec3 centre, float radius)
     return !(squared > far * far) && (inside || !(along < -reach || beside));
 }
 
-// Where rays of the bundle may enter and leave the box along an axis, by intervals of origins and directions.
+// Tests where rays of the bundle may enter and leave the box along each axis, by intervals of origins and directions.
 bool slabs_meet_box(bundle b, vec3 lower, vec3 upper)
 {
     bvec3 forward = greaterThan(b.direction_lower, vec3(1e-6)), backward = lessThan(b.direction_upper, vec3(-1e-6));
     vec3 fast = mix(-b.direction_lower, b.direction_upper, forward);
     vec3 slow = mix(-b.direction_upper, b.direction_lower, forward);
-    // how far it is to the near side from the nearest origin, and to the far side from the farthest one
+    // distance to the near side from the nearest origin, and to the far side from the farthest one
     vec3 to_near = mix(b.origin_lower - upper, lower - b.origin_upper, forward);
     vec3 to_far = mix(b.origin_upper - lower, upper - b.origin_lower, forward);
     bvec3 one_way = bvec3(forward.x || backward.x, forward.y || backward.y, forward.z || backward.z);
     vec3 enter = mix(vec3(0.0), max(to_near, 0.0) / fast, one_way);
     vec3 leave = mix(vec3(3e38), to_far / slow, one_way);
-    // Along an axis where directions differ in sign: beside the box, and not towards it.
+    // Along an axis where directions differ in sign, the bundle misses a box beside it that it does not approach.
     bvec3 below = lessThan(b.origin_upper, lower), above = greaterThan(b.origin_lower, upper);
     bvec3 away = bvec3(below.x && b.direction_upper.x <= 0.0 || above.x && b.direction_lower.x >= 0.0,
                        below.y && b.direction_upper.y <= 0.0 || above.y && b.direction_lower.y >= 0.0,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One level of the hierarchy over the rays of a wave from the level below it, as mip levels are made (section 3.2). An
+// Makes one level of the hierarchy over the rays of a wave from the level below it, like mip levels (section 3.2). An
 // invocation makes a node.
 //
 // Defines: ANY_HIT the rays of the wave ask for transmittance; NODES_OF_RAYS level 1, from the rays.
@@ -11,10 +11,10 @@
 layout(binding = UNIT_RAYSPACE_NODES) uniform samplerBuffer nodes;
 layout(std430, binding = BIND_RAYSPACE_NODES) writeonly buffer node_block { vec4 node_texels[]; };
 
-uniform uint below_first, below_count; // nodes of the level below; rays
+uniform uint below_first, below_count; // nodes of the level below, or rays
 uniform uint own_first, own_count;
 
-// Beyond this half angle a cone culls nothing that boxes do not.
+// Maximum half angle of a cone; a wider one culls nothing that boxes do not.
 const float SPREAD_MAX = 1.5;
 
 struct child {
@@ -43,8 +43,8 @@ child child_at(uint index)
 #endif
 }
 
-// The angle that a chord of the unit sphere spans, or up to 1.1 % more: the refined Shafer-Fink inequality, as asin() of a
-// device may be off by 2^-11. Exact also for small angles, where the cosine is not.
+// Upper bound, up to 1.1 % too large, of the angle that a chord of the unit sphere spans: the refined Shafer-Fink
+// inequality, as asin() of a device may be off by 2^-11. It is exact also for small angles, where the cosine is not.
 float angle_above(float chord)
 {
     float sine = min(0.5 * chord, 1.0);
@@ -80,8 +80,8 @@ void main()
         all.radius = max(all.radius, distance(c.centre, all.centre) + c.radius);
         all.spread = max(all.spread, angle_above(distance(all.axis, c.axis)) + c.spread);
     }
-    // The boxes are exact, and the spheres and cones of unions not: the smaller of both. The farthest corner of the box
-    // of directions is at a chord of the unit sphere from the axis.
+    // The boxes are exact, and spheres and cones of unions are not: the smaller of both counts. The farthest corner of
+    // the box of directions is at a chord of the unit sphere from the axis.
     vec3 farthest = max(abs(all.direction_lower - all.axis), abs(all.direction_upper - all.axis));
     all.radius = min(all.radius, distance(all.origin_lower, all.origin_upper) * 0.5);
     all.spread = min(all.spread, angle_above(length(farthest)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Places of level 0: which ray is where, and how far it goes on.
+// Places of level 0: the ray at each, and the distance up to which it matters.
 //
 // Defines: ANY_HIT the rays of the wave ask for transmittance.
 #include "common/range.glsl"
@@ -14,10 +14,10 @@ uint ray_of_place(uint place)
     return control.sorted != 0u ? texelFetch(order, int(place)).x : place;
 }
 
-// Farther away a point says nothing of the direction to it.
+// Maximum coordinate of a reversed ray's origin: from farther away, the direction would be lost to rounding.
 const float TURNED_MAX = 1e18;
 
-// A ray that was turned round begins at its end, which it has in common with others (section 3.5.1).
+// Ray at a place. A reversed ray begins at its end, which it shares with others (section 3.5.1).
 live_ray ray_at_place(uint place)
 {
     uint ray = ray_of_place(place);

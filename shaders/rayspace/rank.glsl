@@ -12,7 +12,7 @@ uint first_rank_of(uint instance_index)
     return texelFetch(ranks, int(instance_index)).x;
 }
 
-// The last instance whose first rank is not above; those without primitives come before it.
+// Last instance whose first rank is not above `rank`; those without primitives come before it.
 uint instance_of_rank(uint rank)
 {
     uint low = 0u, high = instance_count;

@@ -1,32 +1,32 @@
 // SPDX-License-Identifier: MIT
-// A ray of a wave as level 0 of the hierarchy.
+// Rays of a wave as level 0 of the hierarchy.
 #include "rayspace/layout.h"
 #include "shared/bindings.h"
 #include "common/math.glsl"
 #include "tree/slack.glsl"
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
 
 const float DIRECTION_SLACK = 9.5367431640625e-7; // 2^-20
 
-// What a bundle of rays is tested with.
+// A bundle of rays, with the bounds for its tests.
 struct bundle {
     vec3 centre;
-    float radius; // of the origins
+    float radius; // radius of the origins
     vec3 axis;
     float secant, tangent; // secant 0: no cone
     vec3 origin_lower, origin_upper;
     vec3 direction_lower, direction_upper;
-    float end; // metres; negative: no ray is alive
+    float end; // metres; negative: every ray is dead
 };
 
 struct live_ray {
     vec3 origin, direction; // unit
     float end;              // metres along it; negative: dead
-    float slack;            // rounding of where it is
+    float slack;            // rounding error of its position
 };
 
-// `t_max` may be less than the ray's own. Where a ray begins behind its origin it is taken from there on.
+// Makes the ray, up to `t_max`, which may be less than its own. A ray that begins behind its origin is cut there.
 live_ray live_ray_of(vec4 origin_t_min, vec4 direction_t_max, float t_max)
 {
     float largest = max_component(abs(direction_t_max.xyz));
@@ -37,7 +37,7 @@ live_ray live_ray_of(vec4 origin_t_min, vec4 direction_t_max, float t_max)
     r.direction = scaled / length(scaled);
     r.slack = WORLD_SLACK * max(max_component(abs(origin_t_min.xyz)), max_component(abs(r.origin)));
     r.end = min((t_max - before) * length_ * PRUNE_SLACK, 3e38);
-    // NaN too: no comparison holds
+    // NaN too: every comparison with it is false
     if (!(t_max > origin_t_min.w && length_ > 0.0 && max_component(abs(r.origin)) < 3e38))
         r.end = -1.0;
     return r;

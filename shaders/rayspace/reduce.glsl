@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The slots of the pass in hand. A work group has the segments of RAYSPACE_CHUNK_SLOTS x 64 slots, which are those of a
-// work group of the descent.
+// Slots of the current pass. A work group has the segments of RAYSPACE_CHUNK_SLOTS x 64 slots, which a work group of the
+// descent has written.
 #include "common/dispatch.glsl"
 #include "rayspace/control.glsl"
 #include "rayspace/reduce.h"
@@ -17,13 +17,13 @@ uint first_segment()
     return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP_SEGMENTS;
 }
 
-// Of a slot that is not empty.
+// List of a slot that is not empty.
 uint list_of(uint last)
 {
     return last == RAYSPACE_SLOT_LEAF ? RAYSPACE_LIST_LEAVES : RAYSPACE_LIST_PAIRS;
 }
 
-// How many of a list are in a segment.
+// Number of a list's pairs in a segment.
 uint count_in(uint counts, uint list)
 {
     return counts >> list * RAYSPACE_COUNT_BITS & RAYSPACE_COUNT_MASK;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Last step of a reduction: what was packed goes to the stack and to the leaves, or nowhere if it does not all fit.
+// Last step of a reduction: copies the packed pairs to the stack and to the leaves, or to neither if they do not all fit.
 #include "rayspace/reduce.glsl"
 
 layout(binding = UNIT_RAYSPACE_SLOTS) uniform usamplerBuffer pairs_packed;
@@ -7,7 +7,7 @@ layout(std430, binding = BIND_RAYSPACE_PAIRS) writeonly buffer pair_block { uvec
 layout(std430, binding = BIND_RAYSPACE_LEAVES) writeonly buffer leaf_block { uvec4 leaves_written[]; };
 layout(std430, binding = BIND_RAYSPACE_SEGMENTS) readonly buffer segment_block { uvec4 segments[]; };
 
-uniform uint to; // the stack that is written to
+uniform uint to; // number of the stack that is written
 
 void put(uint list, uint place, uint from)
 {

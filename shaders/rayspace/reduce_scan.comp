@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Second step of the reduction by segments: where each segment's pairs go in their lists, and how many there are in
-// all. One work group; an invocation has a run of segments.
+// Second step of the reduction by segments: finds the places of each segment's pairs in their lists, and their total
+// numbers. A single work group; an invocation has a run of segments.
 #include "rayspace/reduce.glsl"
 
 layout(std430, binding = BIND_RAYSPACE_SEGMENTS) buffer segment_block { uvec4 segments[]; };

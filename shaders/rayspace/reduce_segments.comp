@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// First step of the reduction by segments (section 4.1): what is not empty in each moves to its beginning, list by
-// list. An invocation has a segment: in log s steps of many invocations each would wait for the others, which takes
+// First step of the reduction by segments (section 4.1): moves the occupied slots of each segment to its beginning, list
+// by list. An invocation has a segment: in log s steps of many invocations each would wait for the others, which takes
 // four times as long on software GL.
 #include "rayspace/reduce.glsl"
 

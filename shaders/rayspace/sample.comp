@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Decides from a sample of a wave, whose neighbours are compared, whether its rays are sorted and whether they are turned
-// round. One group.
+// Decides, by comparing neighbours in a sample of a wave, whether its rays are sorted and whether they are reversed. A
+// single work group.
 //
 // Defines: ANY_HIT.
 #include "common/dispatch.glsl"
@@ -8,13 +8,14 @@
 #include "rayspace/control.glsl"
 #include "rayspace/ray.glsl"
 
-uniform uint sorts, turns; // as the settings: 0: as the sample says, 1: always, 2: never
+uniform uint sorts, turns; // settings: 0: decided by the sample, 1: always, 2: never
 
-// Neighbours of one direction are some thousandths apart; of directions by chance, 1.3.
+// Maximum distance of the directions of sorted neighbours. Neighbours with similar directions are some thousandths apart;
+// with random ones, 1.3.
 const float SORTED_APART = 0.3;
-const uint EACH = 4u; // of an invocation
+const uint EACH = 4u; // samples per invocation
 
-shared vec3 sums[64]; // of distances of directions, origins, ends
+shared vec3 sums[64]; // sums of distances between directions, origins, ends
 shared uint counts[64];
 
 void main()
@@ -23,7 +24,7 @@ void main()
     vec3 sum = vec3(0.0);
     uint count = 0u;
     for (uint i = 0u; i < EACH; i++) {
-        // in two steps: the product of both does not fit
+        // divided in two steps: the product of both would overflow
         uint first = uint(float(own * EACH + i) / float(64u * EACH) * float(steps));
         if (first + 1u >= ray_end)
             continue;

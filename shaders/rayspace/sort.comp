@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Sorts the rays of a wave by cells of origin and direction, whose bits are interleaved (a Morton code in five
-// dimensions). In a cell the order is by chance: no answer depends on it.
+// dimensions). Within a cell the order is random: no answer depends on it.
 //
-// Defines: SORT_COUNT how many rays each bin has; SORT_SCAN where each begins, by one group; SORT_PLACE rays to places.
+// Defines: SORT_COUNT counts the rays of each bin; SORT_SCAN finds the beginning of each, in one group; SORT_PLACE puts
+// rays at their places.
 #ifdef SORT_SCAN
 #define GROUP_SIZE 256
 #endif
@@ -16,7 +17,7 @@ layout(std430, binding = BIND_RAYSPACE_BINS) buffer bin_block { uint bins[]; };
 layout(std430, binding = BIND_RAYSPACE_ORDER) writeonly buffer order_block { uint order_written[]; };
 
 uniform vec3 lower_world, cells_per_metre;
-uniform uint bin_shift; // low bits that bins leave out: few rays have few bins
+uniform uint bin_shift; // low bits that bins ignore: few rays have few bins
 
 #ifdef SORT_SCAN
 
@@ -43,7 +44,7 @@ void main()
 
 #else
 
-// The lower bits of a value, four places free behind each.
+// Spreads the lower bits of a value, with four free places behind each.
 uint spread(uint value)
 {
     uint spread_ = 0u;
@@ -52,7 +53,7 @@ uint spread(uint value)
     return spread_;
 }
 
-// The highest bits are of the origin alone, then come in turn bits of v, u, z, y, x.
+// Bin of a ray. The highest bits are the origin's alone, then bits of v, u, z, y, x take turns.
 uint bin_of(live_ray r)
 {
     uvec3 p = uvec3(clamp((r.origin - lower_world) * cells_per_metre, 0.0, float((1u << RAYSPACE_POSITION_BITS) - 1u)));
@@ -69,7 +70,7 @@ void main()
     uint ray = item_index();
     if (ray >= ray_count)
         return;
-    // Those behind the wave's end, whose number only the device knows, are dead and stay at the end.
+    // Rays behind the wave's end, which only the device knows, are dead and stay at the end.
     uint bin = (RAYSPACE_BINS >> bin_shift) - 1u;
     if (ray < ray_end) {
         live_ray r = live_ray_at(ray);

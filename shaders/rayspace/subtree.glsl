@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A ray alone in a part of an instance's tree: an element, and what is below it in the depth-first order of the tree,
-// followed by links. No bundle is narrower than a ray: a pass for each level would gain nothing, and would not know
-// which hits are near.
+// Traversal of a part of an instance's tree by a single ray: an element, and the elements below it in the tree's
+// depth-first order, by links. No bundle is narrower than a ray: a pass for each level would gain nothing, and would not
+// know which hits are near.
 //
 // Defines: RAYSPACE_PACKED boxes are on a grid, else in floats.
 #include "common/candidate.glsl"
@@ -12,13 +12,13 @@
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer tree_elements;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer tree_transforms;
 
-// The planes of a box at p are hit at p scale - offset.
+// Part of a tree. Planes of boxes at p are hit at p scale - offset.
 struct subtree {
-    uint first_element;                 // of the tree
-    uint first_texel, first_primitive;  // of the instance's primitives: in the order of the tree; in the scene
-    uint element, end;                  // the next one, and behind the last one
+    uint first_element;                 // first element of the tree
+    uint first_texel, first_primitive;  // first primitive of the instance: in the order of the tree; in the scene
+    uint element, end;                  // next element, and the end
     vec3 scale, near_offset, far_offset;
-    bvec3 negative; // the ray's direction
+    bvec3 negative; // signs of the ray's direction
 };
 
 uvec4 fetch_element(subtree part)
@@ -39,8 +39,8 @@ subtree subtree_of(uint instance_index, uint element, object_ray o)
     grid_lower = uintBitsToFloat(texelFetch(tree_transforms, texel + 3).xyz);
     cells_per_unit = uintBitsToFloat(texelFetch(tree_transforms, texel + 4).xyz);
 #endif
-    // A component of zero would give infinity times zero. The replacement moves the ray sideways by 1e-12 of its length,
-    // far below the slack.
+    // A zero component would give infinity times zero. Its replacement moves the ray sideways by 1e-12 of its length, far
+    // below the slack.
     vec3 d = o.direction * cells_per_unit;
     float smallest = 1e-12 * max_component(abs(d));
     vec3 origin = (o.origin - grid_lower) * cells_per_unit;
@@ -59,8 +59,7 @@ subtree subtree_of(uint instance_index, uint element, object_ray o)
     return part;
 }
 
-// A step of the traversal: goes on to the next element. Returns the link of this one if it is a leaf that the ray may
-// hit, else 0.
+// Tests an element, and advances to the next one. Returns its link if it is a leaf that the ray may hit, else 0.
 uint test_element(inout subtree part, float t_min, float t_max)
 {
     uvec4 texel = fetch_element(part);

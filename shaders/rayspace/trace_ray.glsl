@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A ray of a wave as the tests of primitives take it.
+// Converts a ray of a wave for tests of primitives.
 //
 // Defines: HAS_MOTION.
 #include "common/candidate.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the descent has found for a ray, after discs were tested.
+// Returns the answer that the descent has found for a ray, after its discs are tested.
 #include "common/candidate.glsl"
 #include "rayspace/answer.glsl"
 #include "rayspace/rank.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Elements of the trees over the scene (tree/layout.h), bounded in world space. They are in one order.
+// Elements of the trees over the scene (tree/layout.h), with bounds in world space. There is one order of elements.
 //
 // Defines: RAYSPACE_PACKED boxes are on a grid, else in floats.
 #include "rayspace/meet.glsl"
@@ -11,16 +11,16 @@ layout(binding = UNIT_TRACER_1) uniform usamplerBuffer tree_transforms;
 
 uniform uint top_count; // elements of the top tree
 #ifdef RAYSPACE_PACKED
-uniform vec3 top_grid_lower, top_cell; // of a cell: its size
+uniform vec3 top_grid_lower, top_cell; // lower corner and size of a cell of the top tree's grid
 #endif
 
-// The tree that a pair is in: where it lies, and how its boxes come to world space.
+// Tree of a pair: its place, and the transform of its boxes to world space.
 struct tree_place {
     uint first, count;
     vec3 grid_lower, cell;
     vec4 world_from_object[3];
     bool is_top;
-    uint motion, pose_count; // as the instance has them
+    uint motion, pose_count; // those of the instance
 };
 
 struct tree_element {
@@ -66,7 +66,7 @@ tree_element element_at(tree_place tree, uint element)
     uvec4 texel = texelFetch(tree_elements, int(tree.first + element));
     vec3 lower = tree.grid_lower + vec3(ivec3(texel.xyz & 0xffffu)) * tree.cell;
     vec3 upper = tree.grid_lower + vec3(ivec3(texel.xyz >> 16)) * tree.cell;
-    // The rounding of the above; that of the cells is in them.
+    // Rounding of the arithmetic above; the boxes include that of the cells.
     vec3 slack = 4.768e-7 * (abs(tree.grid_lower) + max(abs(lower), abs(upper)));
     return tree_element(texel.w, lower - slack, upper + slack);
 #else
@@ -76,7 +76,7 @@ tree_element element_at(tree_place tree, uint element)
 #endif
 }
 
-// A box of an object's space in the world's, rounded outward.
+// Box of an object-space box in world space, rounded outward.
 void box_in_world(vec4 rows[3], vec3 centre, vec3 half_size, inout vec3 lower, inout vec3 upper)
 {
     for (int row = 0; row < 3; row++) {
@@ -94,7 +94,7 @@ bounds bounds_of_box(vec3 lower, vec3 upper)
     return bounds(lower + half_size, length(half_size) * 1.000004, lower, upper);
 }
 
-// Wherever the element is while the shutter is open.
+// Bounds of the element over the whole time that the shutter is open.
 bounds bounds_of(tree_place tree, tree_element e)
 {
     if (tree.is_top)
@@ -125,7 +125,7 @@ bool is_instance(uint link)
     return link >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_INSTANCE;
 }
 
-// Of the root of an instance's tree; false: the tree is empty.
+// Root link of an instance's tree. False: the tree is empty.
 bool root_link_of(uint instance_index, out uint link)
 {
     uvec4 place = texelFetch(tree_transforms, int(instance_index) * BVH_TRANSFORM_TEXELS + 5);

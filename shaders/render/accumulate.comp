@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Adds a slice to the picture, unless it must be done again: the samples of each pixel in their order.
-// Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more (server/render/picture_noise.h).
+// Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more samples (server/render/picture_noise.h).
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -9,12 +9,12 @@
 layout(local_size_x = 64) in;
 
 uniform uint slot_count;
-uniform uint first_slot; // of the slice, in its band
+uniform uint first_slot; // first slot of the slice, in its band
 uniform uint sample_shift;
-uniform uint first_sum; // of the slice's samples
+uniform uint first_sum; // first sum of the slice's samples
 
 #ifdef HAS_TILE_SAMPLES
-uniform uint first_picture_slot; // of the slice, in the picture
+uniform uint first_picture_slot; // first slot of the slice, in the picture
 layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 #endif
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Ambient occlusion rays of each hit.
+// Makes the ambient occlusion rays of each hit.
 //
 //   radiance none, only the pixel's coverage
-//   shadow rays as many as the frame says for a sample, in batches
+//   shadow rays the frame's number per sample, in batches
 //   child       straight on (alpha blending)
 //
 // The rays of all samples of a pixel, and all rays of a sample, are points of one sequence: they are stratified
@@ -14,7 +14,7 @@
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
-uniform uint first_ray, batch_rays; // of shadow_rays_a_hit
+uniform uint first_ray, batch_rays; // this batch, of shadow_rays_a_hit
 uniform float reach, falloff;       // metres; see common/occlusion.glsl
 
 uint ask_for_openness(uint j, path p, surface s, float weight, float distance_)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// First of three passes that give children their places (then compact_scan.comp and compact_move.comp): counts the
-// children and shadow rays of each block of COMPACT_BLOCK hits, in a sorted wave those of each octant. One invocation
-// per block: no shared memory, which is slow on software GL.
+// First of three passes that give children their places (compact_scan.comp and compact_move.comp follow): counts the
+// children and shadow rays of each block of COMPACT_BLOCK hits, in a sorted wave those of each octant. One invocation per
+// block: no shared memory, which is slow on software GL.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -18,7 +18,7 @@ void main()
     if (first >= wave.hits.count)
         return;
     uint end = min(first + COMPACT_BLOCK, wave.hits.count);
-    uvec2 sum = uvec2(0u), octants = uvec2(0u); // of these a byte each
+    uvec2 sum = uvec2(0u), octants = uvec2(0u); // counts per octant, a byte each
     if (wave.sorted == 0u) {
         for (uint k = first; k < end; k++)
             sum += uvec2(child_counts[k] & CHILDREN_MASK, child_counts[k] >> SHADOW_RAYS_SHIFT);

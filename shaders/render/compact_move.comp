@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Third: the children go to their places as rays and paths of the next wave, in the order of their parents, in a sorted
-// wave within each octant. The host has reserved the space.
+// Third pass: moves the children to their places as rays and paths of the next wave, in the order of their parents, in a
+// sorted wave within each octant. The host has reserved the space.
 // Defines: HAS_TIMES something moves: rays have a time.
 
 #include "shared/path.h"
@@ -24,7 +24,7 @@ layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float tim
 void main()
 {
     uint j = item_index();
-    // None where the wave does not fit: then its places are not there.
+    // No children move where the wave does not fit, as their places do not exist.
     if (j >= wave.hits.count || wave.rays.count == 0u)
         return;
     uint own = child_counts[j], count = own & CHILDREN_MASK;

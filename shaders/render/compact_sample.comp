@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Whether the children of a wave are to be sorted by the signs of their directions: neighbours then traverse a structure
-// in one order, and more of it together. Their origins stay about as near to each other, as a sorted wave keeps the
-// order of the pixels within an octant. A sample of the wave decides: blocks of neighbours, one an invocation. What is
-// coherent as it is, such as what a mirror reflects, would be torn apart.
-// Only where a hit has one child: the paths of a sample stay side by side.
+// Decides whether the children of a wave are sorted by the signs of their directions: neighbours then traverse a
+// structure in the same order, and more of it together. Their origins stay about as near to each other, as a sorted wave
+// keeps the order of the pixels within an octant. A sample of the wave decides: blocks of neighbours, one per invocation.
+// A wave that is coherent already, such as the reflection in a mirror, would be torn apart. Runs only where a hit has one
+// child: the paths of a sample stay side by side.
 
 #include "render/wave_counts.glsl"
 
-// Of that many blocks, COMPACT_BLOCK each, the octants are counted; smaller waves are not worth it.
+// Number of blocks, of COMPACT_BLOCK each, whose octants are counted; smaller waves are not worth it.
 const uint BLOCKS = 64u;
-// Octants of a block that are too many. Measured on software GL at 146K triangles, without the sorting: bounces, with
-// 4.5 octants a block, take 1.07 (bvh; its traversal alone 1.16), 1.08 (ldc) and 1.05 (abuffer) of the time of sorted
-// ones, and 64 cells of their origins within an octant would gain 0.02 more; mirror reflections, with 2.1, take 1.06
-// (bvh) and 1.00 (ldc).
+// Maximum number of octants in a block that stays unsorted. Measured on software GL at 146K triangles, without the
+// sorting: bounces, with 4.5 octants a block, take 1.07 (bvh; its traversal alone 1.16), 1.08 (ldc) and 1.05 (abuffer) of
+// the time of sorted ones, and 64 cells of their origins within an octant would gain 0.02 more; mirror reflections, with
+// 2.1, take 1.06 (bvh) and 1.00 (ldc).
 const float OCTANTS_MAX = 2.5;
 
 layout(local_size_x = BLOCKS) in;

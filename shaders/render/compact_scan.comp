@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Second: each block's count becomes the place of its first item. One group scans them all, each invocation a run of
-// blocks. The sums are the wave's new counts.
+// Second pass: each block's count becomes the place of its first item. A single group scans all blocks, each invocation a
+// run of them. The sums are the wave's new counts.
 // Defines:
-//   HITS  the blocks are of rays, of which the hits are counted; else of hits, whose children are the next wave
+//   HITS  blocks are of rays, whose hits are counted; otherwise of hits, whose children are the next wave
 
 #include "render/wave_counts.glsl"
 
 layout(local_size_x = COMPACT_SCAN_SIZE) in;
 
 #ifndef HITS
-uniform uint capacity;    // rays that the buffers hold
-uniform uint last_queued; // 1: no wave is queued behind this one
+uniform uint capacity;    // rays that fit the buffers
+uniform uint last_queued; // 1: no wave is queued after this one
 #endif
 
 layout(std430, binding = BIND_BLOCK_OFFSETS) buffer offset_block { uvec2 block_offsets[]; };
@@ -43,7 +43,7 @@ void take(uvec2 total)
 
 #endif
 
-// The sum of what the invocations before this one have, and of what all have.
+// Sum over the invocations before this one, and over all.
 void add_up(uint self, uvec2 own, out uvec2 before, out uvec2 total)
 {
     sums[self] = own;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What the passes of the denoiser share: server/render/denoise/README.md says what they do.
+// Data that the passes of the denoiser share; server/render/denoise/README.md describes the passes.
 //
-// A strip of the picture lies row by row. Of each pixel it has what its samples saw, the guide, and two estimates of the
-// light that falls there: the means of two halves of its samples, moved so that their mean is that of all samples and half
+// A strip of the picture lies row by row. Each pixel has the mean guide of its samples, and two estimates of the light
+// that falls there: the means of two halves of its samples, moved so that their mean is that of all samples and half
 // their difference has the noise of that mean.
 
 #include "shared/denoise.h"
@@ -10,19 +10,19 @@
 #include "common/colour.glsl"
 #include "common/dispatch.glsl"
 
-uniform uint first_row, item_count; // of the strip, of this dispatch
+uniform uint first_row, item_count; // first row of the strip; items of this dispatch
 uniform uint strip_row, strip_rows; // the strip's first row in the picture, and its number of rows
 
 struct halves {
     vec3 a, b;
-    float deviation; // of each, by luminance
+    float deviation; // deviation of each half, by luminance
 };
 
 struct guide {
-    vec3 normal;    // the mean of the samples' unit normals: shorter where they see several surfaces
-    float share;    // that mirrors and glass have in what is seen
+    vec3 normal;    // mean of the samples' unit normals: shorter where they see several surfaces
+    float share;    // share of mirrors and glass in what is seen
     float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth; 0: nothing
-    float tone;     // root of the albedo's luminance, up to 1
+    float tone;     // square root of the albedo's luminance, up to 1
 };
 
 const float HALF_FLOAT_MAX = 6e4;
@@ -42,8 +42,8 @@ halves halves_of_words(uvec4 words)
                   uintBitsToFloat(words.w));
 }
 
-// Until the deviation is known: the luminance of the mean, and the noise of the first half by how its own halves differ (0: not
-// known).
+// Words of a pixel before the deviation is known: the luminance of the mean, and the noise of the first half by the
+// difference of its own halves (0: unknown).
 uvec4 words_of_taken(vec3 a, vec3 b, float half_noise)
 {
     uvec4 words = words_of_halves(halves(a, b, 0.0));
@@ -80,7 +80,7 @@ guide guide_of_words(uvec2 words)
     return guide(parts.xyz, parts.w, uintBitsToFloat(words.y & ~0xffu), float(words.y & 0xffu) / 255.0);
 }
 
-// Of a pixel, as a share of its depth.
+// Words of a pixel's motion, as a share of its depth.
 uvec2 words_of_motion(vec3 motion)
 {
     bool known = max_component(abs(motion)) < HALF_FLOAT_MAX;
@@ -88,7 +88,7 @@ uvec2 words_of_motion(vec3 motion)
     return uvec2(packHalf2x16(motion.xy), packHalf2x16(vec2(motion.z, known ? 0.0 : 1.0)));
 }
 
-// False: it is not known.
+// Motion of a pixel. False: unknown.
 bool motion_of_words(uvec2 words, out vec3 motion)
 {
     vec2 last = unpackHalf2x16(words.y);
@@ -96,7 +96,7 @@ bool motion_of_words(uvec2 words, out vec3 motion)
     return last.y == 0.0;
 }
 
-// The pixel of this invocation in the strip; false: it has none.
+// Pixel of this invocation in the strip. False: it has none.
 bool pixel_of_item(out ivec2 pixel)
 {
     uint k = item_index(), row = quotient(k, frame.width);
@@ -109,7 +109,7 @@ int place_of(ivec2 pixel)
     return pixel.y * int(frame.width) + pixel.x;
 }
 
-// The pixels of the strip that belong to the same view as this one: the first, and the one behind the last.
+// Bounds of the strip's pixels that belong to the same view as this one: the first, and the one behind the last.
 void bounds_of(ivec2 pixel, out ivec2 lower, out ivec2 upper)
 {
     ivec2 first = ivec2(view_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row)) *
@@ -130,14 +130,14 @@ float turn_of(guide own, guide other)
     return dot(apart, apart);
 }
 
-// Whether a neighbour is on a surface that light falls on alike.
+// Whether light falls alike on a neighbour's surface.
 bool is_alike(guide own, guide other)
 {
     return min(own.nearness, other.nearness) > 0.0 && turn_of(own, other) < 0.4;
 }
 
-// How far a neighbour is from the surface that the pixel sees, 0 and up; 1 is about the most that one surface has. The
-// slope is that of the nearness, a pixel, as a share of it.
+// Distance of a neighbour from the surface that the pixel sees, 0 and up; within one surface it is at most about 1.
+// `slope` is that of the nearness, per pixel, as a share of it.
 float off_surface(guide own, vec2 slope, guide other, vec2 offset)
 {
     float expected = own.nearness * (1.0 + dot(slope, offset));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Adds a slice to the sums that the denoiser has beside the picture, unless it must be done again: the light of the
-// samples of the first half, and what all of them saw. The picture does not have the slice yet.
+// samples of the first half, and the guides of all samples. The picture does not have the slice yet.
 // Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more (server/render/picture_noise.h).
-//          HAS_NOTED_MOTION notes say whether they are to count, and where things were.
+//          HAS_NOTED_MOTION notes say whether they count, and where surfaces were.
 
 #include "shared/denoise.h"
 #include "common/dispatch.glsl"
@@ -10,11 +10,11 @@
 #include "render/wave.glsl"
 
 uniform uint slot_count;
-uniform uint first_slot; // of the slice, in its band
+uniform uint first_slot; // first slot of the slice, in its band
 uniform uint sample_index, sample_shift;
 
 #ifdef HAS_TILE_SAMPLES
-uniform uint first_picture_slot; // of the slice, in the picture
+uniform uint first_picture_slot; // first slot of the slice, in the picture
 layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 #endif
 
@@ -51,7 +51,7 @@ void main()
         float counts = 1.0;
 #ifdef HAS_NOTED_MOTION
         vec4 moved = notes[first + 2u];
-        counts = moved.w > 0.0 ? 1.0 : DENOISE_WHISPER; // if it is all that there is
+        counts = moved.w > 0.0 ? 1.0 : DENOISE_WHISPER; // counts where it is the only one
         motion += vec4(moved.xyz, 1.0) * counts;
 #endif
         albedo += counts * notes[first];

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: MIT
-// How far each pixel goes on to the wider filter: as far as its mean square error is smallest, by Stein's unbiased estimate
-// of that around the pixel (Li et al. SURE-based Optimization for Adaptive Sampling and Reconstruction. 2012), in which half
-// the difference of the halves, filtered alike, stands for the noise.
+// Chooses how far each pixel moves towards the wider filter: to the minimum of its mean square error, by Stein's unbiased
+// estimate of that around the pixel (Li et al. SURE-based Optimization for Adaptive Sampling and Reconstruction. 2012),
+// where half the difference of the halves, filtered alike, represents the noise.
 //
 // With c the light, F its filtered light, y the picture's and t the true one, |(1 - s) c + s F - t|^2 is smallest at
 //
 //   s = (c - t)(c - F) / (c - F)^2,  where  E (c - t)(c - F) = E (c - y)(c - F) + E n (n_c - n_F)
 //
-// with n the noise of y and n_c, n_F what the filters leave of it. Without noise s is 0.
+// with n the noise of y and n_c, n_F its rest after the filters. Without noise s is 0.
 //
-// Both are means of few pixels, and where there is next to nothing to gain chance decides. So of the gain DENOISE_MARGIN
-// standard errors are left out, and where light moves by less than DENOISE_UNSEEN of itself, nothing is gained that shows.
+// Both are means of few pixels, and where the gain is tiny chance decides. So DENOISE_MARGIN standard errors are
+// subtracted from the gain, and a move by less than DENOISE_UNSEEN of the light counts as none, as it would not be
+// visible.
 
 #include "render/denoise.glsl"
 
-uniform int spacing; // of the pixels around
+uniform int spacing; // distance of the pixels around
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_WIDER) uniform usamplerBuffer wider;

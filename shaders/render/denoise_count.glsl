@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// How many samples the pixels of a band have.
+// Number of samples in the pixels of a band.
 // Defines: HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h).
-//          HAS_NOTED_MOTION some samples may not say what they saw.
+//          HAS_NOTED_MOTION some samples may have no guide.
 
 uniform uint sample_count;
 
 #ifdef HAS_TILE_SAMPLES
-uniform uint first_tile; // of the band
+uniform uint first_tile; // first tile of the band
 layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 #endif
 
@@ -24,7 +24,7 @@ float samples_of_slot(uint slot)
 layout(std430, binding = BIND_DENOISE_MOTION) readonly buffer motion_block { vec4 motions[]; };
 #endif
 
-// Those of them that say what they saw.
+// Number of samples that have a guide.
 float notes_of_slot(uint slot, float count)
 {
 #ifdef HAS_NOTED_MOTION

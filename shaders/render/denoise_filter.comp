@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// A level of an edge-avoiding a-trous wavelet (Dammertz et al. Edge-Avoiding A-Trous Wavelet Transform for fast Global
-// Illumination Filtering. HPG 2010), whose light differs by what variance lets expect (Schied et al. Spatiotemporal
-// Variance-Guided Filtering. HPG 2017, 4.4). Each half is weighed by the light of the other, so that no noise chooses
-// itself (Rousselle et al. Adaptive Rendering with Non-Local Means Filtering. 2012). And by albedo, though light is divided by
-// it: what surfaces scatter is one light, what they mirror another, and albedo says how much of each there is.
+// Filters a level of an edge-avoiding a-trous wavelet (Dammertz et al. Edge-Avoiding A-Trous Wavelet Transform for fast
+// Global Illumination Filtering. HPG 2010), whose weights compare differences of light with the variance (Schied et al.
+// Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.4). Each half is weighed by the light of the other, so that noise
+// does not select itself (Rousselle et al. Adaptive Rendering with Non-Local Means Filtering. 2012). Albedo weighs too,
+// though light is divided by it: scattered and mirrored light differ, and the albedo says how much of each there is.
 //
-// Also the parts of the risk of each pixel, see denoise_choose.comp. Where a surface turns within few pixels the light turns
-// with it, and it does so within pixels, where halves of the samples differ by detail: what the cosine lets expect is no noise.
+// Also computes the parts of each pixel's risk for denoise_choose.comp. Where a surface turns within few pixels, the
+// light turns with it, also within pixels, where halves of the samples differ by detail: the difference that the cosine
+// explains is no noise.
 
 #include "render/denoise.glsl"
 
@@ -19,7 +20,7 @@ layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 wider[]; };
 layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer risk_block { vec2 risks[]; };
 
-// The numerator and the denominator of a pixel's share, as shares of its light: of the light at this level, filtered, and
+// Numerator and denominator of a pixel's choice, as shares of its light: from the light at this level, filtered, and
 // before any level.
 vec2 risk_of(halves as_is, halves filtered, halves own)
 {
@@ -65,7 +66,7 @@ void main()
     }
     halves filtered = halves(sum_a / weights.x, sum_b / weights.y, sqrt(variance) / (0.5 * (weights.x + weights.y)));
     wider[place] = words_of_halves(filtered);
-    bool there = own.nearness > 0.0; // what is not stays as it is, and says nothing of its neighbours
+    bool there = own.nearness > 0.0; // an empty pixel stays as it is, and does not affect its neighbours
     float detail = DENOISE_TURNED_LIGHT * turns / weights.x;
     risks[place] = there ? risk_of(h, filtered, halves_of_words(texelFetch(first_light, place))) + vec2(0.0, detail) : vec2(0.0);
 }

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: MIT
-// From the strip to the sums of a band: the picture's, moved by as much as filtering has moved the light.
+// Writes the strip back to the sums of a band, moved by as much as filtering has moved the light.
 //
-// A pixel stays as bright as it is where a pixel beside it is as bright by both halves of its samples: a highlight. Any other is
-// brighter or darker than its neighbours only as far as each part of its samples says so. The rest is a speck, which is worth
-// next to nothing where it was found (DeCoro, Weyrich, Rusinkiewicz. Density-based Outlier Rejection in Monte Carlo Rendering.
-// 2010, by neighbours and parts in place of all samples), and goes to their mean.
+// A pixel stays as bright as it is where a pixel beside it is as bright by both halves of its samples: a highlight. Any
+// other pixel is brighter or darker than its neighbours only as far as each part of its samples agrees. The rest is a
+// speck, which is hardly ever right at its place (DeCoro, Weyrich, Rusinkiewicz. Density-based Outlier Rejection in Monte
+// Carlo Rendering. 2010, by neighbours and parts in place of all samples), and goes to their mean.
 //
-// Defines: HAS_REPROJECTED what pictures before have brought has moved it, too.
+// Defines: HAS_REPROJECTED earlier pictures have moved the light, too.
 
 #include "render/denoise.glsl"
 #include "render/denoise_count.glsl"
 #include "render/denoise_half.glsl"
 
-uniform uint band_row; // the first row of the band in the picture
+uniform uint band_row; // first row of the band in the picture
 uniform float strength;
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
 layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
 #ifdef HAS_REPROJECTED
-layout(binding = UNIT_DENOISE_WIDER) uniform usamplerBuffer kept; // denoise_reproject.comp
+layout(binding = UNIT_DENOISE_WIDER) uniform usamplerBuffer kept; // output of denoise_reproject.comp
 #endif
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { uvec4 first_half[]; };
@@ -28,8 +28,8 @@ layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer band_block { vec4 de
 
 struct surroundings {
     vec3 mean;
-    float least, most; // luminance; but for the outermost, as two specks may lie side by side
-    float shown;       // the most luminance that both halves of a pixel have
+    float least, most; // luminance without the outermost, as two specks may lie side by side
+    float shown;       // maximum luminance that both halves of a pixel have
 };
 
 surroundings surroundings_of(ivec2 pixel)
@@ -57,7 +57,7 @@ surroundings surroundings_of(ivec2 pixel)
     return around;
 }
 
-// The least and the most luminance that a part of the samples has: a half, or of many a quarter.
+// Minimum and maximum luminance over the parts of the samples: halves, or quarters if there are many.
 vec2 range_of_parts(vec3 mean, uint slot, float count)
 {
     float first_count = float(first_half_of(uint(count)));
@@ -67,8 +67,8 @@ vec2 range_of_parts(vec3 mean, uint slot, float count)
     return vec2(min_component(parts), max_component(parts));
 }
 
-// The light of a pixel without specks, which go to the mean around it. `filtered`: what the filter did not leave out. A part
-// that is half as far off as all are believes them, as parts differ by as much.
+// Light of a pixel without specks, which are replaced by the mean around it. `filtered`: the part that the filter has
+// passed. A pixel is believed if a part is half as far off as the whole, as parts differ by as much.
 vec3 without_specks(vec3 own, vec3 filtered, vec2 parts, surroundings around)
 {
     float own_luminance = luminance(own);
@@ -96,7 +96,7 @@ void main()
     uvec2 words = texelFetch(kept, place).xy;
     moved += vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x) - sum.rgb / (count * albedo);
 #else
-    if (count > 1.0) { // of one sample nothing is known
+    if (count > 1.0) { // a single sample proves nothing
         vec3 mean = sum.rgb / (count * albedo);
         moved = without_specks(mean + moved, filtered, range_of_parts(mean, slot, count), surroundings_of(pixel)) - mean;
     }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What is kept of the first half of a pixel's samples: the mean of the light, by their own albedo, so that what a texture has
-// in one half more than in the other is no noise.
+// First half of a pixel's samples: the mean of the light divided by their own albedo, so that a difference of texture
+// between the halves is no noise.
 //
-// Halves end where the number of samples is a power of two, as such runs are stratified (common/sequence.glsl). The mean of
-// all is often much nearer to the truth than halves are to each other, so it is asked how far half of a half is from that:
-// both together say how fast the error falls (denoise_settle.comp).
+// Halves end where the number of samples is a power of two, as such runs are stratified (common/sequence.glsl). The mean
+// of all samples is often much nearer to the truth than halves are to each other, so the difference of half of a half is
+// kept too: both together show how fast the error falls (denoise_settle.comp).
 
-// The number of samples in the first half, of so many: that power of two which is nearest to one half.
+// Number of samples in the first half: the power of two nearest to half of `count`.
 uint first_half_of(uint count)
 {
     uint doubled = 1u << findMSB(count);
@@ -18,7 +18,7 @@ vec3 divisor_of(vec3 albedo)
     return max(albedo, vec3(DENOISE_ALBEDO_MIN));
 }
 
-// rgb: the light, as floats. a: the difference to that of half of these samples, as colours with a common exponent.
+// rgb: the light, as floats. a: the difference from half of these samples, as colours with a common exponent.
 uvec4 words_of_half(vec3 light, vec3 difference)
 {
     float most = max(max(abs(difference.r), abs(difference.g)), abs(difference.b));

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// How much noise there is, in two ways: by the difference of the halves, and by how pixels differ from their neighbours.
-// The halves of stratified samples differ more than their mean is wrong (of two lights each half may have one), and edges
+// Estimates the noise in two ways: by the difference of the halves, and by how pixels differ from their neighbours. The
+// halves of stratified samples differ more than their mean is wrong (with two lights each half may have one), and edges
 // of shadows and textures seen in mirrors look like noise to a difference of neighbours. So both must find noise.
 //
-// Of neighbours the second smallest difference counts: beside an edge it is that of pixels on one side. Its mean square is
-// the noise's within a tenth where that is Gaussian. Also notes how the surface slopes.
+// The second smallest difference of neighbours counts: beside an edge it is that of pixels on one side. Its mean square
+// is that of the noise within a tenth where that is Gaussian. Also notes the slope of the surface.
 
 #include "render/denoise.glsl"
 
 uniform float white;     // 2^-exposure
-uniform uint one_sample; // there are no halves: the difference of neighbours stands for theirs
-uniform float doubt;     // so much of the noise of mirrors and glass is not believed
+uniform uint one_sample; // there are no halves: the difference of neighbours takes their place
+uniform float doubt;     // share of the noise of mirrors and glass that is not believed
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
@@ -25,8 +25,8 @@ vec3 capped(vec3 colour, float cap)
     return colour * min(1.0, cap / max(luminance(colour), 1e-30));
 }
 
-// What is brighter than so many times what lies two pixels away is a highlight, or a sample that happened upon a light:
-// spread over its neighbours it would be seen more. What is above stays where it is.
+// Maximum brightness of a pixel for the filter, from the pixels two away. A brighter one is a highlight, or a sample that
+// hit a light by chance: spread over its neighbours it would be more visible. The excess stays in its pixel.
 float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
 {
     float highest = DENOISE_CAP * white / max(square(own.tone), DENOISE_ALBEDO_MIN), sum = 0.0, count = 0.0;
@@ -63,7 +63,7 @@ void main()
     h.b = capped(h.b, cap);
     vec3 mean = mean_of(h), least = vec3(0.0), second = vec3(0.0);
     float least_size = 1e30, second_size = 1e30, count = 0.0;
-    vec4 rises = vec4(1e30); // of the nearness towards each neighbour
+    vec4 rises = vec4(1e30); // growth of the nearness towards each neighbour
     for (int i = 0; i < 4; i++) {
         ivec2 next = pixel + NEIGHBOURS[i];
         bool inside = within(next, lower, upper);
@@ -95,6 +95,6 @@ void main()
     slope = own.nearness > 0.0 ? clamp(slope / own.nearness, vec2(-1.0), vec2(1.0)) : vec2(0.0);
     slopes[place] = packHalf2x16(slope);
     noisy_light[place] = words_of_halves(h);
-    // Where nothing is nothing is known of noise.
+    // Pixels without a surface have no known noise.
     risks[place] = own.nearness > 0.0 ? vec2(square(luminance(noise)), square(luminance(apart))) : vec2(-1.0);
 }

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// What guides the denoiser, of the first surface that each ray of a slice met: its albedo, with what it shines itself, by
-// which light is divided so that textures are not blurred; its normal and depth. The albedo is the share of light from all
-// around that is sent to the eye, with what is mirrored: by its base colour alone, light that a dark colour mirrors would
-// get the complement of that colour.
+// Writes the guide of the denoiser from the first surface that each ray of a slice met: its albedo, including its own
+// emission, by which light is divided so that textures are not blurred; its normal and depth. The albedo is the share of
+// the light from all around that is sent to the eye, with reflections: by its base colour alone, light that a dark colour
+// mirrors would get the complement of that colour.
 //
-// Of smooth mirrors and glass that is what is seen in or behind them, where most is (FOLLOWS, over the rays of a bounce): the
-// albedo is the product, the normal that of what is seen, the depth that of the way, as production has them (Intel. Open
-// Image Denoise, documentation: following the path to the first surface that is not smooth). Samples that went another way
-// say next to nothing.
+// For smooth mirrors and glass the guide is that of the surface seen in or behind them, where most light comes from
+// (FOLLOWS, over the rays of a bounce): the albedo is the product, the normal that of the surface seen, the depth that of
+// the whole way, as in production (Intel. Open Image Denoise, documentation: following the path to the first surface that
+// is not smooth). Samples that went another way count hardly at all.
 //
 // Defines: those of common/material.glsl.
-//          HAS_NOTED_MOTION notes have a third texel. HAS_MOVED with it: some instances have moved since the picture before.
-//          FOLLOWS with it: of rays that surfaces have sent on.
+//          HAS_NOTED_MOTION notes have a third texel. HAS_MOVED with it: some instances have moved since the picture
+//          before.
+//          FOLLOWS with it: for rays that surfaces have sent on.
 
 #include "shared/denoise.h"
 #include "common/camera.glsl"
@@ -28,7 +29,7 @@ layout(binding = UNIT_DENOISE_MOVED) uniform samplerBuffer moved;
 #endif
 
 struct note {
-    vec4 albedo, normal, motion; // as in shared/denoise.h
+    vec4 albedo, normal, motion; // texels of shared/denoise.h
 };
 
 vec3 motion_of(hit h, vec3 place)
@@ -77,7 +78,7 @@ void write(uint sample_slot, note n)
 }
 
 #ifdef FOLLOWS
-// Of the pixel's middle, by how much the depth grows along it.
+// Growth of the depth along the ray of the pixel's middle.
 float depth_along(path p)
 {
     vec3 origin, direction;

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-// The light of the pixel's own samples, with that of the picture before where it shows the same place (Schied et al.
-// Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). Both take the place of the halves, as their noise is not the same.
+// Blends the light of the pixel's own samples with that of the previous picture where it shows the same place (Schied et
+// al. Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). Both take the place of the halves, as their noise is
+// independent.
 //
-// Places on instances that have moved since are looked for where these were.
+// Places on instances that have moved since are searched where these were.
 //
-// Defines: HAS_NOTED_MOTION of each pixel is known how it has moved.
+// Defines: HAS_NOTED_MOTION the motion of each pixel is known.
 //
-// Of each pixel is kept: rg; b and how many samples it is worth, as half floats; the guide.
+// The kept words of a pixel: rg; b and its worth in samples, as half floats; the guide.
 
 #include "render/denoise.glsl"
 
-uniform float samples;            // of each pixel
-uniform float samples_before_max; // that what was kept may be worth, beside each of them; 0: nothing was
-// The camera of the picture before: rows of world_from_view, and what shared/frame.h has of its extent.
+uniform float samples;            // samples per pixel
+uniform float samples_before_max; // maximum worth of the kept light for each of them; 0: none was kept
+// Camera of the previous picture: rows of world_from_view, and its extent as in shared/frame.h.
 uniform vec4 before_row_0;
 uniform vec4 before_row_1;
 uniform vec4 before_row_2;
@@ -29,7 +30,7 @@ layout(binding = UNIT_DENOISE_MOTION) uniform usamplerBuffer motions;
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 blended[]; };
 layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer kept_block { uvec4 kept[]; };
 
-// Of what lies at that distance along the view.
+// Place in view space at that distance along the view.
 vec3 view_place(vec2 place, vec2 extent, bool orthographic, float nearness)
 {
     float depth = orthographic ? nearness : 1.0 / nearness;
@@ -41,7 +42,7 @@ vec3 world_from_before(vec3 p)
     return vec3(dot(before_row_0, vec4(p, 1.0)), dot(before_row_1, vec4(p, 1.0)), dot(before_row_2, vec4(p, 1.0)));
 }
 
-// rgb: the light kept of that place, w: how many samples it is worth.
+// rgb: the light kept for that place, w: its worth in samples.
 vec4 light_before(vec3 place_world, guide own, float depth)
 {
     bool orthographic = before_extent.w != 0.0;
@@ -73,8 +74,8 @@ vec4 light_before(vec3 place_world, guide own, float depth)
     return weights > 0.01 ? sum / weights : vec4(0.0);
 }
 
-// As far from the mean of the pixels around as their deviation allows (Salvi. An Excursion in Temporal Supersampling.
-// GDC 2016).
+// Clamps a colour to the mean of the pixels around, within their deviation (Salvi. An Excursion in Temporal
+// Supersampling. GDC 2016).
 vec3 clipped(vec3 colour, ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
 {
     vec3 sum = vec3(0.0), squares = vec3(0.0);

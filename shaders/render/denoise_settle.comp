@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Brings the difference of the halves down to the noise that neighbours show, and notes how large it is around a pixel, on
-// whatever surface: how noisy light is differs little from one to the next, and more witnesses say more.
+// Lowers the difference of the halves to the noise that neighbours show, and writes its size around a pixel, over all
+// surfaces: noise differs little from one to the next, and more pixels make a better estimate.
 //
-// And to what halves of the halves let expect: where the square of the error of n samples is n^-p, the mean square of half the
-// difference is D(n) = E(n) (2^p - 1), and D(n / 2) is 2^p D(n). So E(n) = D(n) / (2^p - 1); without stratification D(n).
+// The difference is also limited by the halves of the halves: where the square of the error of n samples is n^-p, the
+// mean square of half the difference is D(n) = E(n) (2^p - 1), and D(n / 2) is 2^p D(n). So E(n) = D(n) / (2^p - 1);
+// without stratification D(n).
 //
-// Of each pixel both are squares of one number, and where light has detail few pixels have most of either sum: as often as
-// not these happen to differ little in D(n / 2), and the noise would be believed. So pixels count by the root of what they
-// have, and 2^p is that of the part m of D(n): of Gaussian noise m is 1 / (1 + 2^(3/4 p)), within 2 % for p up to 3.
+// Both are squares of a single number in each pixel, and where light has detail few pixels make up most of either sum:
+// often these happen to differ little in D(n / 2), and the noise would be believed. So pixels count by the square root,
+// and 2^p follows from the part m of D(n): for Gaussian noise m is 1 / (1 + 2^(3/4 p)), within 2 % for p up to 3.
 
 #include "render/denoise.glsl"
 
-uniform float believed; // of the noise that halves show; above 1: the error may fall as much faster
+uniform float believed; // share of the halves' noise that is believed; above 1: the error may fall that much faster
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_RISK) uniform samplerBuffer risks;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// From the sums of a band to the strip: the light that falls at each pixel, as two halves, and the guide.
+// Reads the sums of a band into the strip: the light that falls at each pixel, as two halves, and the guide.
 
 #include "render/denoise.glsl"
 #include "render/denoise_count.glsl"
 #include "render/denoise_half.glsl"
 
-uniform uint band_row; // the first row of the band in the picture
+uniform uint band_row; // first row of the band in the picture
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { uvec4 first_half[]; };
@@ -30,7 +30,8 @@ void main()
     if (second_count > 0.0)
         noise = (light_of_half(first_half[slot]) - mean) * sqrt(first_count / second_count);
     float depth = normal.w;
-    bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
+    // fully covered: otherwise the background would be spread over the edge, too
+    bool there = depth > 0.0 && albedo.a <= 1.0;
     guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a + (count - noted) / count, 1.0), 0.0,
                     sqrt(luminance(albedo.rgb)));
     if (there)

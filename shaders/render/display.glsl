@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// The mean of a pixel's samples, and its display value.
+// Mean of a pixel's samples, and its display value.
 // Defines:
 //   HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h)
 //   PAIRS            sums are an identifier and a share, twice (shared/layers.h)
 //   PLAIN            sums are four numbers of the first sample, shown as they are
-//   DISPLAY_VALUES   what is summed is display values of no curve
-//   TONE_MAP         the curve, a number of common/tonemap.glsl; else there is none
+//   DISPLAY_VALUES   sums are display values without a curve
+//   TONE_MAP         the curve, a number of common/tonemap.glsl; otherwise there is none
 #include "shared/path.h"
 #include "common/slots.glsl"
 #include "common/tonemap.glsl"
 
 uniform float scale;          // exposure / samples
 uniform float coverage_scale; // 1 / samples
-uniform vec4 background;      // what lies behind the surfaces: linear; a: 1: a colour, 0: nothing
+uniform vec4 background;      // background behind the surfaces: linear; a: 1: a colour, 0: nothing
 
 #ifndef TONE_MAP
 #define TONE_MAP TONE_MAP_NONE
@@ -24,19 +24,19 @@ const bool display_values = false;
 #endif
 #ifdef HAS_TILE_SAMPLES
 layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
-uniform uint first_tile; // of the band
-uniform float exposure;  // scale is that times coverage_scale
+uniform uint first_tile; // first tile of the band
+uniform float exposure;  // scale is this times coverage_scale
 #endif
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 
-// `pixel` is one of the band.
+// Sum of a pixel of the band.
 vec4 sum_of_pixel(uvec2 pixel)
 {
     return accumulation[slot_of_pixel(pixel)];
 }
 
-// Of one of the band. Premultiplied by alpha.
+// Mean of a pixel of the band, premultiplied by alpha.
 vec4 mean_of_sum(vec4 sum, uvec2 pixel)
 {
     vec2 by = vec2(scale, coverage_scale);
@@ -59,7 +59,7 @@ vec3 straight_of(vec4 colour)
     return colour.a > 0.0 ? colour.rgb / colour.a : colour.rgb;
 }
 
-// Before the background, linear. Premultiplied by alpha.
+// Colour over the background, linear and premultiplied by alpha.
 vec4 over_background(vec4 colour)
 {
     if (display_values)
@@ -67,7 +67,7 @@ vec4 over_background(vec4 colour)
     return colour + background * (1.0 - colour.a);
 }
 
-// Straight, tone-mapped and sRGB.
+// Display value: straight alpha, tone-mapped and sRGB.
 vec4 display_of_sum(vec4 colour)
 {
     vec3 straight = straight_of(colour), behind = background.rgb;

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: MIT
-// The radiance of each hit of a wave towards the eye, and its rays: Cook, Porter, Carpenter. Distributed Ray Tracing.
-// 1984. Of each kind of ray that a hit could emit one is chosen, weighted by the inverse of its probability, so the
-// mean of the samples is right however few rays each has.
+// Computes the radiance of each hit of a wave towards the eye, and its rays: Cook, Porter, Carpenter. Distributed Ray
+// Tracing. 1984. For each kind of ray, one of those that a hit could emit is chosen, weighted by the inverse of its
+// probability, so the mean of the samples is correct however few rays each has.
 //
 //   radiance    emission, and a constant ambient term as in whitted.comp
 //   shadow ray  one, to one point of one light or emissive triangle, or to the environment
-//   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
-//               rough surface sends it, or several in turn
+//   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction of a facet of the rough
+//               surface, or of several in turn
 //
 // Lights with an extent are found by shadow rays alone, at a point that is chosen on the light or by a facet that mirrors
-// it. Rays are chosen, and end by chance, by what they may bring of an image about the scene, as it may be far brighter
-// than white.
+// it. The choice of rays, and their random end, takes account of an environment image, which may be far brighter than
+// white.
 //
-// Emissive triangles are asked for the light that is scattered: no child brings that. What a rough surface mirrors of
-// them, and of the bright parts of an image about the scene, shadow rays and children both find (common/two_ways.glsl).
-// Children see them through glass as it bends light, and through blended surfaces; so translucent surfaces stop the
-// shadow rays for mirrors, and what is met behind one counts fully. The last hits of a path, which have no child, mirror
-// neither. Of other environments, children alone find what is mirrored.
+// Shadow rays sample emissive triangles for scattered light: no child finds that. Their reflection in a rough surface,
+// and that of bright parts of an environment image, is found by both shadow rays and children (common/two_ways.glsl).
+// Children see them refracted through glass, and through blended surfaces; so translucent surfaces stop the shadow rays
+// for mirrors, and light met behind one counts fully. The last hits of a path, which have no child, mirror neither.
+// Reflections of other environments are found by children alone.
 //
 // Defines: those of common/material.glsl, common/light.glsl, common/environment_choice.glsl, common/two_ways.glsl and
-// render/shade.glsl. With HAS_ENVIRONMENT_TABLE shadow rays ask for the environment.
+// render/shade.glsl. With HAS_ENVIRONMENT_TABLE shadow rays sample the environment.
 
 #include "common/environment_choice.glsl"
 #include "common/light_choice.glsl"
@@ -30,14 +30,14 @@
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
-// A child with a lower weight than this is traced with the probability weight / this, and then has this weight.
+// Weight below which a child is traced with the probability weight / this, and then has this weight.
 const float ROULETTE = 1.0 / 4.0;
 
 #if defined(HAS_EMITTERS) || defined(HAS_ENVIRONMENT_TABLE)
 #define TWO_WAYS
 #endif
 
-// The steradians over which the environment's light is spread: the square of its sum by the sum of its squares.
+// Solid angle over which the environment's light is spread: the square of its sum divided by the sum of its squares.
 uniform float environment_extent;
 
 struct eye_hit {
@@ -47,27 +47,27 @@ struct eye_hit {
     surface s;
     split parts;
     float NoV, distance_;
-    vec3 origin; // of shadow rays
-    // As lights see it, see path_roughness().
+    vec3 origin; // origin of shadow rays
+    // The surface for lights, see path_roughness().
     surface blurred;
     split blurred_parts;
 };
 
-// What a shadow ray asks for.
+// Light that a shadow ray samples.
 struct shadow_choice {
-    float environment; // the chance of that; of the rest:
-    float lights;      // of a light, else an emitter; of those:
-    float mirrored;    // of what is mirrored of it, not scattered
+    float environment; // probability of the environment; otherwise:
+    float lights;      // probability of a light, not an emitter; in these:
+    float mirrored;    // probability of its reflection, not its scattered light
     uint light_number;
-    float light_chance; // of that one of the lights
-    vec2 u;             // x: the choice, then both: the place
-    uint ray_normal;    // with which emitters are chosen: packed
-    float by_facets;    // of a light with an extent: of looking for it where facets mirror
+    float light_chance; // probability of this light among the lights
+    vec2 u;             // x: for the choice, then both: for the place
+    uint ray_normal;    // normal by which emitters are chosen: packed
+    float by_facets;    // light with an extent: probability of sampling it by facets that mirror it
 };
 
-// The roughness of the mirrors and windows that a path has met: they blur what it sees. A light's highlight on a smooth
-// surface, which is as bright as it is narrow, is widened to it, by less with every sample; else one ray in thousands
-// would hit it, as a firefly.
+// Roughness of the mirrors and windows along a path: they blur what it sees. A light's highlight on a smooth surface,
+// which is as bright as it is narrow, is widened to it, less with every sample; otherwise one ray in thousands would hit
+// it, as a firefly.
 float path_roughness(path p)
 {
     return float(p.flags >> PATH_ROUGHNESS_SHIFT) / 65535.0;
@@ -78,13 +78,13 @@ float emitter_chance(shadow_choice c)
     return (1.0 - c.environment) * (1.0 - c.lights);
 }
 
-// The chance that a ray of that weight is traced.
+// Probability that a ray of that weight is traced.
 float survival_of(vec3 carried, vec3 direction)
 {
     return max_component(carried) * brightness_beyond(direction) / ROULETTE;
 }
 
-// lobe_mirrored(), with the density of the rays that are traced.
+// Value of lobe_mirrored(), with the density of the rays that are traced.
 vec3 mirrored_light(eye_hit e, vec3 light, out float found)
 {
     vec3 sent = lobe_mirrored(e.s, e.parts, e.NoV, e.view, light, found);
@@ -97,14 +97,14 @@ void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
     path p = e.p;
     vec3 carried = e.weight * chosen.weight;
     float survival = survival_of(carried, chosen.direction);
-    if (!(choice < survival)) // also if it is NaN
+    if (!(choice < survival)) // true for NaN too
         return;
     uint roughness = uint(max(path_roughness(p), chosen.roughness) * 65535.0 + 0.5);
     p.flags = path_sent_on(p.flags, chosen.roughness);
     p.flags = p.flags & (1u << PATH_ROUGHNESS_SHIFT) - 1u | roughness << PATH_ROUGHNESS_SHIFT;
 #ifdef TWO_WAYS
     float found = 0.0;
-    if (chosen.back && chosen.solid_angle > 0.0) // no shadow ray asks for what is smooth
+    if (chosen.back && chosen.solid_angle > 0.0) // no shadow ray samples smooth mirrors
         mirrored_light(e, chosen.direction, found);
 #endif
 #ifdef HAS_EMITTERS
@@ -122,8 +122,8 @@ void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
 }
 
 #ifdef HAS_AREA_LIGHTS
-// The chance of looking for the chosen light in the directions that facets mirror, not at a point of it: by the share of
-// its highlight, and by how much wider the light is than these.
+// Probability of sampling the chosen light by directions that facets mirror, not by a point on it: by the share of its
+// highlight, and by how much wider the light is than these directions.
 float by_facets_chance(shadow_choice c, light_receiver r)
 {
     const float CHANCE_MAX = 0.8;
@@ -167,7 +167,7 @@ shadow_choice choose_shadow_ray(eye_hit e, vec2 u)
     all_ += estimate * both;
 #endif
 #ifdef HAS_ENVIRONMENT_TABLE
-    // A lobe that is narrow beside the environment's bright parts finds these well enough alone.
+    // A lobe that is narrow beside the environment's bright parts samples these well enough alone.
     float angle = rough_solid_angle(e.s, e.s.geometric), own = mirrored * max_component(frame.irradiance[0].rgb);
     c.environment = own > 0.0 ? angle / (angle + environment_extent) * own / (own + all_) : 0.0;
 #endif
@@ -193,7 +193,7 @@ bool ask_for_emitter(eye_hit e, shadow_choice c)
     vec3 sent = vec3(0.0);
     if (mirrored)
         sent = mirrored_light(e, sampled.direction, found);
-    else if (side * NoL > 0.0) // the chance is of that side
+    else if (side * NoL > 0.0) // the probability is for that side
         sent = brdf_scattered(e.s, e.parts, e.view, e.NoV, sampled.direction) * abs(NoL);
 #ifdef LIGHT_LAYERS
     ray_part = part_asked(e.p, vec3(mirrored ? 1.0 : 0.0), group_of_instance(sampled.instance));
@@ -224,8 +224,8 @@ bool ask_for_environment(eye_hit e, shadow_choice c)
 #endif
 
 #ifdef HAS_AREA_LIGHTS
-// A point of the light, or the one that a facet mirrors: one sample of both techniques, with the balance heuristic (Veach,
-// Guibas 1995, section 5.2). A point alone would be in a narrow highlight once in many samples.
+// Samples a point of the light, or the one that a facet mirrors: one sample of both techniques, with the balance
+// heuristic (Veach, Guibas 1995, section 5.2). A point alone would lie in a narrow highlight once in many samples.
 light_sample light_of_two_ways(eye_hit e, shadow_choice c, inout vec3 origin)
 {
     if (c.by_facets <= 0.0)
@@ -315,7 +315,7 @@ void main()
     e.s.emission *= emitter_share_met(e.p.light_number >> PATH_LIGHT_BITS, e.p.light_number & PATH_LIGHT_MASK, h, r, e.p.time,
                                       e.s.emission);
 #endif
-    // Where nothing else is said below, children count in full.
+    // Children count in full by default.
     e.p.light_number = 0u;
     e.p.environment_share = 1.0;
     if (straight) {

@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: MIT
-// Bounds what light costs most noise, that which one path in thousands finds: `clamp` of the protocol's render.
+// Limits light that one path in thousands finds, which causes most noise: `clamp` of the protocol's render.
 //
-//   limited                what a path brings over a rough surface and at least one more is scaled down to a limit. Whole
-//                          stays light that one rough surface alone scatters to the eye, or to smooth mirrors and windows
-//                          before it
-//   regularised_roughness  behind a rough surface no sharper one is seen: Kaplanyan, Dachsbacher. Path Space Regularization
+//   limited                light over a rough surface and at least one more is scaled down to a limit. Light that a
+//                          single rough surface scatters to the eye, or to smooth mirrors and windows before it, stays
+//                          whole
+//   regularised_roughness  surfaces behind a rough one are no sharper: Kaplanyan, Dachsbacher. Path Space Regularization
 //                          for Holistic and Robust Light Transport. 2013. Angles shrink as the sixth root of the number
 //                          of samples, so that noise and bias both vanish
 
 #include "shared/path.h"
 #include "common/math.glsl"
 
-uniform float radiance_limit; // 0: there is none, and nothing is regularised
+uniform float radiance_limit; // 0: no limit, and nothing is regularised
 
-// The flags of a path that a surface of that roughness sends on.
+// Flags of a path that a surface of that roughness has sent on.
 uint path_sent_on(uint flags, float roughness)
 {
     uint step_ = uint(clamp(roughness / PATH_STEPS_ROUGHNESS, 0.0, 1.0) * PATH_STEPS) << PATH_STEP_SHIFT;
     return flags & ~PATH_STEP_MASK | max(flags & PATH_STEP_MASK, step_);
 }
 
-// Of sample `index` a roughness: angles go as its square.
+// Roughness for sample `index`: angles go as its square.
 float shrunk_roughness(float roughness, uint index)
 {
     return roughness * pow(float(index + 1u), -1.0 / 12.0);
@@ -32,7 +32,8 @@ float regularised_roughness(path p, float roughness, uint index)
     return radiance_limit > 0.0 ? max(roughness, shrunk_roughness(step_, index)) : roughness;
 }
 
-// Paths with at most `bounces` are not limited: 1 for light that the ray has hit, 0 for light that its hit asks for.
+// Limits light, except on paths with at most `bounces`: 1 for light that the ray has hit, 0 for light that its hit
+// samples.
 vec3 limited(path p, uint bounces, vec3 arriving)
 {
     float size = max_component(arriving);

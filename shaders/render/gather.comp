@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Adds a wave's radiance and the light that its shadow rays let through to the samples of the slice. The paths of a
-// sample lie side by side; the first of them adds for all, in their order, so no two invocations share a sample and the
-// sum is the same to the bit every time. Shadow rays come in batches: each batch is added to its path's radiance, and
-// the last to the samples, so their number does not matter. Paths that left the scene bring the environment home here.
-// Defines: GREY of what a shadow ray lets through, the mean of the channels counts; GROUND shadow rays change the pixel's
-// coverage, too (ground.comp); COVERS what covers the pixel is noted (shared/layers.h). Those of left_scene.glsl and
+// Adds a wave's radiance and the light of its shadow rays to the samples of the slice. The paths of a sample lie side by
+// side; the first of them adds for all, in their order, so no two invocations share a sample and the sum is the same
+// every time, to the bit. Shadow rays come in batches: each batch is added to its path's radiance, and the last to the
+// samples, so their number does not matter. Paths that left the scene get the environment's light here.
+// Defines: GREY the mean of a shadow ray's channels counts; GROUND shadow rays change the pixel's coverage, too
+// (ground.comp); COVERS the surfaces that cover the pixel are noted (shared/layers.h). Those of left_scene.glsl and
 // light_layers.glsl.
 
 #include "shared/path.h"
@@ -20,7 +20,7 @@ layout(local_size_x = 64) in;
 uniform uint batch_rays;
 uniform uint last_batch;
 
-layout(binding = UNIT_PASS_0) uniform samplerBuffer light_samples; // in texels: software GL fetches those faster
+layout(binding = UNIT_PASS_0) uniform samplerBuffer light_samples; // texels: software GL fetches these faster
 layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
 layout(std430, binding = BIND_RADIANCE) buffer radiance_block { vec4 radiance[]; };
 layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
@@ -30,11 +30,12 @@ layout(std430, binding = BIND_SLICE_SUMS) buffer sum_block { vec4 slice_sums[]; 
 #include "shared/hit.h"
 #include "shared/layers.h"
 uniform uint wave_number;
-uniform uint sample_count; // of the slice
+uniform uint sample_count; // samples of the slice
 layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
 layout(std430, binding = BIND_COVERS) writeonly buffer cover_block { uvec4 covers[]; };
 
-// Of a sample one path at most goes straight on. The shadow on a ground covers, but is no object.
+// Notes what covers a sample. At most one path of a sample goes straight on. The shadow on a ground covers, but is no
+// object.
 void note_cover(uint slot, uint k, float share)
 {
     uvec4 h = texelFetch(hits, int(3u * k));
@@ -48,7 +49,7 @@ uint slot_of(uint k)
     return texelFetch(paths, int(k) * PATH_TEXELS).w;
 }
 
-// Of hit j, with the light that the batch let through.
+// Radiance of hit j, with the light that the batch lets through.
 vec4 radiance_of_hit(uint k, uint j)
 {
     vec4 sum = radiance[k];
@@ -77,7 +78,7 @@ vec4 radiance_of_hit(uint k, uint j)
 
 vec4 beyond(uint k)
 {
-    vec3 of_light; // what comes from the area light that the path hit
+    vec3 of_light; // light of the area light that the path hit
     vec4 arrived = radiance_beyond(k, of_light);
 #ifdef LIGHT_LAYERS
     path p = path_at(k);
@@ -92,7 +93,7 @@ vec4 beyond(uint k)
     return arrived;
 }
 
-// The sample's coverage.
+// Adds to the sample's coverage.
 void note_coverage(uint slot, float coverage)
 {
 #ifdef LIGHT_LAYERS
@@ -117,7 +118,7 @@ void main()
         return;
     vec4 sum = slice_sums[slot];
     bool more = true;
-    while (more) { // of which a batch that is not the last has one
+    while (more) { // a batch that is not the last has one path of it
         uint j = hit_places[k];
         vec4 arrived = vec4(0.0);
         if (j != HIT_PLACE_NONE)

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The radiance of an eye's samples from the pictures of a key view's layers (shared/key_view.h): of the intersection
-// of its ray with the structure of that view, which names the layer; of a ray that met nothing, the environment.
-// Widmer and others. An Adaptive Acceleration Structure for Screen-space Ray Tracing. 2015, section 5.1.
+// Reads the radiance of an eye's samples from the pictures of a key view's layers (shared/key_view.h): at the
+// intersection of a ray with the structure of that view, which names the layer; a ray that met nothing gets the
+// environment. Widmer and others. An Adaptive Acceleration Structure for Screen-space Ray Tracing. 2015, section 5.1.
 //
-// Coverage is 1 wherever there is a surface: what blended surfaces leave open is in the layer's radiance.
+// Coverage is 1 wherever there is a surface: the layer's radiance includes light through blended surfaces.
 //
-// Defines: those of common/environment.glsl; OPEN in place of the environment is 1; HAS_UNKNOWN the share of samples
-// that the key view does not show is a layer of the picture; EYES where the rays meet the layers is known as
-// shared/eye_hit.h has it, in place of rays and intersections, and SPREAD as common/sample_place.glsl has it; HAS_LENS
-// rays begin on a lens; KEY_LAYERS how many layers there are; MARK where rays meet layers is kept in place of radiance,
-// and texels that have to be there before it can be taken are marked; KEPT the picture has such places.
+// Defines: those of common/environment.glsl; OPEN the environment counts as 1; HAS_UNKNOWN the share of samples that the
+// key view does not show is a layer of the picture; EYES the places where rays meet the layers are texels of
+// shared/eye_hit.h, not rays and intersections, with SPREAD of common/sample_place.glsl; HAS_LENS rays begin on a lens;
+// KEY_LAYERS the number of layers; MARK writes where rays meet layers instead of radiance, and marks the texels needed to
+// read it later; KEPT the picture has such places.
 
 #include "shared/key_view.h"
 #include "shared/eye_hit.h"
@@ -22,14 +22,14 @@
 
 layout(local_size_x = 64) in;
 
-uniform vec3 key_right, key_up, key_back, key_eye; // axes of the key view in the world, and where it is
+uniform vec3 key_right, key_up, key_back, key_eye; // axes of the key view in the world, and its eye
 uniform vec2 key_extent;                           // half width and height at distance 1, or of an orthographic view
 uniform uint key_orthographic;
 uniform uint key_width, key_height;
-uniform uint first_slot; // of the slice
-uniform float key_bound; // how far inverse distances of the structure may be off, 1 / metres
+uniform uint first_slot; // first slot of the slice
+uniform float key_bound; // maximum error of the structure's inverse distances, 1 / metres
 #ifdef HAS_UNKNOWN
-uniform uint first_unknown; // in the sums
+uniform uint first_unknown; // index in the sums
 #endif
 
 #ifdef EYES
@@ -52,14 +52,14 @@ layout(std430, binding = BIND_KEY_MARKS) writeonly buffer mark_block { uint mark
 #endif
 #ifdef KEPT
 layout(std430, binding = BIND_ACCUMULATION) buffer accumulation_block { vec4 accumulation[]; };
-uniform uint first_kept; // of the slice, in its band
+uniform uint first_kept; // first slot of the slice, in its band
 #endif
 #ifdef HAS_UNKNOWN
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
 #endif
 
-// A surface is met where inverse distances agree within this share, beside the structure's own bound: those of
-// surfaces that are some centimetres apart differ by more at the distances of a room.
+// Share of inverse distance, besides the structure's own bound, within which a ray meets a surface: inverse distances of
+// surfaces some centimetres apart differ by more at the distances of a room.
 const float SURFACE_SHARE = 0.01;
 
 vec4 key_texel(uint layer, ivec2 p)
@@ -77,7 +77,8 @@ vec4 key_texel(uint layer, ivec2 p)
     return texelFetch(key_layer_0, place);
 }
 
-// Straight in the picture's coordinates on every plane. Of an orthographic view distances themselves are.
+// Inverse distance, which is linear in the picture's coordinates on every plane; in an orthographic view the distance
+// itself.
 float straight(float distance_)
 {
     if (key_orthographic != 0u)
@@ -86,10 +87,10 @@ float straight(float distance_)
 }
 
 #ifdef HAS_LENS
-vec3 met_plane; // of what was met last, in the key view: right, up and forward; a point on it has the product 1
+vec3 met_plane; // plane that was met last, in the key view: right, up and forward; a point on it has the product 1
 bool has_plane = false;
 
-// `depths` lie at a place and its neighbours to the right and below, and change evenly.
+// Notes the plane of a place: `depths` lie at the place and its neighbours to the right and below, and change evenly.
 void note_plane(vec4 depths, vec2 place, float met)
 {
     vec2 slope = vec2(depths.y - depths.x + depths.w - depths.z, depths.z - depths.x + depths.w - depths.y) * 0.5;
@@ -99,7 +100,8 @@ void note_plane(vec4 depths, vec2 place, float met)
 }
 #endif
 
-// From the four texels round a place, of which those count that agree with what a ray met there. `known`: one at least does.
+// Radiance from the four texels round a place, of which those count that agree with the surface that a ray met there.
+// `known`: at least one of them does.
 vec3 key_radiance(uint layer, vec2 place, float met, out bool known)
 {
     vec2 corner = floor(place - 0.5), f = place - 0.5 - corner;
@@ -110,7 +112,7 @@ vec3 key_radiance(uint layer, vec2 place, float met, out bool known)
     vec4 depths = vec4(straight(a.w), straight(b.w), straight(c.w), straight(d.w));
     vec4 weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     float tolerance = SURFACE_SHARE * abs(met) + key_bound;
-    // Four texels of one plane pass through what was met, however steep it is.
+    // Four texels of one plane pass through the surface that was met, however steep it is.
     float fold = abs(depths.x - depths.y - depths.z + depths.w);
     bool plane = dot(there, vec4(1.0)) == 4.0 && fold <= tolerance && abs(dot(weights, depths) - met) <= tolerance;
 #ifdef HAS_LENS
@@ -119,7 +121,8 @@ vec3 key_radiance(uint layer, vec2 place, float met, out bool known)
 #endif
     vec4 misfit = abs(depths - met) + (1.0 - there) * 1e30;
     float best = min(min(misfit.x, misfit.y), min(misfit.z, misfit.w));
-    // Else those that fit as well as the best one, by as much as a steep surface may differ from texel to texel.
+    // Otherwise texels count that fit as well as the best one, within the difference that a steep surface may have
+    // between texels.
     vec4 fits = vec4(lessThanEqual(misfit, vec4(best + tolerance))) * there;
     vec4 own = plane ? weights : fits * max(weights, vec4(1e-6));
     known = plane || best <= 0.1 * abs(met) + key_bound;
@@ -144,18 +147,18 @@ vec3 key_from_world(vec3 d)
     return vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
 }
 
-// In texels, of a point along the axes of the key view from its eye.
+// Place in texels of a point along the axes of the key view, from its eye.
 vec2 key_place(vec3 v)
 {
     vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
     return (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
 }
 
-// Of what a ray met there. `known`: it is what the layer shows; false where the place is a guess, at which there may be
-// nothing.
+// Radiance at a place that a ray met. `known`: the layer shows it; false where the place is a guess, with perhaps nothing
+// there.
 vec3 met_radiance(vec4 met, uint layer, inout bool known, inout bool is_met)
 {
-    if (!known) { // the background beside what hides it, however far the point is from it
+    if (!known) { // the background beside the hiding surface, however far the point is from it
         vec4 shown = key_texel(layer, ivec2(floor(met.xy)));
         is_met = is_met && shown.w > 0.0;
         return shown.rgb;
@@ -164,10 +167,11 @@ vec3 met_radiance(vec4 met, uint layer, inout bool known, inout bool is_met)
 }
 
 #ifdef HAS_LENS
-uniform uint lens_more; // samples of the lens beside that of the ray
+uniform uint lens_more; // samples of the lens besides the ray's own
 
-// Other points of the lens look at the plane that a ray has met, without being traced: section 5.2 of the paper. They
-// count as far as the layer shows that plane where they meet it. They lie round the lens's centre, as far from it.
+// Adds other points of the lens, which see the plane that a ray has met without being traced: section 5.2 of the paper.
+// They count as far as the layer shows that plane where they meet it. They lie round the lens's centre, at the ray's
+// distance from it.
 vec3 with_lens(uint k, vec3 origin, vec3 direction, uint layer, vec3 radiance)
 {
     uvec2 pixel = pixel_of_slot(first_slot + (k >> frame.sample_shift));
@@ -197,7 +201,7 @@ vec3 with_lens(uint k, vec3 origin, vec3 direction, uint layer, vec3 radiance)
 #endif
 
 #ifdef MARK
-// The four texels that key_radiance() reads.
+// Marks the four texels that key_radiance() reads.
 void mark(vec2 place, uint layer)
 {
     ivec2 corner = ivec2(floor(place - 0.5)), last = ivec2(key_width, key_height) - 1;
@@ -211,9 +215,9 @@ void mark(vec2 place, uint layer)
 #endif
 
 #if !defined EYES && !defined KEPT
-vec4 origin, direction; // of the ray
+vec4 origin, direction; // those of the ray
 
-// What an intersection is, as shared/eye_hit.h has it.
+// Converts an intersection to the texel of shared/eye_hit.h.
 vec4 eye_hit_of(uint k)
 {
     origin = texelFetch(rays, int(2u * k));
@@ -270,7 +274,7 @@ void main()
         mark(met.xy, layer);
     slice_sums[k] = met;
 #else
-    vec4 sum = vec4(0.0); // a pixel beyond the picture's edge
+    vec4 sum = vec4(0.0); // stays for a pixel beyond the picture's edge
     if (is_met)
         sum = vec4(met_radiance(met, layer, known, is_met), 1.0);
 #ifdef HAS_LENS

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// What is seen of the ground, a shadow catcher: what lies behind it, times the share of light that reaches it. That is what
-// a white Lambert surface there would show with shadows, by what it would show without: Debevec's differential rendering
-// (Rendering Synthetic Objects into Real Scenes. 1998) by a quotient in place of a difference. After the integrator's own
-// shading, whose results for these hits are replaced.
+// Shades the ground, a shadow catcher: the background behind it, times the share of light that reaches it. The share is
+// the radiance of a white Lambert surface with shadows, divided by that without: Debevec's differential rendering
+// (Rendering Synthetic Objects into Real Scenes. 1998) with a quotient in place of a difference. Runs after the
+// integrator's own shading, and replaces its results for these hits.
 //
 //   radiance    black, which covers
-//   shadow rays take their shares of that away, and show what lies behind: w of their light sample is below 0
+//   shadow rays subtract their shares of coverage, and show the background: w of their light sample is below 0
 //   children    none
 //
 // Defines, one of them:
 //   EVERY_LIGHT one shadow ray to every light; the environment's irradiance, which has no shadows there, lights it too
-//   ONE_LIGHT   some, each to what is chosen by its light: a light, an emitter, a direction of the environment. All bring the
-//               same part of the light: where nothing is in the way there is no noise
+//   ONE_LIGHT   some, each to a source chosen by its light: a light, an emitter, a direction of the environment. All have
+//               equal parts of the light: without occluders there is no noise
 //   OPEN        those of ao.comp
 // and those of common/light.glsl, common/emitter.glsl, common/environment_choice.glsl and render/shade.glsl.
 
@@ -23,15 +23,15 @@
 #include "render/wave.glsl"
 
 uniform uint first_ray, batch_rays;
-uniform uint own_rays;        // shadow rays that the integrator itself makes of each hit
+uniform uint own_rays;        // shadow rays that the integrator itself makes for each hit
 uniform float reach, falloff; // OPEN: see common/occlusion.glsl
 
 const vec4 COVERED = vec4(0.0, 0.0, 0.0, 1.0);
-// Candidates for one direction of the environment, or place on an emitter: chosen by the light that they bring (Talbot,
-// Cline, Egbert. Importance Resampling for Global Illumination. 2005). The more, the less the share is off.
+// Number of candidates for a direction of the environment, or a place on an emitter: chosen by their light (Talbot,
+// Cline, Egbert. Importance Resampling for Global Illumination. 2005). With more of them, the share is more exact.
 const uint CANDIDATES = 4u;
 
-// What a ray that goes on without the ground would bring: render/left_scene.glsl.
+// Light behind the ground along a ray that continues without it: render/left_scene.glsl.
 vec4 behind(vec3 direction)
 {
     if (environment_is_hidden())
@@ -49,13 +49,13 @@ float mean_of(vec3 v)
     return dot(v, vec3(1.0 / 3.0));
 }
 
-// As a light's radiance on a white Lambert surface.
+// Irradiance of a direction, as a light's radiance on a white Lambert surface.
 float lambert(vec3 normal, vec3 direction, vec3 irradiance)
 {
     return max(dot(normal, direction), 0.0) * mean_of(irradiance) * INVERSE_PI;
 }
 
-// `uncovers`: of the radiance at the eye, if nothing is in the way.
+// Adds a shadow ray. `uncovers`: its part of the radiance at the eye, if the ray is not blocked.
 void add_ground_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec4 uncovers)
 {
     shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET)));
@@ -65,7 +65,7 @@ void add_ground_ray(uint place, path p, vec3 origin, vec3 direction, float dista
 #endif
 }
 
-// Takes the number's share of one more candidate out of it: true where that is chosen. `number` stays uniform.
+// Resampling with one more candidate: true if it is chosen. `number` decides, and stays uniform.
 bool take(float size, inout float sum, inout float number)
 {
     sum += size;
@@ -84,7 +84,7 @@ vec2 numbers_of_candidate(vec2 u, uint i)
 struct light_choice {
     vec3 direction;
     float distance_;
-    float all_; // the light that arrives without shadows, about
+    float all_; // estimate of the light that arrives without shadows
 };
 
 light_choice choose_light(path p, vec3 origin, vec3 normal, vec2 u, vec2 v, float number)
@@ -115,7 +115,8 @@ light_choice choose_light(path p, vec3 origin, vec3 normal, vec2 u, vec2 v, floa
             float probability;
             vec3 direction = environment_choose(normal, numbers_of_candidate(v, i), probability);
 #ifdef HAS_ENVIRONMENT_TABLE
-            // Every other one by the cosine: of a bright sea all that the table gives may come from below.
+            // Every other candidate is sampled by the cosine: with a bright sea, all directions of the table may point
+            // down.
             if ((i & 1u) != 0u)
                 direction = occlusion_direction(normal, normal, numbers_of_candidate(v, i));
             float by_cosine = max(dot(normal, direction), 0.0) * INVERSE_PI;
@@ -145,16 +146,16 @@ void main()
     path p = path_at(k);
     ray r = ray_at(k);
     vec3 direction = r.direction_t_max.xyz, normal = unpack_unit(h.normal_shading);
-    // It is no surface that a shadow ray might hit, and so that starts on it.
+    // The ground is no surface that a shadow ray might hit, so the ray starts on it.
     vec3 origin = r.origin_t_min.xyz + h.distance * direction;
     vec4 weight = vec4(p.weight_r, p.weight_g, p.weight_b, p.weight_r);
     vec4 uncovered = weight * behind(direction), covered = weight * COVERED;
     uvec2 seed = path_seed(p);
     uint sample_ = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
-    float unshadowed = 0.0; // share of the light that has no shadows
+    float unshadowed = 0.0; // share of light that casts no shadows
     uint alive = 0u;
 #ifdef LIGHT_LAYERS
-    ray_part.group = group_of_environment(); // which it shows less of
+    ray_part.group = group_of_environment(); // the light that the ground blocks
 #endif
 #if defined(EVERY_LIGHT)
     float sum = mean_of(environment_irradiance(normal)), ambient = sum;

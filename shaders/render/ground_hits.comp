@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Where rays of the eye that meet nothing meet the ground (server/render/ground.h): they become hits with HIT_GROUND. It lies
-// below all that is shown, so what is seen hides it and never the other way round; from below it is not there.
+// Lets the eye's rays that met nothing meet the ground (server/render/ground.h): they become hits with HIT_GROUND. The
+// ground lies below all objects, so they hide it and never the other way round; from below it is invisible.
 
 #include "shared/hit.h"
 #include "shared/path.h"

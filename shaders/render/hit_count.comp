@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Counts the paths of each block of COMPACT_BLOCK that hit something. First of three passes (then compact_scan.comp and
-// hit_list.comp) that list the hits, so that shading runs on those alone: software GL would run all of it for paths
-// that left the scene, too.
+// Counts the paths of each block of COMPACT_BLOCK that hit something. First of three passes (compact_scan.comp and
+// hit_list.comp follow) that list the hits, so that shading runs on these alone: software GL would also execute it for
+// paths that left the scene.
 
 #include "shared/hit.h"
 #include "shared/path.h"

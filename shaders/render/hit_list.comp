@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lists the paths that hit something, in their order, and tells each path its place in that list.
+// Lists the paths that hit something, in their order, and writes into each path its place in that list.
 
 #include "shared/hit.h"
 #include "shared/path.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From the sums of a layer's picture, a band of it, to texels of the key view (shared/key_view.h).
+// Copies the sums of a layer's picture, a band of it, to texels of the key view (shared/key_view.h).
 //
-// Defines: HAS_TILES as of render/tiles.glsl.
+// Defines: HAS_TILES of render/tiles.glsl.
 
 #include "shared/key_view.h"
 #include "render/tiles.glsl"
@@ -9,9 +9,9 @@
 
 layout(local_size_x = 64) in;
 
-uniform uint slot_count, first_slot; // of the band
+uniform uint slot_count, first_slot; // the band's
 uniform float scale;                   // 1 / samples
-uniform uint shows_environment;        // where no surface is: 1 in the first layer
+uniform uint shows_environment;        // 1 in the first layer: texels without a surface show the environment
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_KEY_DEPTHS) readonly buffer depth_block { vec4 depths[]; };

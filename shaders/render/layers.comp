@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The layers of each sample of a slice: those of the first surface that its ray hit, opaque or not. They are 0 for a
-// sample that hit nothing, and, in layers of the first sample only, for all others.
+// Writes the layers of each sample of a slice: those of the first surface that its ray hit, opaque or not. They are 0 for
+// a sample that hit nothing, and, in layers of the first sample only, for all others.
 //
 // Defines: NEEDS_SURFACE albedo or normal are among them; those of common/material.glsl.
 
@@ -9,9 +9,9 @@
 #include "render/shade.glsl"
 
 uniform uint ray_count;
-uniform uint layers; // of the frame, without the beauty
-uniform uint noting; // of them, what is put
-uniform uint first_light_plane, end_light_plane; // of layers of light: the integrator adds
+uniform uint layers; // layers of the frame, without the beauty
+uniform uint noting; // layers that are written
+uniform uint first_light_plane, end_light_plane; // layers of light, to which the integrator adds
 
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
 
@@ -36,7 +36,7 @@ void main()
     for (uint plane = first_light_plane; plane < end_light_plane; plane++)
         layer_sums[plane * ray_count + k] = vec4(0.0);
     hit h = hit_at(k);
-    // Those of later waves: layers_unknown.comp. Of pictures made from a key view: gather_views.comp.
+    // Later waves are in layers_unknown.comp, and pictures from a key view in gather_views.comp.
     put(LAYER_BIT_UNKNOWN, k, vec4(vec3((h.material & HIT_UNKNOWN) != 0u ? 1.0 : 0.0), 1.0));
     if (!(h.distance >= 0.0)) {
         for (uint layer_bit = LAYER_BIT_ALBEDO; layer_bit <= LAYER_BIT_ID; layer_bit <<= 1)
@@ -59,6 +59,6 @@ void main()
     }
     put(LAYER_BIT_DEPTH, k, depth);
     put(LAYER_BIT_POSITION, k, position);
-    put(LAYER_BIT_AO, k, vec4(vec3(0.0), 1.0)); // layers_gather.comp adds
+    put(LAYER_BIT_AO, k, vec4(vec3(0.0), 1.0)); // layers_gather.comp adds to it
     put(LAYER_BIT_ID, k, id);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The rays of the layer `ao` for each hit of a slice: those of the integrator `ao` at first hits, so that the two
+// Makes the rays of the layer `ao` for each hit of a slice: those of the integrator `ao` at first hits, so that the two
 // agree.
 //
 // Defines: those of common/material.glsl and render/shade.glsl.
@@ -8,7 +8,7 @@
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
-uniform uint first_ray, batch_rays; // of all_rays that a sample has
+uniform uint first_ray, batch_rays; // this batch, of the all_rays of a sample
 uniform uint all_rays;
 uniform float reach, falloff;       // metres; see common/occlusion.glsl
 

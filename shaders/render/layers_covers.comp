@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What covers the samples of a slice (shared/layers.h), as far as it is known before their surfaces are shaded: where
-// nothing shows through these, the first surface; else nothing, and gather.comp goes on.
+// Notes what covers the samples of a slice (shared/layers.h), as far as it is known before their surfaces are shaded: the
+// first surface where nothing shows through; otherwise nothing, and gather.comp continues.
 
 #include "shared/hit.h"
 #include "shared/layers.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Adds the transmittances of the rays of layers_ao.comp to the layer's samples, those of a sample in their order.
+// Adds the transmittances of the rays of layers_ao.comp to the layer's samples, in the order of a sample's rays.
 
 #include "shared/layers.h"
 #include "common/dispatch.glsl"
@@ -8,9 +8,9 @@
 
 layout(local_size_x = 64) in;
 
-uniform uint ray_count; // of the slice
+uniform uint ray_count; // rays of the slice
 uniform uint batch_rays, all_rays;
-uniform uint plane; // of the layer
+uniform uint plane; // plane of the layer
 
 layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
 layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
@@ -22,8 +22,8 @@ void main()
     if (j >= wave.hits.count)
         return;
     uint place = plane * ray_count + hit_list[j];
-    float open_share = layer_sums[place].r; // ray by ray, so that it is the same however they are batched
-    for (uint i = 0u; i < batch_rays; i++) { // the mean of a coloured transmittance
+    float open_share = layer_sums[place].r; // sums ray by ray, so that the result does not depend on the batches
+    for (uint i = 0u; i < batch_rays; i++) { // mean of a coloured transmittance
         vec3 through = transmittance_of(visibility[i * wave.hits.count + j]);
         open_share += dot(through, vec3(1.0 / 3.0)) / float(all_rays);
     }

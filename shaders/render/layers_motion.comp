@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The layer `motion`: where what the first sample of a pixel shows lies a frame later and a frame earlier, in pixels from
-// where it lies now, to the right and up. A point keeps its place in its object, or in its triangle where that deforms;
-// what lies behind all surfaces keeps its direction. 0 for all other samples, and for what is behind the camera then.
+// Writes the layer `motion`: the displacement of the point that the first sample of a pixel shows, a frame later and a
+// frame earlier, in pixels to the right and up. A point keeps its place in its object, or in its triangle where that
+// deforms; the background keeps its direction. 0 for all other samples, and for points behind the camera then.
 //
-// Defines: HAS_MOTION things move while the shutter is open (common/motion.glsl); where they are as it opens counts.
+// Defines: HAS_MOTION objects move while the shutter is open (common/motion.glsl); their places as it opens count.
 
 #include "shared/hit.h"
 #include "shared/layers.h"
@@ -13,12 +13,12 @@
 #include "render/path_texels.glsl"
 
 uniform uint ray_count;
-uniform uint first_slot;       // of the slice
-uniform uint first_sum;        // of the layer
-uniform uint has_moves;        // 0: nothing but the camera moves
+uniform uint first_slot;       // first slot of the slice
+uniform uint first_sum;        // first sum of the layer
+uniform uint has_moves;        // 0: only the camera moves
 uniform uint is_orthographic;
-uniform vec4 world_from_views[9]; // rows: of the camera a frame earlier, now, a frame later
-uniform vec4 pixels_a_metre;      // at distance 1, or of a parallel view; likewise
+uniform vec4 world_from_views[9]; // rows: the camera a frame earlier, now, a frame later
+uniform vec4 pixels_a_metre;      // at distance 1, or in a parallel view; for the same times
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays;
 layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
@@ -34,7 +34,7 @@ struct places { // in the world, by time; w 0: a direction
     vec4 at[3];
 };
 
-// The weights of a triangle's corners in the point of its plane that is nearest.
+// Weights of a triangle's corners in the nearest point of its plane.
 vec3 weights_of(vec3 point, vec3 corners[3])
 {
     vec3 a = corners[1] - corners[0], b = corners[2] - corners[0], p = point - corners[0];
@@ -49,7 +49,7 @@ vec3 moved_vertex(uint number)
     return vec3(moved_vertices[3u * number], moved_vertices[3u * number + 1u], moved_vertices[3u * number + 2u]);
 }
 
-// In the object, by time.
+// Corners of a triangle in object space, by time.
 void deform(move m, geometry g, uint primitive, float time, inout vec3 points[3])
 {
     uvec3 vertices = texelFetch(triangles, int(primitive)).xyz;
@@ -84,7 +84,7 @@ places places_of(uvec4 h, vec3 place, float time)
     return p;
 }
 
-// In pixels from the middle of the view of that eye; false: it is not in front of the camera.
+// Place in pixels from the middle of that eye's view. False: it is not in front of the camera.
 bool in_picture(vec4 place, uint time, vec2 eye, out vec2 at)
 {
     vec4 rows[3] = vec4[3](world_from_views[3u * time], world_from_views[3u * time + 1u], world_from_views[3u * time + 2u]);

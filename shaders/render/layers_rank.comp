@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Adds what covers the samples of a slice to the ranks of its pixels, for Cryptomatte: two identifiers and their sums in
-// each plane, the largest first. Each pixel is one invocation's, which adds in the order of its samples; so ranks do not
-// depend on how slices are cut. What comes to a pixel that has no rank left is dropped: those that are there stay true.
-// Defines: PLANES how many there are, up to CRYPTO_PLANES; MATERIALS their identifiers, else those of nodes;
-// HAS_TILE_SAMPLES tiles may have stopped, and get no more (server/render/picture_noise.h).
+// Adds the objects that cover the samples of a slice to the ranks of their pixels, for Cryptomatte: two identifiers and
+// their sums in each plane, the largest first. Each pixel is one invocation's, which adds in the order of its samples; so
+// ranks do not depend on the division into slices. An object without a free rank is dropped: the others stay true.
+// Defines: PLANES the number of planes, up to CRYPTO_PLANES; MATERIALS identifiers of materials, else of nodes;
+// HAS_TILE_SAMPLES tiles may have stopped, and get no more samples (server/render/picture_noise.h).
 
 #include "shared/hit.h"
 #include "shared/layers.h"
@@ -18,10 +18,10 @@
 layout(local_size_x = 64) in;
 
 uniform uint slot_count, sample_shift, cover_waves;
-uniform uint first_slot; // of the slice, in its band
+uniform uint first_slot; // first slot of the slice, in its band
 
 #ifdef HAS_TILE_SAMPLES
-uniform uint first_picture_slot; // of the slice, in the picture
+uniform uint first_picture_slot; // first slot of the slice, in the picture
 layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 #endif
 

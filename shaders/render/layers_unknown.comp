@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Marks the samples a ray of which came to where nothing is known, by how much of that ray reaches the eye: in the layer
-// `unknown`, after each wave of secondary rays. Of all rays of a sample the greatest counts, in whichever order they come.
+// Marks samples with a ray that reached unknown space, by the share of that ray at the eye, in the layer `unknown`, after
+// each wave of secondary rays. The maximum over a sample's rays counts, in whichever order they come.
 
 #include "shared/hit.h"
 #include "shared/layers.h"
@@ -10,13 +10,13 @@
 
 layout(local_size_x = 64) in;
 
-uniform uint first_sum; // of the layer
+uniform uint first_sum; // first sum of the layer
 
 layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
 layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
 layout(std430, binding = BIND_LAYER_SUMS) buffer layer_block { vec4 layer_sums[]; };
 
-// Weights, and the sample.
+// First texel of a path: weights, and the sample.
 uvec4 path_head(uint k)
 {
     return texelFetch(paths, int(k) * PATH_TEXELS);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The radiance of paths that left the scene: the environment.
-// Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment; SHARES paths say how
-// much of it counts, and may be limited; HAS_AREA_LIGHTS with it: they also say which light they hit; HAS_EMITTERS with
-// that: the integrator samples emitters, too.
+// Radiance of paths that left the scene: the environment.
+// Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment; SHARES paths have a share
+// of it, and may be limited; HAS_AREA_LIGHTS with SHARES: paths also name the light that they hit; HAS_EMITTERS with
+// both: the integrator samples emitters, too.
 
 #include "shared/path.h"
 #include "shared/ray.h"
@@ -11,7 +11,7 @@
 #include "render/fireflies.glsl"
 #include "render/path_texels.glsl"
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // texels: software GL fetches these faster
 layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
 
 path path_at(uint k)
@@ -21,7 +21,7 @@ path path_at(uint k)
 }
 
 #ifdef HAS_AREA_LIGHTS
-// The area light that the ray hit, plus 1.
+// Number of the area light that the ray hit, plus 1.
 uint met_number(path p)
 {
 #ifdef HAS_EMITTERS
@@ -32,7 +32,7 @@ uint met_number(path p)
 }
 #endif
 
-// `of_light`: the part of an area light that it hit.
+// Radiance at the end of the path. `of_light`: the part of an area light that it hit.
 vec4 radiance_beyond(uint k, out vec3 of_light)
 {
     of_light = vec3(0.0);
@@ -53,7 +53,7 @@ vec4 radiance_beyond(uint k, out vec3 of_light)
     vec3 share = of_light / max(arriving, vec3(1e-30));
 #endif
 #endif
-    vec3 brought = vec3(p.weight_r, p.weight_g, p.weight_b) * arriving; // pixels beyond the picture's edge have no weight
+    vec3 brought = vec3(p.weight_r, p.weight_g, p.weight_b) * arriving; // pixels beyond the picture's edge have weight 0
 #ifdef SHARES
     brought = limited(p, 1u, brought);
 #ifdef HAS_AREA_LIGHTS

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Layers of light: each contribution to a sample's radiance is noted in one of them, or in two by what the first surface
-// scatters and mirrors, so that their sum is the beauty. They follow the first surface that bends or scatters a path, and
-// whether light has come there directly. A sample has at most one path. Light groups are the same sum by the lights and
-// glowing surfaces that the light comes from.
+// Layers of light: each contribution to a sample's radiance is noted in one of them, or in two by the first surface's
+// shares of scattering and reflection, so that their sum is the beauty. They follow the first surface that bends or
+// scatters a path, and whether light has come there directly. A sample has at most one path. Light groups divide the same
+// sum by the lights and emitters that the light comes from.
 //
-//   shading passes  note what they write to radiance[], by part_met() and part_asked(), and so does gather.comp of light beyond the scene
+//   shading passes  note what they write to radiance[], by part_met() and part_asked(), as gather.comp does for light
+//                   beyond the scene
 //   shadow rays     have their part in `ray_part`, which the light sample's second vec4 brings to gather.comp
-//   first surfaces  tell what they do with the path, by note_first()
+//   first surfaces  note their effect on the path, by note_first()
 //
-// Defines: LIGHT_LAYERS there are some; else nothing here costs anything. LIGHT_GROUPS with it: some are light groups.
+// Defines: LIGHT_LAYERS there are some; otherwise nothing here costs anything. LIGHT_GROUPS with it: some are light
+// groups.
 
 #include "shared/hit.h"
 #include "shared/layers.h"
@@ -18,16 +20,16 @@
 struct light_part {
     vec3 mirrored; // share of it that the first surface mirrors
     float kind;    // LIGHT_*
-    uint group;    // of what sends it; 0: none
+    uint group;    // group of the source; 0: none
 };
 
 #ifdef LIGHT_LAYERS
-uniform uint light_layers; // all layers of the frame, without the beauty
+uniform uint light_layers; // the frame's layers, without the beauty
 uniform uint plane_samples;
 
 layout(std430, binding = BIND_LAYER_SUMS) buffer light_sum_block { vec4 light_sums[]; };
 
-light_part ray_part = light_part(vec3(0.0), LIGHT_BEHIND, 0u); // of the shadow ray that is made next
+light_part ray_part = light_part(vec3(0.0), LIGHT_BEHIND, 0u); // part of the shadow ray that is made next
 
 #ifdef LIGHT_GROUPS
 uniform uint environment_group;
@@ -58,13 +60,13 @@ void add_to_layer(uint layer_bit, uint slot, vec3 light)
         light_sums[place_in_layer(layer_bit, slot)].rgb += light;
 }
 
-// Kind and group of a part in one number.
+// Encodes kind and group of a part as one number.
 float code_of(light_part part)
 {
     return part.kind + LIGHT_KINDS * float(part.group);
 }
 
-// `mirrored`: of the light.
+// Adds a contribution. `mirrored`: the mirrored part of the light.
 void add_parts(uint slot, vec3 light, vec3 mirrored, float code)
 {
     float group = floor(code / LIGHT_KINDS), kind = code - LIGHT_KINDS * group;
@@ -89,7 +91,7 @@ light_part part_behind(path p, float kind, uint group)
     return light_part(first.rgb, first.w > 0.0 ? LIGHT_TRANSMITTED : kind, group);
 }
 
-// Of light that the path's ray meets. `seen`: its kind where the eye does.
+// Part for light that the path's ray meets. `seen`: its kind if the eye sees it.
 light_part part_met(path p, float seen, uint group)
 {
     uint bounces = p.flags & PATH_BOUNCES_MASK;
@@ -98,7 +100,7 @@ light_part part_met(path p, float seen, uint group)
     return part_behind(p, bounces == 1u ? LIGHT_DIRECT : LIGHT_INDIRECT, group);
 }
 
-// Of light that comes to where the path's ray ends. `mirrored`: the share of it that is mirrored there.
+// Part for light that arrives at the end of the path's ray. `mirrored`: the share of it that is mirrored there.
 light_part part_asked(path p, vec3 mirrored, uint group)
 {
     bool first = (p.flags & PATH_BOUNCES_MASK) == 0u;
@@ -116,13 +118,13 @@ void note_first(path p, vec3 mirrored, bool transmitted)
         light_sums[place_of_first(p.sample_slot)] = vec4(mirrored, transmitted ? 1.0 : 0.0);
 }
 
-// Of what is sent, the share that is not scattered.
+// Share of reflected light that is not scattered.
 vec3 share_mirrored(vec3 sent, vec3 scattered)
 {
     return clamp(1.0 - scattered / max(sent, vec3(1e-30)), 0.0, 1.0);
 }
 
-// The share that a part has of a sum.
+// Share of a part in a sum.
 vec3 share_of(vec3 part, vec3 sum)
 {
     return clamp(part / max(sum, vec3(1e-30)), 0.0, 1.0);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A light as a surface sees it: what scatters light to its other side sees those behind it, from there.
+// Samples of a light for a surface: one that scatters light to its other side also samples lights behind it, from there.
 //
 // Defines: those of common/light.glsl and render/shade.glsl.
 
 #include "common/light.glsl"
 #include "render/shade.glsl"
 
-// `origin`: of shadow rays on the viewer's side; becomes that of this one.
+// Samples a light. `origin`: of shadow rays on the viewer's side; becomes that of this one.
 light_sample light_seen(surface s, float distance_, uint index, vec2 u, inout vec3 origin)
 {
     light_sample sampled = light_sample_at(index, origin, u);
@@ -19,8 +19,8 @@ light_sample light_seen(surface s, float distance_, uint index, vec2 u, inout ve
     return sampled;
 }
 
-// Of a light's highlight: 0 for a steady one in a smooth mirror. Renderers that had such lights showed in mirrors what rays
-// meet, and no ray meets a point.
+// Factor of a light's highlight: 0 for a steady one in a smooth mirror. Renderers with such lights showed in mirrors only
+// objects that rays meet, and no ray meets a point.
 float light_shine(uint index, float roughness)
 {
     int kind = int(texelFetch(lights, int(index) * LIGHT_TEXELS).w);

@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: MIT
-// The radiance of each hit of a wave towards the eye, and its rays: Kajiya. The Rendering Equation. 1986, by paths from
-// the eye. There is no ambient term: all light arrives over bounces.
+// Computes the radiance of each hit of a wave towards the eye, and its rays: Kajiya. The Rendering Equation. 1986, by
+// paths from the eye. There is no ambient term: all light arrives over bounces.
 //
 //   radiance    emission; the area light that the ray hit on its way
-//   shadow rays one to one point of one light or emissive triangle, and one to the environment. Two, as nothing tells before they are traced
-//               which of them is in the shadow: chosen between, one would often be wasted
+//   shadow rays one to one point of one light or emissive triangle, and one to the environment. Two, as only tracing
+//   shows which of them is in the shadow: a choice of one would often be wasted
 //   child       at most one: straight on (alpha blending), scattered, mirrored or refracted
 //
-// Light with an extent is found by shadow rays and by children, at no extra cost: rectangles, spheres and the
-// environment are met by them as they go on. Light that both find is weighed (common/two_ways.glsl). The last hits of a
-// path have no child; there shadow rays bring everything. Straight rays from the eye hit no area light.
+// Light with an extent is found by shadow rays and by children, at no extra cost: children meet rectangles, spheres and
+// the environment on their way. Light that both find is weighed (common/two_ways.glsl). The last hits of a path have no
+// child; there shadow rays find everything. Straight rays from the eye hit no area light.
 //
-// Emissive triangles are found both ways, too. Rays that go on see them through glass as it bends light, and through
-// blended surfaces; so translucent surfaces stop the shadow rays towards them, and what is met behind one counts fully.
-// The last hits do not ask for them: their light is that of one bounce more.
+// Emissive triangles are found both ways, too. Children see them refracted through glass, and through blended surfaces;
+// so translucent surfaces stop the shadow rays towards them, and light met behind one counts fully. The last hits do not
+// sample them: their light is that of one bounce more.
 //
 // Glass. Shadow rays go straight through it, tinted (common/alpha.glsl), smooth or not; so a light behind a pane lights
-// a room without waiting for a path to find it. The rays that go on have to find the same light for both ways to be
-// weighed: where one from a place that asked for light meets glass, a shadow ray goes straight on in its place, with
-// its share. Its child, which is bent, would bring that light once more: it brings none until it was scattered, or
-// mirrored outside (PATH_COVERED), but for what emissive surfaces send. Paths from the eye, or a mirror, see everything
-// through glass. Surfaces of glass ask for no light from inside.
+// a room without waiting for a path to find it. Children have to find the same light for the weights of both ways: where
+// one from a place that sampled lights meets glass, a shadow ray continues straight in its place, with its share. The
+// refracted child would find that light a second time: it counts none until it is scattered, or mirrored outside
+// (PATH_COVERED), except that of emissive surfaces. Paths from the eye, or a mirror, see everything through glass.
+// Surfaces of glass sample no light from inside.
 //
 // Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl, common/two_ways.glsl and
 // render/shade.glsl.
@@ -34,28 +34,28 @@
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
-// A child with a lower weight than this is traced with the probability weight / this, and then has this weight. Measured in two
+// Weight below which a child is traced with the probability weight / this, and then has this weight. Measured in two
 // rooms: 1/4 is as good.
 const float ROULETTE = 1.0 / 2.0;
 
-uniform uint asks_lights, asks_environment; // 1: there are some; their shadow rays come in this order
+uniform uint asks_lights, asks_environment; // 1: the scene has some; their shadow rays come in this order
 
 struct eye_hit {
     uint j;
     path p;
     surface s;
     bsdf b;
-    vec3 origin; // of shadow rays
+    vec3 origin; // origin of shadow rays
     vec3 weight;
     float distance_;
     bool last;   // no child follows
     light_receiver receiver;
     float all_lights; // sum of their estimates
-    // The light that shadow rays ask for, and the numbers that are left to choose a point of it.
+    // Light that shadow rays sample, and the numbers that remain to choose a point of it.
     uint light_number;
     float light_chance;
     vec2 light_u;
-    float lights_chance; // of asking for a light, not for an emitter
+    float lights_chance; // probability of sampling a light, not an emitter
 };
 
 uint numbers_of(uint choice)
@@ -68,13 +68,13 @@ void choose_light(inout eye_hit e, uvec2 seed, uint index)
     e.light_u = sequence_pair_sorted(seed, numbers_of(SEQUENCE_PATH_LIGHT), index, frame.group_shift);
     e.light_number = light_choose(e.receiver, frame.light_count, e.light_u.x, e.light_chance, e.all_lights);
 #ifdef HAS_EMITTERS
-    if (!e.last) // what emissive surfaces send is a bounce
+    if (!e.last) // light of emissive surfaces counts as a bounce
         e.lights_chance = lights_share(e.receiver, e.all_lights,
                                        emitters_around(e.origin, e.s.normal, passed_share(e.b.parts)));
 #endif
 }
 
-// For the shadow ray that is made next, whose group is to be told.
+// Evaluates the surface, for the shadow ray that is made next; the caller sets its group.
 vec3 evaluate(eye_hit e, vec3 direction, out float found)
 {
     vec3 sent = bsdf_evaluate(e.b, e.s, direction, found);
@@ -92,7 +92,7 @@ bool ask_for_emitter(eye_hit e, uint place, vec2 u)
     vec3 from = origin_towards(e.s, e.origin, e.distance_, side * e.s.geometric);
     emitter_sample sampled = emitter_sample_at(from, normal, u, e.p.time);
     vec3 arriving = vec3(0.0), sent = evaluate(e, sampled.direction, found);
-    if (sampled.probability > 0.0 && side * dot(sampled.direction, e.s.normal) > 0.0) // the chance is of that side
+    if (sampled.probability > 0.0 && side * dot(sampled.direction, e.s.normal) > 0.0) // the probability is for that side
         arriving = e.weight * sent * sampled.radiance / (sampled.probability * chance);
     arriving = limited(e.p, 0u, arriving * emitter_share_asked(sampled, chance, found));
 #ifdef LIGHT_LAYERS
@@ -132,7 +132,7 @@ bool ask_for_light(eye_hit e, uint place)
     return add_shadow_ray(place, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
 
-// The density with which shadow rays ask for the environment in a direction. A table knows no sides of the surface.
+// Density with which shadow rays sample the environment in a direction. A table ignores the sides of the surface.
 float environment_density(eye_hit e, vec3 direction)
 {
 #ifdef HAS_ENVIRONMENT_TABLE
@@ -166,7 +166,7 @@ bool ask_for_environment(eye_hit e, uint place, uvec2 seed, uint index)
 
 #ifdef HAS_AREA_LIGHTS
 // Chooses one of the lights that a child's ray will hit if nothing is in the way, and its weight. `found`: the
-// probability density of its direction per steradian; 0: no other technique finds them.
+// probability density of its direction per steradian; 0: no other technique samples them.
 void meet_lights(inout path p, eye_hit e, vec3 origin, vec3 direction, float found, float choice)
 {
     float sum = 0.0;
@@ -187,14 +187,14 @@ void meet_lights(inout path p, eye_hit e, vec3 origin, vec3 direction, float fou
         }
         choice = choice * sum / size;
         p.light_number = i + 1u;
-        p.light_distance = distance_ * (1.0 - 4.0 * PATH_OFFSET); // as shadow rays end before it
+        p.light_distance = distance_ * (1.0 - 4.0 * PATH_OFFSET); // shadow rays end before it too
         p.light_share = share / size;
     }
     p.light_share *= sum;
 }
 #endif
 
-// The area light that a ray hits, plus 1.
+// Number of the area light that a ray hits, plus 1.
 uint met_number(path p)
 {
 #ifdef HAS_EMITTERS
@@ -204,7 +204,7 @@ uint met_number(path p)
 #endif
 }
 
-// The light behind glass straight on, which the ray was to find. Returns the number of its live shadow rays.
+// Samples the light straight on behind glass, which the ray would have found. Returns the number of its live shadow rays.
 uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
 {
     uint place = e.j, alive = 0u;
@@ -253,7 +253,7 @@ void ask_nothing(uint j)
         no_shadow_ray(i * wave.hits.count + j);
 }
 
-// The child that the surface emits.
+// Emits the child of the surface.
 void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
 {
     path p = e.p;
@@ -262,11 +262,11 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     vec3 carried = e.weight * chosen.weight;
     float survival = min(max_component(carried) / ROULETTE, 1.0);
     float end = sequence_number(seed, numbers_of(SEQUENCE_PATH_END), index);
-    if (!(end < survival)) // also if it is NaN
+    if (!(end < survival)) // true for NaN too
         return;
     bool of_glass = chosen.lobe == BSDF_REFRACTED || e.b.leaves && chosen.lobe == BSDF_MIRRORED;
     bool covered = of_glass && (p.flags & (PATH_ASKED | PATH_COVERED)) != 0u;
-    // The density with which shadow rays sample it.
+    // Density with which shadow rays sample this direction.
     float found = asked && !of_glass ? chosen.probability : 0.0;
     p.flags &= ~(PATH_ASKED | PATH_COVERED);
     p.flags |= (found > 0.0 ? PATH_ASKED : 0u) | (covered ? PATH_COVERED : 0u);
@@ -278,7 +278,7 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     p.light_number = 0u;
     p.light_share = 0.0;
     p.environment_share = covered ? 0.0 : 1.0;
-    if (frame.environment_kind == ENVIRONMENT_BACKDROP) // nothing that scatters sees it
+    if (frame.environment_kind == ENVIRONMENT_BACKDROP) // surfaces that scatter do not see it
         p.environment_share = chosen.lobe == BSDF_SCATTERED ? 0.0 : e.p.environment_share;
     if (found > 0.0 && asks_environment != 0u)
         p.environment_share = heuristic(found, environment_density(e, chosen.direction));
@@ -296,7 +296,7 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     p.light_number |= ratio_code(emitters_chance, found) << PATH_LIGHT_BITS;
 #endif
 #ifdef LIGHT_LAYERS
-    // Of a direction with a density all lobes bring their shares, whichever was chosen.
+    // In a direction with a density all lobes contribute, whichever was chosen.
     bool evaluated = chosen.probability > 0.0, mirrored = chosen.lobe == BSDF_MIRRORED || chosen.lobe == BSDF_COAT;
     vec3 share = evaluated ? share_mirrored(chosen.weight * chosen.probability, evaluated_scattered) : vec3(mirrored ? 1.0 : 0.0);
     note_first(e.p, share, chosen.lobe == BSDF_REFRACTED);
@@ -306,7 +306,7 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false, sample_solid_angle(angle));
 }
 
-// The area light that the ray hit before the surface.
+// Light of an area light that the ray hit before the surface.
 vec3 met_light(path p, float distance_)
 {
 #ifdef HAS_AREA_LIGHTS
@@ -360,10 +360,10 @@ void main()
         sent += e.s.unlit ? e.s.base : e.s.emission;
     if (asks)
         choose_light(e, seed, index);
-    float passes = 0.0; // share of its shadow rays that are for light behind it
+    float passes = 0.0; // share of its shadow rays for light behind it
     vec3 through = e.s.base * (e.s.transmission * (1.0 - e.s.metallic));
     if (!straight && !e.s.unlit && (e.p.flags & PATH_ASKED) != 0u && max_component(through) > 0.0)
-        passes = asks ? 0.5 : 1.0; // one or the other
+        passes = asks ? 0.5 : 1.0; // either of the two
     vec3 weight = e.weight;
     if (sequence_number(seed, numbers_of(SEQUENCE_PATH_PASS), index) < passes) {
         e.weight = weight / passes;

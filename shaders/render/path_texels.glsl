@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A path from and to the texels of its buffer: PATH_TEXELS, RGBA32UI.
+// Conversion of a path from and to the texels of its buffer: PATH_TEXELS, RGBA32UI.
 
 #include "shared/path.h"
 
@@ -10,7 +10,8 @@ path path_of_texels(uvec4 a, uvec4 b, uvec4 c)
                 c.x, uintBitsToFloat(c.y), uintBitsToFloat(c.z), uintBitsToFloat(c.w));
 }
 
-// In three stores: each is code of its own, whose size hardly depends on how many words it stores.
+// Texels of a path. There are only three stores: each is code of its own, whose size hardly depends on the number of
+// words.
 struct path_texels {
     uvec4 a, b, c;
 };

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Rays and paths of a slice's samples, those of one pixel side by side; the slice's sums are set to black.
+// Makes the rays and paths of a slice's samples, those of one pixel side by side; sets the slice's sums to black.
 // Defines:
-//   VISIBILITY  what the rasteriser saw is noted in the hits, for primary_fill.comp; else they are left to a tracer
-//   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.sample_places says
-//   HAS_LENS    rays start on a lens and meet in the plane in focus
-//   HAS_TILES   of the texels of a key view, rays through those that no eye looks at are dead (render/tiles.glsl)
+//   VISIBILITY  the rasterised primitives are noted in the hits, for primary_fill.comp; otherwise a tracer finds them
+//   SPREAD      each pixel places its samples by its own random numbers; otherwise all use frame.sample_places
+//   HAS_LENS    rays start on a lens and meet in the plane of focus
+//   HAS_TILES   rays through texels of a key view that no eye reads are dead (render/tiles.glsl)
 //   HAS_TILE_SAMPLES tiles may have stopped: their rays are dead (server/render/picture_noise.h)
 //   HAS_TIMES   something moves: rays have a time
 
@@ -21,7 +21,7 @@ layout(local_size_x = 64) in;
 uniform uint first_slot, slot_count;
 #ifdef HAS_TILES
 layout(binding = UNIT_KEY_MARKS) uniform usamplerBuffer key_marks;
-uniform uint first_mark; // of the layer
+uniform uint first_mark; // first mark of the layer
 #endif
 
 #ifdef HAS_TILE_SAMPLES
@@ -36,13 +36,14 @@ layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float tim
 #endif
 #ifdef VISIBILITY
 layout(std430, binding = BIND_HITS) writeonly buffer hit_block { uvec4 hits[]; }; // HIT_TEXELS each
-// A layer for each of the current samples. An image, as llvmpipe compiles later programs for the state of a sampler, too.
+// Primitives, with a layer for each of the current samples. They are an image, as llvmpipe compiles later programs for
+// the state of a sampler, too.
 layout(binding = IMAGE_VISIBLE, rg32ui) readonly uniform uimage2DArray visible_primitives;
-uniform uint first_row; // of the picture in them
+uniform uint first_row; // row of the picture that is their first
 #endif
 
 #ifdef HAS_LENS
-// Shirley and Chiu. A Low Distortion Map Between Disk and Square. 1997. From [0, 1)^2 to the unit disc.
+// Maps [0, 1)^2 to the unit disc. Shirley and Chiu. A Low Distortion Map Between Disk and Square. 1997.
 vec2 disc_from_square(vec2 u)
 {
     vec2 p = 2.0 * u - 1.0;
@@ -54,8 +55,8 @@ vec2 disc_from_square(vec2 u)
     return radius * vec2(cos(angle), sin(angle));
 }
 
-// Through a thin lens, which leads all rays of one point of the picture through one point of the plane in focus (Cook,
-// Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: where they meet it, on the unit disc.
+// Ray through a thin lens, which leads all rays of one point of the picture through one point of the plane of focus
+// (Cook, Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: their place on it, on the unit disc.
 void camera_ray_lens(vec2 view_place, vec2 on_lens, out vec3 origin, out vec3 direction, out float t_min)
 {
     vec2 place = view_place / vec2(frame.view_width, frame.view_height) * 2.0 - 1.0;
@@ -63,7 +64,7 @@ void camera_ray_lens(vec2 view_place, vec2 on_lens, out vec3 origin, out vec3 di
     float focus = frame.lens.y;
     bool orthographic = frame.extent_near.w != 0.0;
     vec3 on_view = vec3(frame.lens.x * on_lens + (orthographic ? place : vec2(0.0)), 0.0);
-    // towards the point in focus, as far as distance 1 along the view
+    // direction to the point in focus, up to distance 1 along the view
     vec3 towards = vec3((orthographic ? vec2(0.0) : place) - frame.lens.x * on_lens / focus, -1.0);
     float stretch = length(towards);
     origin = eye_world() + world_from_view_vector(on_view);
@@ -108,7 +109,7 @@ void main()
 #endif
     vec2 cone = camera_cone();
     float weight = in_picture ? 1.0 : 0.0;
-    // Dead beyond the picture's edge, and where a tile has stopped.
+    // Rays are dead beyond the picture's edge, and where a tile has stopped.
     rays[k] = ray(vec4(origin, t_min), vec4(direction, in_picture ? 1e30 : -1.0));
     path_texels texels =
         texels_of_path(path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time, 0u, 0.0, 0.0, 1.0));
@@ -120,7 +121,7 @@ void main()
     uvec2 visible = uvec2(VISIBLE_NOTHING, 0u);
     if (in_picture)
         visible = imageLoad(visible_primitives, ivec3(pixel - uvec2(0u, first_row), sample_)).xy;
-    // Of misses layers.comp looks at the flags of the material, too.
+    // layers.comp reads the flags of the material, even for misses.
     hits[HIT_TEXELS * k] = uvec4(floatBitsToUint(visible.x != VISIBLE_NOTHING ? 0.0 : -1.0), 0u, visible.y,
                                  visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u);
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Fills the hits of a slice whose primitives the rasteriser found (primary.comp has noted them).
+// Fills the hits of a slice whose primitives the rasteriser found (as noted by primary.comp).
 // Defines: those of common/primary_hit.glsl.
 
 #include "shared/path.h"
@@ -12,7 +12,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // texels: software GL fetches these faster
 layout(std430, binding = BIND_HITS) buffer hit_block { uvec4 hits[]; }; // HIT_TEXELS each
 layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
 
@@ -38,7 +38,7 @@ void main()
     else
 #endif
         found = candidate_triangle(instance_index, primitive, origin, direction, 0.0);
-    // Two compilations of one test may round differently at a rim: a hit stays a hit.
+    // Two compilations of the same test may round differently at a rim: a hit stays a hit.
     found.distance = max(found.distance, origin_t_min.w);
     hit h = surface_of(found, origin, direction, 0.0);
     hits[HIT_TEXELS * k] = uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// All surfaces along a ray, blended front to back: Levoy. Display of Surfaces from Volume Data. 1988, with surfaces for
-// samples. What each hit of a wave sends towards the eye:
+// Blends all surfaces along a ray front to back: Levoy. Display of Surfaces from Volume Data. 1988, with surfaces for
+// samples. Contributions of each hit of a wave:
 //
-//   radiance    emission, the light of every source without shadows, and the environment's irradiance, also
-//               in place of what a mirror would show; times how opaque the surface is
-//   child       straight on, with what is left
+//   radiance    emission, the light of every source without shadows, and the environment's irradiance, also in place of a
+//               mirror's reflection; times the opacity of the surface
+//   child       straight on, with the remaining weight
 //
-// The opacity of blended surfaces is alpha, that of glass the share that it does not transmit; light through glass is
-// tinted as shadow rays are. All other surfaces are made translucent: `layer_opacity`.
+// The opacity of blended surfaces is alpha, that of glass the share that it does not transmit; glass tints light as it
+// tints shadow rays. All other surfaces are made translucent: `layer_opacity`.
 //
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
 
@@ -25,7 +25,7 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
     split parts = split_light(s, view, NoV);
     vec3 origin = off_surface(s, distance_, s.geometric);
-    vec3 mirror = parts.mirror + parts.refracted; // as if the scene were as bright behind glass as before it
+    vec3 mirror = parts.mirror + parts.refracted; // the scene counts as equally bright behind glass and before it
     vec3 scattered = parts.scattered + parts.again + sheen_of(parts);
     vec3 sum = s.emission + s.occlusion * (scattered * environment_irradiance(s.normal) +
                                            passed_of(parts) * environment_irradiance(-s.normal) +
@@ -69,7 +69,7 @@ void main()
         through = vec3(1.0 - layer_opacity);
     }
     vec3 rest = weight * through;
-    bool goes_on = max_component(rest) >= PATH_WEIGHT_MIN; // not if it is NaN
+    bool goes_on = max_component(rest) >= PATH_WEIGHT_MIN; // false for NaN
     if (goes_on)
         add_child(j, p, s, h.distance, direction, rest, true, 0.0);
     radiance[k] = vec4(weight * opacity * (s.unlit ? s.base : lit(p, s, direction, h.distance)),

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// From sums of samples to pixels of the output's format, rows from the top. Linear formats are premultiplied by
-// alpha, RGBA8 is straight, tone-mapped and sRGB. Attachments: depth as it is, normals as unit vectors in 8 bits, shares too.
+// Converts sums of samples to pixels of the output's format, rows from the top. Linear formats are premultiplied by
+// alpha, RGBA8 is straight, tone-mapped and sRGB. Attachments: depth unchanged, normals as unit vectors in 8 bits, shares
+// too.
 
-// The host sets the define FORMAT to one of those below: software GL would run all of them for each pixel.
+// The host sets the define FORMAT to one of those below: software GL would execute all of them for each pixel.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -15,7 +16,7 @@
 #define FORMAT_NORMAL8 4
 #define FORMAT_SHARE8 5
 
-uniform uint pixel_count; // of the band
+uniform uint pixel_count; // pixels of the band
 
 layout(std430, binding = BIND_RESOLVED) writeonly buffer resolved_block { uint resolved[]; };
 
@@ -41,7 +42,7 @@ void main()
 #elif FORMAT == FORMAT_DEPTH32F
     resolved[k] = floatBitsToUint(sum.r);
 #elif FORMAT == FORMAT_NORMAL8
-    float extent = length(sum.xyz); // 0 also where normals cancel each other out
+    float extent = length(sum.xyz); // 0 also where normals cancel out
     vec3 normal = extent > 0.0 ? sum.xyz / extent : vec3(0.0);
     resolved[k] = sum.a > 0.0 ? packUnorm4x8(vec4(normal * 0.5 + 0.5, 1.0)) : 0u;
 #elif FORMAT == FORMAT_SHARE8

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From sums of samples to Y'CbCr 4:2:0 in the rows that server/base/ycbcr.h describes: of the very RGBA8 that
-// resolve.comp gives, so that pictures look alike in every conversion. An item is 8 columns of two rows: two words of
-// luma in each, and one of Cb and of Cr.
+// Converts sums of samples to Y'CbCr 4:2:0 in the rows that server/base/ycbcr.h describes, from the same RGBA8 as
+// resolve.comp's, so that pictures look alike in every conversion. An item is 8 columns of two rows: two words of luma in
+// each, and one of Cb and of Cr.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -9,12 +9,12 @@
 
 #define YCBCR_VIDEO 1u // enum ycbcr
 
-uniform uint row_count; // of the band in the picture; an odd last one stands for two
+uniform uint row_count; // rows of the band in the picture; an odd last one stands for two
 uniform uint ycbcr;
 
 layout(std430, binding = BIND_RESOLVED) writeonly buffer resolved_block { uint resolved[]; };
 
-// Red, green and blue as codes of 8 bits, 0 .. 255. Beyond the picture its edge is repeated.
+// Red, green and blue of a pixel as codes of 8 bits, 0 .. 255. The picture's edge is repeated beyond it.
 vec3 codes_of_pixel(uint x, uint y)
 {
     uvec2 pixel = min(uvec2(x, y), uvec2(frame.width, row_count) - 1u);
@@ -41,7 +41,7 @@ void main()
     // Blue less luma lies within 1 - weights.b of 0, red less luma within 1 - weights.r.
     vec2 chroma_scale = (video ? 224.0 / 255.0 : 1.0) * 0.5 / (1.0 - weights.br);
 
-    vec4 luma[4], cb, cr; // of luma: left and right of the upper row, then of the lower one
+    vec4 luma[4], cb, cr; // luma: left and right of the upper row, then of the lower one
     vec3 before = vec3(0.0);
     if (video) {
         uint x = max(first.x, 1u) - 1u;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Shared by the integrators' shading passes: a hit of the wave in; its children and shadow rays out, with the light
-// that these bring if nothing is in the way. Hits are in the order of the list, j is the place in it.
+// Input and output of the integrators' shading passes: a hit of the wave in; its children and shadow rays out, with the
+// light of these if they are not blocked. Hits are in the order of the list, j is the place in it.
 //
 // Defines: HAS_TIMES something moves: rays have a time; those of render/light_layers.glsl.
 
@@ -17,13 +17,13 @@
 
 layout(local_size_x = 64) in;
 
-uniform uint first_slot; // of the slice
+uniform uint first_slot; // first slot of the slice
 uniform uint wave_number;
 uniform uint last_wave;  // 1: no children
 uniform uint children_a_hit; // capacity
 uniform uint shadow_rays_a_hit;
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // texels: software GL fetches these faster
 layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
 layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
 layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
@@ -55,7 +55,7 @@ path path_at(uint k)
     return path_of_texels(texelFetch(paths, texel), texelFetch(paths, texel + 1), texelFetch(paths, texel + 2));
 }
 
-// The pixel and sample of a path, for common/sequence.glsl. Of a picture of tiles (render/tiles.glsl) it is another pixel,
+// Pixel and sample of a path, for common/sequence.glsl. In a picture of tiles (render/tiles.glsl) it is another pixel,
 // but no two have the same.
 uvec2 path_seed(path p)
 {
@@ -84,8 +84,8 @@ surface surface_of_path(path p, hit h, ray r)
     return s;
 }
 
-// The weight of the light that a surface sends along a path: that of the path, less what the body absorbs whose surface
-// is met from inside. What lies within a body is not told from what lies in air.
+// Weight of the light that a surface sends along a path: the path's, less the absorption of the body whose surface is met
+// from inside. A body within another body counts as in air.
 vec3 weight_at(path p, surface s, float distance_)
 {
     vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
@@ -96,7 +96,7 @@ vec3 weight_at(path p, surface s, float distance_)
     return weight;
 }
 
-// The cone of a ray that a surface sends on. `solid_angle`: see add_child().
+// Cone of a ray that a surface sends on. `solid_angle`: see add_child().
 vec2 cone_sent_on(vec2 cone, surface s, vec3 direction, float solid_angle)
 {
     float cosine = dot(direction, s.normal);
@@ -109,15 +109,16 @@ vec2 cone_sent_on(vec2 cone, surface s, vec3 direction, float solid_angle)
     return solid_angle > 0.0 ? cone_scattered(cone, solid_angle) : cone;
 }
 
-// The directions that the surface's roughness spreads a mirrored or refracted ray over, steradians. A smooth one: 0.
+// Solid angle over which the surface's roughness spreads a mirrored or refracted ray, steradians; for a smooth one 0.
 float rough_solid_angle(surface s, vec3 direction)
 {
     return lobe_solid_angle(facets_alpha(s), turn_of(s, dot(direction, s.geometric) > 0.0));
 }
 
-// Of the directions that one of the pixel's samples stands for, if it was chosen with a density of 1 / `solid_angle`.
-// The cone is half as wide as its share: at full width the noise is 2 dB lower still, but models whose textures are
-// atlases are 1 dB farther from the truth at 64 samples, as a wide footprint reaches over other parts of the image.
+// Solid angle of the directions that one of the pixel's samples represents, if it was chosen with a density of 1 /
+// `solid_angle`. The cone is half as wide as its share: at full width the noise is 2 dB lower still, but models whose
+// textures are atlases are 1 dB farther from the truth at 64 samples, as a wide footprint extends over other parts of the
+// image.
 float sample_solid_angle(float solid_angle)
 {
     return square(0.5 * frame.far_width.y) * solid_angle;
@@ -128,7 +129,7 @@ vec3 off_surface(surface s, float distance_, vec3 side)
     return s.position + PATH_OFFSET * max(max_component(abs(s.position)), distance_) * side;
 }
 
-// Of a shadow ray in a direction. `origin`: of those on the viewer's side.
+// Origin of a shadow ray in a direction. `origin`: of those on the viewer's side.
 vec3 origin_towards(surface s, vec3 origin, float distance_, vec3 direction)
 {
 #ifdef HAS_DIFFUSE_TRANSMISSION
@@ -140,15 +141,16 @@ vec3 origin_towards(surface s, vec3 origin, float distance_, vec3 direction)
 
 uint child_count = 0u, child_octant = 0u;
 
-// A child without weight or direction, or beyond the depth, is left out. All else is the parent's. `solid_angle`: of the
-// directions that it stands for, steradians; 0: a smooth mirror or window sends it on, or it goes straight on.
+// Adds a child; one without weight or direction, or beyond the depth, is skipped. Other values are the parent's.
+// `solid_angle`: of the directions that it represents, steradians; 0: a smooth mirror or window sends it on, or it goes
+// straight on.
 void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight,
                float solid_angle)
 {
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
     if (!(dot(direction, direction) > 0.5) || last_wave != 0u || bounces > frame.depth)
         return;
-    if (!(max_component(weight) > 0.0)) // also if it is NaN
+    if (!(max_component(weight) > 0.0)) // true for NaN too
         return;
     vec3 side = dot(direction, s.geometric) > 0.0 ? s.geometric : -s.geometric;
     path p = parent;
@@ -156,7 +158,7 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     p.weight_g = weight.g;
     p.weight_b = weight.b;
     vec2 cone = cone_at(parent, distance_);
-#ifdef HAS_TEXTURES // only they are filtered by it
+#ifdef HAS_TEXTURES // only textures are filtered by it
     if (!straight)
         cone = cone_sent_on(cone, s, direction, solid_angle);
 #endif
@@ -186,7 +188,7 @@ uint group_of_instance(uint instance_index)
     return 0u;
 }
 
-// What an integrator writes to radiance[]; ground.comp replaces it where the hit is the ground's.
+// Notes light that an integrator writes to radiance[]; ground.comp replaces it where the hit is the ground's.
 void note_sent(path p, hit h, light_part part, vec3 light)
 {
     if ((h.material & HIT_GROUND) == 0u)
@@ -206,22 +208,24 @@ void put_light_sample(uint place, vec4 light)
 
 void no_shadow_ray(uint place)
 {
-    if (shadow_rays_a_hit == 0u) // nor a place for one
+    if (shadow_rays_a_hit == 0u) // there is no place for one either
         return;
     shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
-    put_light_sample(place, vec4(0.0)); // a dead ray meets nothing, and so lets everything through
+    put_light_sample(place, vec4(0.0)); // a dead ray is not blocked, so it must have no light
 #ifdef HAS_TIMES
     shadow_times[place] = 0.0;
 #endif
 }
 
-// `arriving`: the radiance at the eye if the ray reaches the light. False if it is zero. `t_min`: 0 or RAY_STOPS_T_MIN.
+// Adds a shadow ray. `arriving`: the radiance at the eye if the ray reaches the light. False if it is zero. `t_min`: 0 or
+// RAY_STOPS_T_MIN.
 bool add_shadow_ray_from(uint place, path p, vec3 origin, vec3 direction, float t_min, float distance_, vec3 arriving)
 {
-    bool alive = max_component(arriving) > 0.0; // not if it is NaN
+    bool alive = max_component(arriving) > 0.0; // false for NaN
     if (!alive && shadow_rays_a_hit == 0u)
         return false;
-    // Short of the light, as a model may have a surface at its position. One of both, as each store is code.
+    // The ray ends short of the light, as a model may have a surface at its position. Both cases share one store, as each
+    // store is code.
     vec4 start = vec4(origin, t_min), way = vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET));
     shadow_rays[place] = ray(alive ? start : vec4(0.0), alive ? way : vec4(0.0, 0.0, 1.0, -1.0));
     put_light_sample(place, alive ? vec4(arriving, 0.0) : vec4(0.0));
@@ -236,7 +240,7 @@ bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float dista
     return add_shadow_ray_from(place, p, origin, direction, 0.0, distance_, arriving);
 }
 
-// `first`: the first batch of the wave's shadow rays, which also emits the children.
+// Notes the children of a hit. `first`: the first batch of the wave's shadow rays, which also emits the children.
 void note_children(uint j, bool first, uint shadow_rays_alive)
 {
     uint before = first ? child_count | child_octant << CHILD_OCTANT_SHIFT : child_counts[j];

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The number of shadow rays of a batch: so many of each hit. Only where the host does not know how many hits there are.
+// Counts the shadow rays of a batch: the same number for each hit. Runs only where the host does not know the number of
+// hits.
 #include "render/wave_counts.glsl"
 
 layout(local_size_x = 1) in;
 
 uniform uint batch_rays;
-uniform uint all_count; // 1: they count in the slice's sum as they are, dead ones too
+uniform uint all_count; // 1: they count in the slice's sum as they are, dead ones included
 
 void main()
 {

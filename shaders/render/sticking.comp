@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-// How much of each sample of a slice follows the eye. It travels as means of blocks of 4 x 4 pixels, so one pixel of
-// each 2 x 2 stands for all, the first: four slots that lie side by side.
+// Writes the share of each sample of a slice that depends on the eye. It is sent as means of blocks of 4 x 4 pixels, so
+// the first pixel of each 2 x 2, four consecutive slots, represents all of them.
 //
-// Defines: STICKS the integrator shows what follows the eye; those of common/material.glsl and common/light.glsl.
+// Defines: STICKS the integrator shows light that depends on the eye; those of common/material.glsl and
+// common/light.glsl.
 
 #include "shared/layers.h"
 #include "common/sticking.glsl"
 #include "render/shade.glsl"
 
 uniform uint slot_count;
-uniform uint first_sum; // of the plane
+uniform uint first_sum; // first sum of the plane
 
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
 
@@ -28,7 +29,7 @@ float share_of(uint k)
 void main()
 {
     uint item = item_index(), shift = frame.sample_shift, sample_ = item & (1u << shift) - 1u;
-    // Of the picture; a slice may begin or end within four.
+    // Groups of four slots in the picture; a slice may begin or end within one.
     uint four = 4u * ((first_slot >> 2) + (item >> shift));
     uint begin = max(four, first_slot) - first_slot, end = min(four + 4u - first_slot, slot_count);
     if (begin >= end)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How far the pixels of each tile are off, in the mean: server/render/picture_noise.h.
+// Estimates the mean error of the pixels of each tile: server/render/picture_noise.h.
 
 #include "shared/path.h"
 #include "common/slots.glsl"
@@ -7,8 +7,8 @@
 
 layout(local_size_x = 64) in;
 
-uniform uint first_tile, tile_count;  // of the band
-uniform uint samples, half_samples;   // of each pixel; half_samples 0: nothing is measured
+uniform uint first_tile, tile_count;  // tiles of the band
+uniform uint samples, half_samples;   // per pixel; half_samples 0: nothing is measured
 uniform uint keep;                    // 1: the sums become those of the first half
 uniform float exposure;
 
@@ -17,7 +17,7 @@ layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block {
 layout(std430, binding = BIND_HALVES) buffer half_block { vec4 halves[]; };
 layout(std430, binding = BIND_TILE_ERRORS) writeonly buffer error_block { float tile_errors[]; };
 
-const float DARK = 0.03; // of white: beneath it errors count as they are, not relative to what is there
+const float DARK = 0.03; // share of white: errors below it count absolutely, not relative to the light
 
 void main()
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The lists of the wave in hand: how many rays, hits and blocks of them there are. Only a pass that reads them includes
-// it: Mesa's zink (22.3) takes one uniform block for another where a program declares one that it does not read.
+// Lists of the current wave: its numbers of rays, hits and blocks. Only passes that read them include this file: Mesa's
+// zink (22.3) confuses uniform blocks where a program declares one that it does not read.
 #include "shared/wave.h"
 
 layout(std140, binding = UNIFORM_WAVE) uniform wave_block { wave_state wave_in_block; };

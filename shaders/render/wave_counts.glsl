@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// For the passes that make the lists of a wave.
+// Counts of a wave's lists, for the passes that make these.
 #include "shared/path.h"
 #include "shared/wave.h"
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The radiance of each hit of a wave towards the eye, and its rays.
+// Computes the radiance of each hit of a wave towards the eye, and its rays.
 //
-//   radiance    emission, and a constant ambient term in Whitted's sense: the environment's irradiance, not
-//               shadowed but for the occlusion texture
+//   radiance    emission, and a constant ambient term in Whitted's sense: the environment's irradiance, shadowed by the
+//               occlusion texture alone
 //   shadow rays one to every light, with its unshadowed radiance
 //   children    straight on (alpha blending), mirrored, refracted
 //
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl; SENDS_NOTHING no surface is
 // see-through or smooth enough for a mirror ray: there are no children, whose code is a fifth of all.
 //
-// Lights beyond the first batch come in further passes with first_ray > 0, which make shadow rays alone.
+// Further passes, with first_ray > 0, make the shadow rays of lights beyond the first batch, and nothing else.
 
 #include "common/environment.glsl"
 #include "common/scattering.glsl"
@@ -17,13 +17,13 @@
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
-uniform uint first_ray, batch_rays; // a light each
+uniform uint first_ray, batch_rays; // lights, each with a ray
 
-// What a hit sends on, in this order. Each has a bit, so that one loop makes the children: code is compiled once, and software
-// GL skips it for a group of hits that sends nothing on.
+// Children of a hit, in this order. Each has a bit, so that one loop makes all: its code is compiled once, and software
+// GL skips it for a group of hits without children.
 const uint SENDS_STRAIGHT = 1u, SENDS_COAT = 2u, SENDS_MIRRORED = 4u, SENDS_BENT = 8u;
 
-// Where ambient light comes from: one loop for the same reason.
+// Sources of ambient light: one loop for the same reason.
 const uint FROM_AROUND = 1u, FROM_MIRRORED = 2u, FROM_BEHIND = 4u, FROM_COAT = 8u;
 
 struct sent {
@@ -37,7 +37,7 @@ struct sent {
 
 uint sends(uint which, vec3 weight)
 {
-    return max_component(weight) >= PATH_WEIGHT_MIN ? which : 0u; // not `<`: NaN sends nothing
+    return max_component(weight) >= PATH_WEIGHT_MIN ? which : 0u; // not `<`: NaN has no child
 }
 
 void add_children(uint j, path parent, surface s, float distance_, sent on)
@@ -62,8 +62,8 @@ void add_children(uint j, path parent, surface s, float distance_, sent on)
     }
 }
 
-// Returns the number of the batch's live shadow rays. `asks`: whether there are any; their places are written all the same,
-// here, as each store is code.
+// Makes shadow rays to the lights; returns the number of the batch's live ones. `asks`: whether there are any; their
+// places are written all the same, here, as each store is code.
 uint ask_for_lights(uint j, bool asks, path parent, surface s, split parts, vec3 view, float NoV, vec3 weight,
                     float distance_)
 {
@@ -104,13 +104,13 @@ vec3 shade(surface s, split parts, vec3 direction, vec3 weight, inout sent on)
 #endif
 #ifndef SENDS_NOTHING
     on.bent = bent_direction(s, index_ratio(s), direction, s.normal, s.normal);
-    // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
+    // Light that is totally reflected, or sent back by a tilted normal, is mirrored.
     bool through = dot(on.bent, s.geometric) < 0.0;
     mirror += through ? vec3(0.0) : parts.refracted;
     vec3 in_mirror = mirror * parts.mirror_ray;
 #ifdef HAS_CLEARCOAT
     on.coat_weight = weight * coat_ray;
-    // One ray for both mirrors where they are one; over a refracted ray there is no room for two.
+    // Both mirrors share a ray where their directions agree; beside a refracted ray there is no room for two.
     if (through && max_component(parts.refracted) > 0.0 || dot(on.mirrored, on.coat) > 0.99999)
         in_mirror += coat_ray;
     else

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Paints the edges of triangles black, where the rays of a slice first meet them: the colour of the hit, which multiplies
-// the material's. Every integrator then shades them as it does any surface, and the samples of a pixel smooth them.
+// Paints the edges of triangles black where the rays of a slice first meet them, by the colour of the hit, which
+// multiplies the material's. Integrators then shade them like any surface, and the samples of a pixel smooth them.
 //
-// Of a point on a triangle's plane each barycentric coordinate is linear, 0 on the opposite edge; divided by its change from
-// one pixel to the next it is the distance from that edge in pixels. Baerentzen, Nielsen, Gjoel, Larsen and Christensen.
+// On a triangle's plane each barycentric coordinate is linear, and 0 on the opposite edge; divided by its change from one
+// pixel to the next it is the distance from that edge in pixels. Baerentzen, Nielsen, Gjoel, Larsen and Christensen.
 // Single-pass Wireframe Rendering. 2006, with Igehy's differentials of the eye's rays (Tracing Ray Differentials. 1999,
 // section 3.1) in the place of a rasteriser's derivatives.
 //
@@ -20,13 +20,13 @@
 layout(local_size_x = 64) in;
 
 uniform uint ray_count;
-uniform float half_width; // of a line, pixels
+uniform float half_width; // half width of a line, pixels
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays;
 layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
 layout(std430, binding = BIND_HITS) buffer hit_block { hit hits[]; };
 
-// How far the place on the plane moves where the ray is that of the next pixel along an axis of the view.
+// Displacement of the place on the plane if the ray is that of the next pixel along an axis of the view.
 vec3 moved(vec3 axis_view, vec3 direction, vec3 normal, float pixel)
 {
     vec3 aside = pixel * world_from_view_vector(axis_view);
@@ -65,6 +65,6 @@ void main()
     float nearest = min(pixels_from(b, c - b, normal, place, across, down),
                         min(pixels_from(c, a - c, normal, place, across, down),
                             pixels_from(a, b - a, normal, place, across, down)));
-    if (nearest < half_width) // not if it is NaN
+    if (nearest < half_width) // false for NaN
         hits[k].colour = h.colour & 0xff000000u;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Layers of a picture beside its light, in a slice. */
+/* Layers of a picture besides its light, in a slice. */
 #ifndef FARLIGHT_SHARED_LAYERS_H
 #define FARLIGHT_SHARED_LAYERS_H
 #include "shared/path.h"
@@ -13,7 +13,7 @@
 #define LAYER_BIT_AO 32u
 #define LAYER_BIT_ID 64u
 #define LAYER_BIT_UNKNOWN 128u
-#define LAYER_BITS_SEEN 0xffu /* the beauty, and what describes first surfaces */
+#define LAYER_BITS_SEEN 0xffu /* the beauty, and descriptions of first surfaces */
 #define LAYER_BITS_CRYPTO_OBJECT 0x0700u
 #define LAYER_BITS_CRYPTO_MATERIAL 0x3800u
 #define LAYER_BITS_CRYPTO (LAYER_BITS_CRYPTO_OBJECT | LAYER_BITS_CRYPTO_MATERIAL)
@@ -27,40 +27,40 @@
 #define LAYER_BIT_BACKGROUND (1u << 22)
 #define LAYER_BITS_LIGHT_PARTS (0x7fu << 16) /* parts of the beauty: render/light_layers.glsl */
 #define LAYER_BIT_LIGHT_REST (1u << 23)
-#define LAYER_BITS_LIGHT_GROUPS                                                                                   \
-    (0xffu << 23) /* the same by where light comes from: the rest, then groups from 1 on */
+/* Parts of the beauty by the source of light: the rest, then groups from 1 on. */
+#define LAYER_BITS_LIGHT_GROUPS (0xffu << 23)
 #define LAYER_BITS_LIGHT (LAYER_BITS_LIGHT_PARTS | LAYER_BITS_LIGHT_GROUPS)
 #define LAYER_BITS_ALL (LAYER_BITS_SEEN | LAYER_BITS_CRYPTO | LAYER_BIT_MOTION | LAYER_BITS_LIGHT)
-/* Of an attachment, which no layer beside the beauty goes with: no LAYER. */
+/* Bit of an attachment that excludes all layers but the beauty: no LAYER. */
 #define LAYER_BIT_STICKING (1u << 31)
 
-/* How light reaches the eye: directly, if the first surface sends on what a light has sent to it. */
+/* Ways in which light reaches the eye: direct, if the first surface sends on light from a light source. */
 #define LIGHT_DIRECT 0.0f
 #define LIGHT_INDIRECT 1.0f
 #define LIGHT_TRANSMITTED 2.0f
 #define LIGHT_EMITTED 3.0f
 #define LIGHT_BEHIND 4.0f
-#define LIGHT_KINDS 8.0f /* a kind, plus this times a light group: one number */
+#define LIGHT_KINDS 8.0f /* kind plus this times a light group: one number */
 
-/* Storage buffer: a plane for each layer of the frame but the beauty and those of Cryptomatte, in their order; in
- * it a vec4 for each sample of the slice. With layers of light another: what the first surface did with the light
- * of the sample's path, rgb the share that it mirrored, w 1: it let it through. */
+/* Storage buffer: a plane for each layer of the frame except the beauty and Cryptomatte's, in their order; a
+ * vec4 per sample of the slice in each. With layers of light there is another plane: what the first surface did
+ * with the light of the sample's path, rgb the share that it mirrored, w 1: it let it pass. */
 #define BIND_LAYER_SUMS BIND_PASS_0
 
-/* Storage buffer: what covers each sample of the slice, for Cryptomatte: a plane for each wave of rays that go
- * straight on, in it a uvec4 for each sample: instance as of a hit, material with its HIT bits, bits of the share,
- * 0. Share 0: nothing. */
+/* Storage buffer: the surfaces that cover each sample of the slice, for Cryptomatte: a plane for each wave of
+ * rays that go straight on, a uvec4 per sample in each: instance of a hit, material with its HIT bits, bits of
+ * the share, 0. Share 0: nothing. */
 #define BIND_COVERS BIND_PASS_4
-#define COVERS_MAX 8u   /* waves; behind so many blended surfaces little is left */
-#define CRYPTO_PLANES 3 /* of a kind, with two identifiers each */
+#define COVERS_MAX 8u   /* waves; behind so many blended surfaces little light is left */
+#define CRYPTO_PLANES 3 /* per kind, with two identifiers each */
 
-/* Where an instance is a frame earlier and a frame later; a storage buffer, in the order of the instances. The
- * vertices of its geometry, where that deforms, lie in another: three floats each, those of the frame before it,
+/* Places of an instance a frame earlier and a frame later; a storage buffer, in the order of the instances. The
+ * vertices of its geometry, where that deforms, lie in another: three floats each, those of the previous frame,
  * then those of the next one. */
 struct move {
     vec4 earlier[3]; /* rows of world_from_object */
     vec4 later[3];
-    uint first_vertex; /* its number there, plus 1; 0: the geometry does not deform */
+    uint first_vertex; /* first vertex in that buffer, plus 1; 0: the geometry does not deform */
     uint pad0, pad1, pad2;
 };
 SHARED_SIZE(move, 112)

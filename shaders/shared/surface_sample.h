@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A place on a surface in four words, as a sampled tracer stores it and as a hit with HIT_SAMPLED brings it
- * (shared/hit.h). Shares are what textures and vertex colours give, filtered to the size of a sample; what the
- * material itself says is multiplied when the hit is shaded, so an edit of a material needs no new samples.
+/* Surface sample in four words: a sampled tracer stores it, and a hit with HIT_SAMPLED carries it (shared/hit.h).
+ * Shares come from textures and vertex colours, filtered to the size of a sample; shading multiplies them by the
+ * material's own values, so an edit of a material needs no new samples.
  *
  *   x  bits 0..23 base colour, r g b, sRGB, 8 bits each; 24..31 alpha
  *   y  shading normal, normal and bump maps applied; octahedral, 2 x 16 bit snorm, world space, to the outside

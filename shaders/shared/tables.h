@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* What is small of a scene, in one buffer of RGBA32UI texels: geometries, materials, texture slots, textures,
- * discs and the tables of shared/emitter.h, one table after the other. Each struct is whole texels. */
+/* Small tables of a scene in one buffer of RGBA32UI texels: geometries, materials, texture slots, textures,
+ * discs and the tables of shared/emitter.h, one after the other. Each struct is whole texels. */
 #ifndef FARLIGHT_SHARED_TABLES_H
 #define FARLIGHT_SHARED_TABLES_H
 #include "shared/types.h"
 
-/* The buffer's head: the texels where the tables begin, and struct emitter_starts. The table of the geometries
- * begins behind the head. */
+/* Head of the buffer: the texels where the tables begin, and struct emitter_starts. The table of the geometries
+ * follows the head. */
 struct table_starts {
     uint materials, texture_slots, textures, discs;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From the intersections of a closest-hit wave to hits: the second half of every exact tracer. It is apart from the
-// traversal, whose program stays small, and which need not carry barycentrics.
+// Turns the intersections of a closest-hit wave into hits: the second half of every exact tracer. It is separate from the
+// traversal, whose program stays small, and which need not keep barycentrics.
 //
 // Defines: HAS_SPHERES, HAS_MOTION as the scene has them; those of common/range.glsl and common/surface.glsl.
 #include "common/dispatch.glsl"
@@ -8,11 +8,12 @@
 #include "common/intersection.glsl"
 #include "common/surface.glsl"
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
 #ifdef HAS_MOTION
 layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #endif
-layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
+// three texels per hit; the first one is the intersection
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits;
 
 bool is_triangle(candidate found)
 {
@@ -41,7 +42,8 @@ void main()
         found.barycentrics =
             candidate_triangle(found.instance_index, found.primitive, origin, direction, time).barycentrics;
     hit h = surface_of(found, origin, direction, time);
-    uint known = intersection.y & (HIT_UNKNOWN | HIT_LAYER_MASK); // of a tracer that knows what a view sees, else 0
+    // bits of a tracer over a view's visible surfaces, else 0
+    uint known = intersection.y & (HIT_UNKNOWN | HIT_LAYER_MASK);
     imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material | known, h.primitive, h.instance));
     imageStore(hits, int(3u * k + 1u), h.uv01_or_sample);
     imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));

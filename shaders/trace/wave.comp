@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One wave of rays through one acceleration structure: the entry point of every <tracer>/traverse.glsl.
+// Traces a wave of rays through an acceleration structure: the entry point of every <tracer>/traverse.glsl.
 //
 // The host (trace/program.c) sets the defines:
 //   TRAVERSE             "bvh/traverse.glsl", the structure's traversal
@@ -10,7 +10,7 @@
 //   HAS_MOTION           something moves while the shutter is open, and rays have times
 //   HAS_CUTOUT           some material is alpha mode mask
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
-//   HAS_TRANSMISSION     and tints them on the way
+//   HAS_TRANSMISSION     some of these tint them
 //   EVEN_ALPHA           none of these has a texture or vertex colours
 //   HAS_COUNTS           only the device knows how many rays there are
 //   PACKET_RAYS        how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
@@ -21,18 +21,18 @@
 //   void trace_closest_rays(trace_ray r[PACKET_RAYS], inout candidate best[PACKET_RAYS]);
 //   void trace_any_rays(trace_ray r[PACKET_RAYS], inout vec3 optical_depth[PACKET_RAYS]);
 // It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
-// primitive against a ray with cutouts and tints accounted for. A traversal that intersects by its own means calls
-// offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
-// (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
-// offer_any adds to `optical_depth`; trace_any returns true, and may stop, once offer_any did: no light is left.
+// primitive against a ray with cutouts and tints accounted for. A traversal with an intersection test of its own calls
+// offer_closest / offer_any with the candidate, or, where the scene has neither cutouts nor translucent surfaces (no
+// define), may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc. offer_any adds
+// to `optical_depth`; trace_any returns true, and may stop, once offer_any did: no light is left.
 //
-// A traverse.glsl may define RAYS_GO_ON: several dispatches are of the same rays, which go on with what they have found; the
-// first one has is_first_part 1. BIND_OPTICAL_DEPTHS is then a buffer with a vec4 for each ray of the dispatch.
+// A traverse.glsl may define RAYS_GO_ON: several dispatches trace the same rays, which keep their findings; the first one
+// has is_first_part 1. BIND_OPTICAL_DEPTHS is then a buffer with a vec4 for each ray of the dispatch.
 //
-// This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the answer: a
-// visibility, or an intersection (shared/hit.h) of which surface.comp makes a hit. Some of several rays may be dead:
+// This file handles everything else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and the answer: a
+// visibility, or an intersection (shared/hit.h) that surface.comp turns into a hit. Some of several rays may be dead:
 // they have t_max = -1 and t_min = 0, direction (1 0 0) and can hit nothing, so a traversal must not rely on ray 0 for
-// the others. Groups in which all are dead do not reach it.
+// the others. Groups of dead rays alone do not reach it.
 #include "shared/bindings.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
@@ -46,12 +46,12 @@
 #endif
 #include TRAVERSE
 
-// A traverse.glsl may define INTERSECTION_FLAGS, what the second word of an intersection is (shared/hit.h).
+// Second word of an intersection (shared/hit.h); a traverse.glsl may define it.
 #ifndef INTERSECTION_FLAGS
 #define INTERSECTION_FLAGS 0u
 #endif
 
-layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each: software GL fetches those faster
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray: software GL fetches these faster
 #ifdef HAS_MOTION
 layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #endif
@@ -68,7 +68,8 @@ layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer intersecti
 #ifdef RAYS_GO_ON
 uniform uint is_first_part;
 #ifdef ANY_HIT
-layout(std430, binding = BIND_OPTICAL_DEPTHS) buffer depth_block { vec4 optical_depths[]; }; // visibilities are rounded
+// exact, as visibilities are rounded
+layout(std430, binding = BIND_OPTICAL_DEPTHS) buffer depth_block { vec4 optical_depths[]; };
 #endif
 #endif
 
@@ -110,7 +111,7 @@ vec3 found_before(uint ray_index, trace_ray r)
     return vec3(0.0);
 }
 
-// Nothing stops a dead ray.
+// A dead ray has full transmittance.
 void store_visibility(uint ray_index, vec3 optical_depth)
 {
 #ifdef RAYS_GO_ON
@@ -147,7 +148,7 @@ void store_intersection(uint ray_index, candidate best)
 
 #endif
 
-// Not one that goes on.
+// Whether the dispatch is the first one of its rays.
 bool is_new()
 {
 #ifdef RAYS_GO_ON
@@ -210,7 +211,7 @@ void look_at_discs(inout trace_ray r[PACKET_RAYS], inout found_type found[PACKET
 #ifdef ANY_HIT
             if (discs_any(r_i, found_i)) {
                 found_i = vec3(OPTICAL_DEPTH_MAX);
-                r_i.t_max = -1.0; // nothing can be hit any more
+                r_i.t_max = -1.0; // ends the ray
                 r_i.t_min = 0.0;
             }
 #else

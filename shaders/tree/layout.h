@@ -3,22 +3,22 @@
  * top tree over the instances; both of the same elements, traversed by links alone (no stack).
  *
  * A tree of n elements is stored BVH_OCTANTS times, once for each sign of a direction's components, each time in
- * the depth-first order that meets nearer children first. So the element that follows a hit is the next one, and
- * an element needs one link alone: where to go on after a miss (a leaf goes on at the next either way). Octant o:
+ * the depth-first order that meets nearer children first. So the element after a hit is the next one, and an
+ * element needs only one link: the element after a miss (after a leaf it is the next one in any case). Octant o:
  * bit 0: x is negative, 1: y, 2: z. A tree that begins at element f has octant o's copy at BVH_OCTANTS f + o n.
  * Trees that no ray traverses by its direction (trace/rayspace, and spheres) have octant 0's copy alone, at f.
  *
- * Two forms of element. Packed: boxes on a grid of 65536 cells an axis that spans the tree, one texel. Whole:
- * boxes or spheres in floats, two texels; for spheres, and for a scene with a tree that has more detail than its
- * grid. Why so: measured on software GL with 146K triangles, a traversal step is bound by its texel fetches and
- * not by its arithmetic; elements of 32 bytes with links of 8 beside them, stored once, took three fetches a step.
- */
+ * Two forms of element. Packed: boxes on a grid of 65536 cells per axis that spans the tree, one texel. Whole:
+ * boxes or spheres in floats, two texels; for spheres, and for a scene with a tree that has finer detail than its
+ * grid. The reason: measured on software GL with 146K triangles, a traversal step is bound by its texel fetches
+ * and not by its arithmetic; elements of 32 bytes with links of 8 beside them, stored once, took three fetches per
+ * step. */
 #ifndef FARLIGHT_SHADERS_TREE_LAYOUT_H
 #define FARLIGHT_SHADERS_TREE_LAYOUT_H
 #include "shared/types.h"
 
-/* A texel of an RGBA32UI texel buffer. Each axis: cell of the corner that rays of this octant reach first, and,
- * times 65536, of the other corner. */
+/* A packed element, one texel of an RGBA32UI texel buffer. Each axis: cell of the corner that rays of this
+ * octant reach first, and, times 65536, of the other corner. */
 struct bvh_packed_element {
     uint corners_x, corners_y, corners_z;
     uint link;
@@ -26,8 +26,8 @@ struct bvh_packed_element {
 SHARED_SIZE(bvh_packed_element, 16)
 #define BVH_GRID_CELLS 65535u
 
-/* Two texels.
- * Box: lower and upper corner. Sphere: centre in `lower`, radius in `upper_x`; y and z are 0. */
+/* A whole element, two texels. Box: lower and upper corner. Sphere: centre in `lower`, radius in `upper_x`; y
+ * and z are 0. */
 struct bvh_element {
     float lower_x, lower_y, lower_z;
     uint link;
@@ -37,9 +37,9 @@ struct bvh_element {
 SHARED_SIZE(bvh_element, 32)
 #define BVH_OCTANTS 8u
 
-/* A link of kind 0 is that of an inner element: where to go on after a miss, counted from the copy's first
- * element; the number of elements: this tree is done. Else the element is a leaf: kind (2 bits), count - 1 (3
- * bits), first primitive in the tree's order or instance (27 bits). */
+/* Link of an element. Kind 0: an inner element; the element after a miss, counted from the copy's first one;
+ * the number of elements: the tree is finished. Other kinds: a leaf: kind (2 bits), count - 1 (3 bits), first
+ * primitive in the tree's order or instance (27 bits). */
 #define BVH_LEAF_KIND_SHIFT 30u
 #define BVH_LEAF_TRIANGLES 1u
 #define BVH_LEAF_SPHERES 2u
@@ -49,15 +49,15 @@ SHARED_SIZE(bvh_element, 32)
 #define BVH_LEAF_FIRST_MASK 0x07ffffffu
 #define BVH_LEAF_MAX 8u /* primitives */
 
-/* The other half of a transform element: the data for entering an instance. Texels of an RGBA32UI buffer. */
+/* Transform element: the data for entering an instance. Texels of an RGBA32UI buffer. */
 struct bvh_transform {
     vec4 object_from_world[3];
     float grid_lower_x, grid_lower_y, grid_lower_z; /* object space; packed elements count cells from here */
-    uint close_texels;   /* from a triangle to itself as the shutter closes; 0: the shape stays meanwhile */
+    uint close_texels;   /* offset from a triangle to itself at shutter close; 0: the shape stays meanwhile */
     vec4 cells_per_unit; /* w unused */
-    uint first_element;  /* of the geometry's tree, in the element buffer */
+    uint first_element;  /* first element of the geometry's tree, in the element buffer */
     uint element_count;
-    uint first_texel;     /* of the geometry's primitives, in the primitive buffer */
+    uint first_texel;     /* first texel of the geometry's primitives, in the primitive buffer */
     uint first_primitive; /* scene-wide */
 };
 SHARED_SIZE(bvh_transform, 96)
@@ -67,24 +67,24 @@ SHARED_SIZE(bvh_transform, 96)
  * driver may flush a small integer, which is a denormal as a float. Texels:
  *   triangle  3 texels: corners; w of the first: bits of the primitive's number in its geometry
  *   sphere    2 texels: centre and radius; x of the second: bits of the number
- * Triangles of a geometry that deforms come twice: all as the shutter opens, then all as it closes. */
+ * Triangles of a geometry that deforms are stored twice: all at shutter open, then all at shutter close. */
 #define BVH_TRIANGLE_TEXELS 3u
 #define BVH_SPHERE_TEXELS 2u
 
-/* An element as the refit of a deformed geometry's tree (shaders/tree/refit_bounds.comp) reads it. Texels of an
+/* Input of the refit of a deformed geometry's tree (shaders/tree/refit_bounds.comp): an element. Texels of an
  * RGBA32UI buffer, elements in the order of their height above the leaves. */
 struct bvh_refit_record {
-    uint element; /* by the order of octant 0, in which a node's children follow it */
+    uint element; /* in the order of octant 0, in which a node's children follow it */
     uint size;    /* elements of its subtree, itself included */
     uint leaf;    /* its link, 0: an inner one */
     uint pad;
-    uvec4 places_0123, places_4567; /* in the order of each octant */
+    uvec4 places_0123, places_4567; /* places in the order of each octant */
 };
 SHARED_SIZE(bvh_refit_record, 48)
 #define BVH_REFIT_TEXELS 3
-/* The box of each element while it is refitted: texels of 4 words, by the order of octant 0: lower
- * corner and the size of its subtree; upper corner; (floats) surfaces of all boxes of its subtree, and of each of
- * its triangles' own box. */
+/* Box of an element during a refit: texels of 4 words, in the order of octant 0: lower corner and the size of
+ * its subtree; upper corner; (floats) surfaces of all boxes of its subtree, and of each of its triangles' own
+ * box. */
 #define BVH_REFIT_BOX_TEXELS 3u
 
 #endif

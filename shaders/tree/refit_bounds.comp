@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Boxes of a tree whose triangles have moved, bottom-up: one dispatch for the leaves, which writes their triangles
-// where the traversal reads them too, then one for each level above them (trace/tree/build_refit.c). Order and links of
-// the tree stay.
+// Refits the boxes of a tree whose triangles have moved, bottom-up: one dispatch for the leaves, which also writes their
+// triangles where the traversal reads them, then one for each level above them (trace/tree/build_refit.c). The order and
+// links of the tree stay.
 //
 // The output is a storage buffer: measured on software GL, it takes 0.7 of the time of an image.
 //
@@ -14,13 +14,13 @@ layout(binding = UNIT_TRACER_0) uniform usamplerBuffer records; // bvh_refit_rec
 layout(std430, binding = BIND_TRACER_1) buffer box_block { uvec4 boxes[]; };
 uniform uint first_record;
 uniform uint record_count;
-uniform uint first_box; // texel where this tree's begin
+uniform uint first_box; // texel of this tree's first box
 
 const float FAR = 3.402823466e38;
 
 struct box {
     vec3 lower, upper;
-    vec2 surfaces; // of all boxes below it; of each triangle's own
+    vec2 surfaces; // sum over all boxes below it; over each triangle's own
 };
 
 box empty_box()
@@ -34,7 +34,7 @@ float surface_of(box b)
     return extent.x >= 0.0 ? extent.x * extent.y + extent.y * extent.z + extent.z * extent.x : 0.0;
 }
 
-// NaN is left out.
+// Includes the corners in the box, except NaN.
 void include(inout box b, vec3 lower, vec3 upper)
 {
     b.lower = mix(b.lower, lower, lessThan(lower, b.lower));
@@ -55,10 +55,10 @@ void store(uvec4 record, box b)
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer corners; // vertices of the mesh and number of each triangle
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;
 layout(std430, binding = BIND_TRACER_0) writeonly buffer primitive_block { uvec4 primitives[]; }; // tree/layout.h
-uniform uint first_texel;  // of this tree's
-uniform uint close_texels; // from a triangle to itself as the shutter closes
-uniform uint first_vertex; // of the mesh in `positions`
-uniform uint close_offset; // of vertices, as in struct geometry
+uniform uint first_texel;  // first texel of this tree's primitives
+uniform uint close_texels; // offset from a triangle to itself at shutter close
+uniform uint first_vertex; // first vertex of the mesh in `positions`
+uniform uint close_offset; // offset of vertices at shutter close, as in struct geometry
 
 void move(uint texel, ivec3 vertices, uint number, inout box b)
 {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// From boxes (refit_bounds.comp) to elements as the traversal reads them, in all octants' copies. The C twin is
+// Writes boxes (refit_bounds.comp) as elements for the traversal, in all octants' copies. Its twin in C is
 // bvh_write_element() in trace/tree/build_element.c.
 //
-// Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none; BVH_ONE_ORDER there is octant 0's copy alone.
+// Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none; BVH_ONE_ORDER there is only octant 0's copy.
 #include "tree/layout.h"
 #include "common/dispatch.glsl"
 #include "shared/bindings.h"
@@ -12,7 +12,7 @@ layout(binding = UNIT_TRACER_1) uniform usamplerBuffer boxes;
 layout(std430, binding = BIND_TRACER_0) writeonly buffer element_block { uvec4 elements[]; };
 uniform uint record_count;
 uniform uint first_box;
-uniform uint first_texel; // of the tree's elements
+uniform uint first_texel; // first texel of the tree's elements
 uniform vec3 grid_lower, cells_per_unit;
 
 #ifdef BVH_ONE_ORDER
@@ -27,7 +27,7 @@ const float PAD_MIN = 1.17549435e-38;
 const float GRID_PAD = 0.0625;
 const float CELLS = float(BVH_GRID_CELLS);
 
-// Written so that NaN makes the box larger.
+// The negated comparisons make the box larger for NaN.
 uint cell_below(float x)
 {
     return x > 0.0 ? uint(min(x, CELLS)) : 0u;

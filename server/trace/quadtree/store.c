@@ -9,9 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-#define UNIT_OF_DIAGONAL                                                                                          \
-    0.05f                /* distance at which w is 1: slopes of w then use the full precision of half             \
-                            floats */
+/* Distance at which w is 1: slopes of w then use the full precision of half floats. */
+#define UNIT_OF_DIAGONAL 0.05f
 #define DOUBLED_AT 0.25f /* distance in diagonals at which bounds that grow with distance have doubled */
 #define CUBE_TEXELS_MAX 1024u
 #define CUBE_TEXELS_MIN 256u

@@ -17,9 +17,8 @@
 
 #define TASK_PRIMITIVES 4096u /* smaller ranges stay with their thread */
 #define STACK_DEPTH 40        /* the smaller half comes first: at most one level for each doubling of the range */
-#define BLOCK_NODES                                                                                               \
-    512u               /* nodes that a thread reserves at a time; an even number, as children come in             \
-                          pairs */
+/* Nodes that a thread reserves at a time; an even number, as children come in pairs. */
+#define BLOCK_NODES 512u
 #define FIRST_CHILD 2u /* even, so that a pair shares a cache line */
 
 /* Maximum of ranges that all threads cut together. */
