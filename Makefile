@@ -92,8 +92,8 @@ EDIT_SRC := $(call sources,client/edit,c)
 CLI_SRC := $(call sources,client/cli,c)
 IMPORT_C := $(call sources,client/import,c)
 # Modules of the helper programs need hundreds of libraries, and are loaded only when they are used.
-TEXTURE_CXX := client/import/texture.cpp
-ASSIMP_CXX := client/import/assimp_library.cpp
+TEXTURE_CXX := client/import/image/module.cpp
+ASSIMP_CXX := client/import/assimp/module.cpp
 IMPORT_CXX := $(filter-out $(TEXTURE_CXX) $(ASSIMP_CXX),$(call sources,client/import,cpp))
 EXPORT_C := $(call sources,client/output,c)
 # It includes the others of its folder.
@@ -315,7 +315,7 @@ $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode e
   warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp) $(SERVING_WRAP)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o) $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ) $(B)/tests/fixtures/frame_hooks.o
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(B)/client/import/model/closed.o $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ) $(B)/tests/fixtures/frame_hooks.o
 # Measurements of the benchmark register themselves (tests/bench/bench.h).
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c,$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_IMPORT_FORMAT_H
 #define FARLIGHT_IMPORT_FORMAT_H
 
-#include "assimp.h"
+#include "import/assimp/library.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -2,17 +2,20 @@
 /* farlight-import: turns a model file into the protocol's messages and speaks them over a socket that the program
  * that started it has connected already. A program of its own so that nothing else links the libraries that read
  * hostile files, and so that it can give up its rights before it does. */
-#include "formats.h"
-#include "import.h"
+#include "import/assimp/import.h"
+#include "import/gltf/import.h"
+#include "import/nff/import.h"
+#include "import/obj/import.h"
+#include "import/model/scene.h"
 #include "helper/module.h"
 #include "helper/sandbox.h"
-#include "model.h"
-#include "origin.h"
+#include "import/model/edits.h"
+#include "import/model/origin.h"
 #include "send.h"
 #include "sky.h"
 #include "source.h"
-#include "texture.h"
-#include "threemf.h"
+#include "import/image/texture.h"
+#include "import/threemf/import.h"
 #include "protocol/common/clock.h"
 #include "protocol/version.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "send.h"
 
-#include "model.h"
+#include "import/model/edits.h"
 
 #include "protocol/framing.h"
 

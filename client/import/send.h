@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_IMPORT_SEND_H
 #define FARLIGHT_IMPORT_SEND_H
 
-#include "import.h"
+#include "import/model/scene.h"
 
 struct sender {
     int socket;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "sky.h"
 
-#include "half.h"
-#include "placement.h"
+#include "import/image/half.h"
+#include "import/model/placement.h"
 #include "shaders/shared/sky.h"
 
 #include <math.h>

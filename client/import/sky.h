@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_IMPORT_SKY_H
 #define FARLIGHT_IMPORT_SKY_H
 
-#include "import.h"
+#include "import/model/scene.h"
 
 /* After all models. Not where a file says what is around it, nor in a room that a camera of the file is in. */
 void import_add_sky(struct import_scene *scene);

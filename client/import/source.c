@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "source.h"
 
-#include "model.h"
-#include "placement.h"
+#include "import/model/edits.h"
+#include "import/model/placement.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -5,9 +5,9 @@
 #ifndef FARLIGHT_IMPORT_SOURCE_H
 #define FARLIGHT_IMPORT_SOURCE_H
 
-#include "files.h"
+#include "import/model/files.h"
 #include "format.h"
-#include "import.h"
+#include "import/model/scene.h"
 
 #define SOURCES_MAX 64
 

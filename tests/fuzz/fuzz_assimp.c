@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Any bytes as a model of a format that Assimp reads: the first byte chooses it. */
+#include "import/assimp/import.h"
 #include "tests/fuzz/importing.h"
 
 static const struct assimp_format *format;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Any bytes as an environment, of the formats that need no module. */
-#include "import/texture_plain.h"
+#include "import/image/plain.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <stdlib.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Any bytes as a model: NFF. */
+#include "import/nff/import.h"
 #include "tests/fuzz/importing.h"
 
 static bool import_alone(struct import_scene *scene, struct files *files, const unsigned char *bytes,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Any bytes as a model: 3MF. Those that are kept are archives that are not packed, so that changed bytes reach the
  * parser of XML; checksums are looked at behind it. */
-#include "import/threemf.h"
+#include "import/threemf/import.h"
 #include "tests/fuzz/importing.h"
 
 static bool import_alone(struct import_scene *scene, struct files *files, const unsigned char *bytes,

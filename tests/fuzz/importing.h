@@ -3,7 +3,8 @@
 #ifndef FARLIGHT_TESTS_FUZZ_IMPORTING_H
 #define FARLIGHT_TESTS_FUZZ_IMPORTING_H
 
-#include "import/formats.h"
+#include "import/model/files.h"
+#include "import/model/scene.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <stdlib.h>

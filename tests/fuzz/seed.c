@@ -354,7 +354,7 @@ static const char gltf_model[] =
 static const char obj_model[] =
     "mtllib a b.mtl\no thing\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\n"
     "vn 0 0 1\nusemtl red\ns 1\nf 1/1/1 2/2/1 \\\n3//1 -1\ng other\nl 1 2\np 3\nf 1 2 3\n";
-/* The first letter chooses the format, by its place in the table (import/assimp.c). */
+/* The first letter chooses the format, by its place in the table (import/assimp/library.c). */
 static const char *const assimp_models[] = {
     "mply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uch"
     "ar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\ne"

@@ -54,7 +54,17 @@ MAY_INCLUDE = {
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
     "client/edit": ("protocol", "protocol/common", "client/lib"),  # a part of the library
     "client/helper": ("protocol",),
-    "client/import": ("protocol", "protocol/common", "client/helper", SHARED),  # the default sky
+    "client/import/model": ("protocol", "protocol/common"),
+    "client/import/image": ("protocol/common", "client/helper"),
+    "client/import/obj": ("protocol/common", "client/import/model", "client/import/image"),
+    "client/import/gltf": ("protocol/common", "client/import/model", "client/import/image"),
+    "client/import/nff": ("protocol/common", "client/import/model"),
+    "client/import/threemf": ("protocol/common", "client/import/model"),
+    # Its materials become those of obj.
+    "client/import/assimp": ("protocol/common", "client/helper", "client/import/model", "client/import/obj"),
+    "client/import": (
+        "protocol", "protocol/common", "client/helper", *(f"client/import/{room}" for room in (
+            "model", "image", "gltf", "obj", "nff", "assimp", "threemf")), SHARED),  # of shaders: the default sky
     "client/output": ("protocol", "protocol/common", "client/helper"),
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
@@ -85,14 +95,15 @@ RESTRICTED = {
         BASE, "server/net", "client/lib", "client/helper", "client/import", "client/web"),
     r"lib(av|sw)": ("client/video", "client/viewer", "server/encode"),
     r"SDL2?/": ("client/viewer",),
-    r"OpenImageIO/": ("client/import", "client/output/library"),
-    r"png\.h": ("client/import", "client/output"),
+    r"OpenImageIO/": ("client/import/image", "client/output/library"),
+    r"png\.h": ("client/import/image", "client/output"),
     r"(OpenEXR|Imath)/": ("client/output",),
-    r"tiny_(gltf|obj_loader)": ("client/import",),
-    r"assimp/": ("client/import",),
-    r"turbojpeg\.h": ("client/import", "client/lib", "client/output", "server/encode"),
+    r"tiny_gltf": ("client/import/gltf",),
+    r"tiny_obj_loader": ("client/import/obj",),
+    r"assimp/": ("client/import/assimp",),
+    r"turbojpeg\.h": ("client/import/image", "client/lib", "client/output", "server/encode"),
     r"libexif/": ("client/output",),
-    r"stb_": ("client/import",),
+    r"stb_": ("client/import/image",),
     r"zstd\.h": ("server/encode", "client/lib", "protocol/pixels"),
     r"libwebsockets\.h": ("client/web",),
     r"sodium\.h": ("client/cli", "client/web", "server/session", "server/store", "protocol/common", "protocol/sealed"),

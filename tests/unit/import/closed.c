@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Which meshes bound a body. */
-#include "import/closed.h"
+#include "import/model/closed.h"
 #include "tests/harness/test.h"
 
 #include <math.h>

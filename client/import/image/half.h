@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/* Radiance as a half float. */
+#ifndef FARLIGHT_IMPORT_IMAGE_HALF_H
+#define FARLIGHT_IMPORT_IMAGE_HALF_H
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+/* IEEE 754 binary16, rounded to nearest even; 0 of what is negative or no number, and at most the largest one. */
+static inline uint16_t half_of_radiance(float value)
+{
+    const float largest = 65504.0f;
+    uint32_t bits;
+
+    if (!(value > 0))
+        return 0;
+    if (value > largest)
+        value = largest;
+    memcpy(&bits, &value, sizeof(bits));
+    if (bits < 0x38800000u) /* below 2^-14: a denormal half, a multiple of 2^-24 */
+        return (uint16_t)nearbyintf(value * 16777216.0f);
+    bits += 0xfffu + ((bits >> 13) & 1u);
+    bits = (bits - 0x38000000u) >> 13;
+    return (uint16_t)(bits < 0x7bffu ? bits : 0x7bffu);
+}
+
+#endif

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/* The reader of the 3D Manufacturing Format: see model/scene.h for what readers promise. */
+#ifndef FARLIGHT_IMPORT_THREEMF_IMPORT_H
+#define FARLIGHT_IMPORT_THREEMF_IMPORT_H
+
+#include "import/model/scene.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+bool threemf_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
