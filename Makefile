@@ -121,18 +121,14 @@ SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PI
 WARP_OBJ := $(call obj,$(WARP_SRC))
 LIB_OBJ := $(call obj,$(LIB_SRC) $(EDIT_SRC)) $(WARP_OBJ) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
-# What the helper programs share is linked to each of them, as an archive: each takes what it needs.
+# What programs share is linked to each of them, as an archive: each takes what it needs. Tests link the windows' and pages' parts so, too.
 HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
+OPTIONS_OBJ := $(call obj,$(call sources,client/options,c))
+VIEWER_OBJ := $(call obj,$(VIEWER_C))
+WEB_OBJ := $(call obj,$(WEB_C))
 IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX)) $(COMMON_OBJ) $(B)/helper.a
 EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
 VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(B)/helper.a
-
-# The viewer takes the command line as render does; the gateway takes of it which daemon is meant.
-COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c edit_history.c image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
-    job_views.c key.c models.c parse.c retry.c talk.c \
-    watch.c))
-VIEWER_OBJ := $(call obj,$(VIEWER_C)) $(COMMAND_LINE_OBJ)
-WEB_OBJ := $(call obj,$(WEB_C) $(addprefix client/cli/,loading.c progress.c sharing.c wave_table.c)) $(COMMAND_LINE_OBJ)
 
 # The library for others' programs: only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
@@ -221,9 +217,13 @@ WEB_LIBS = $(call pkg_libs,$(WEB_PKGS) $(CLIENT_PKGS)) -lm
 
 $(B)/farlightd: $(B)/server/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
-$(B)/farlight: $(CLI_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
+$(B)/farlight: $(CLI_OBJ) $(B)/options.a $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
 $(B)/helper.a: $(HELPER_OBJ)
+$(B)/options.a: $(OPTIONS_OBJ)
+$(B)/viewer.a: $(filter-out %/main.o,$(VIEWER_OBJ))
+$(B)/web.a: $(filter-out %/main.o,$(WEB_OBJ))
+$(addprefix $(B)/,helper.a options.a viewer.a web.a):
 	$(call say,AR)rm -f $@ && $(AR) rcs $@ $^
 $(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-textures.so $(B)/farlight-assimp.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
@@ -239,9 +239,9 @@ $(B)/farlight-palette.so: $(call obj,$(PALETTE_C))
 	$(call say,LINK)$(CC) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(PALETTE_PKGS)) -o $@
 $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-palette.so
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
-$(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
+$(B)/farlight-view: $(B)/client/viewer/main.o $(B)/viewer.a $(B)/options.a $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
-$(B)/farlight-web: $(WEB_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
+$(B)/farlight-web: $(B)/client/web/main.o $(B)/web.a $(B)/options.a $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(WEB_LIBS) -o $@
 # It takes in the files of the page.
 $(B)/client/web/page.o: $(wildcard client/web/page/*)
@@ -259,7 +259,7 @@ $(B)/python/farlight/messages.py: client/python/generate.py $(wildcard client/py
 	$(call say,GEN)CC='$(CC)' python3 $< $(@D)
 
 # What the tables say of tracers and options, in the place of the line that asks for it.
-$(B)/shot.schema.json: client/cli/shot.schema.json $(B)/farlight
+$(B)/shot.schema.json: client/cli/shot/shot.schema.json $(B)/farlight
 	$(B)/farlight tracers --schema >$@.part && sed -e '/@SETTINGS@/{r $@.part' -e 'd;}' $< >$@.new && mv $@.new $@
 $(B)/man/farlight.1: conf/man/farlight.1 $(B)/farlight
 	@mkdir -p $(@D)
@@ -302,24 +302,21 @@ $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 # The importer without its main() and its sandbox, with its modules as they are compiled for themselves.
 READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(call obj,$(TEXTURE_CXX) $(ASSIMP_CXX))
 READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS) $(ASSIMP_PKGS))
-# What reads messages of the page of farlight-web.
-REQUEST_OBJ := $(call obj,client/web/address.c client/web/request.c)
 # Sessions that begin, break and end, with memory that runs out.
 $(B)/tests/unit/fault_tests: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
 $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 # What the fuzzers have found.
-$(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ) $(REQUEST_OBJ)
+$(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ) $(B)/web.a
 $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
-$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode edit_rows heat hud hud_edit hud_mark hud_timeline input layer metrics outline paint panel pixmap plan recall replay settings tour views \
-  warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
+$(B)/tests/unit/media_tests: $(B)/viewer.a $(B)/options.a
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp) $(SERVING_WRAP)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(B)/client/import/model/closed.o $(B)/client/cli/edit_history.o $(addprefix $(B)/client/web/,address.o callers.o editing.o inbox.o links.o outage.o queue.o request.o) $(MODEL_OBJ) $(B)/tests/fixtures/frame_hooks.o
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(B)/client/import/model/closed.o $(B)/web.a $(B)/options.a $(MODEL_OBJ) $(B)/tests/fixtures/frame_hooks.o
 # Measurements of the benchmark register themselves (tests/bench/bench.h).
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c,$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
-$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c plan.c)) $(MODEL_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC)) $(B)/viewer.a $(MODEL_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) $(VIEWER_LIBS) -o $@
 # A link to look over.
 SHAPED_LINK := $(B)/tests/bench/shaped_link
@@ -514,7 +511,7 @@ analyze: analyze-packages
 	$(MAKE) -j$(JOBS) CC=gcc CXX=g++ B=build/analyze CFLAGS='$(ANALYZE_FLAGS)' $(patsubst $(B)/%,build/analyze/%,$(ANALYZED))
 ANALYZE_FLAGS := -fanalyzer
 ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
-    $(WEB_OBJ) $(HELPER_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
+    $(WEB_OBJ) $(HELPER_OBJ) $(OPTIONS_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
 # Lines that tests reach, as HTML; TESTS chooses among them. A program that may not write its counts, in a sandbox or beyond a limit,
 # fails its test; what the others have reached is shown all the same.
 # Figures are written when a process ends, which the daemon's sandbox would refuse.
@@ -687,7 +684,7 @@ $(B)/tests/fuzz/fuzz_coarse_depth: $(PIXELS_OBJ)
 $(B)/tests/fuzz/fuzz_coarse_depth: FUZZ_LIBS = $(call pkg_libs,libzstd) -lm
 $(B)/tests/fuzz/fuzz_frame: $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_frame: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
-$(B)/tests/fuzz/fuzz_request: $(REQUEST_OBJ) $(LIB_OBJ)
+$(B)/tests/fuzz/fuzz_request: $(B)/web.a $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_request: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
 $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm

@@ -1,5 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/cli.h"
+#include "commands.h"
+#include "options/interrupt.h"
+#include "options/job.h"
+#include "options/models.h"
+#include "options/parse.h"
+#include "options/talk.h"
 #include "cli/info_camera.h"
 
 #include <inttypes.h>

@@ -2,7 +2,8 @@
 /* The camera that 'farlight render' takes of a model, in coordinates: a daemon is asked for a tiny picture. */
 #include "cli/info_camera.h"
 
-#include "cli/cli.h"
+#include "options/complete.h"
+#include "options/interrupt.h"
 
 #include <math.h>
 #include <stdio.h>

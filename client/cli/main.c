@@ -1,9 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/cli.h"
+#include "commands.h"
+#include "cli/compare/commands.h"
+#include "cli/daemon/commands.h"
+#include "cli/jobs/commands.h"
+#include "options/talk.h"
 #include "lib/text.h"
 #include "protocol/common/standard.h"
 #include "protocol/version.h"
 
+#include <argp.h>
 #include <stdio.h>
 #include <string.h>
 

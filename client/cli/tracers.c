@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* farlight tracers: every tracer and its settings, for people, for scripts, and for the build, which makes the
  * manual and the schema of shot files of them. farlight complete: for the shell. */
-#include "cli/job_fields.h"
+#include "options/fields.h"
+#include "commands.h"
+#include "options/parse.h"
+#include "options/talk.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The viewer is a program of its own, so that nothing else links SDL and libavcodec. */
-#include "cli/cli.h"
+#include "commands.h"
+#include "options/talk.h"
 #include "lib/process.h"
 
 #include <errno.h>

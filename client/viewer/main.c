@@ -1,7 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* farlight-view: a window on a scene that a daemon renders. Started by `farlight view`; a program of its own so
  * that nothing else links SDL and libavcodec. */
-#include "cli/cli.h"
+#include "options/arguments.h"
+#include "options/complete.h"
+#include "options/daemon.h"
+#include "options/interrupt.h"
+#include "options/job.h"
+#include "options/models.h"
+#include "options/parse.h"
+#include "options/talk.h"
+#include "options/views.h"
 #include "lib/text.h"
 #include "viewer/input.h"
 #include "viewer/viewer.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/recall.h"
-#include "cli/cli.h"
+#include "options/image_path.h"
 #include "lib/json_text.h"
 
 #include <stdio.h>

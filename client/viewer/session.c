@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/session.h"
-#include "cli/cli.h"
-#include "cli/watch.h"
+#include "options/retry.h"
+#include "options/watch.h"
 
 #include <inttypes.h>
 #include <pthread.h>

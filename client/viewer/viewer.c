@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/viewer.h"
 #include "viewer/viewer_state.h"
-#include "cli/cli.h"
+#include "options/complete.h"
+#include "options/talk.h"
 #include "protocol/common/clock.h"
 
 #include <errno.h>

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_EDIT_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_EDIT_H
 
-#include "cli/edit_history.h"
+#include "options/edit_history.h"
 #include "viewer/edit_rows.h"
 #include "viewer/input.h"
 

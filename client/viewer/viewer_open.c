@@ -2,7 +2,7 @@
 /* Opens scenes: that of the command line, and the file that is dropped on the window. The shown scene stays until
  * the other one is there. */
 #include "viewer/viewer_state.h"
-#include "cli/cli.h"
+#include "options/talk.h"
 #include "lib/importer.h"
 #include "protocol/common/clock.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/describe.h"
-#include "cli/cli.h"
+#include "options/wave_table.h"
 
 #include <jansson.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_CLIENT_WEB_EDITING_H
 #define FARLIGHT_CLIENT_WEB_EDITING_H
 
-#include "cli/edit_history.h"
+#include "options/edit_history.h"
 #include "web/request.h"
 
 /* The answer to a request of those that edit, for free(): {"objects": ..}, {"object": ..} or {"edited": ..}. NULL:

@@ -1,11 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /* farlight-web: a page in a browser that shows a model, or a shared scene of a daemon. */
-#include "cli/sharing.h"
-#include "cli/watch.h"
+#include "options/sharing.h"
+#include "options/watch.h"
 #include "lib/text.h"
 #include "web/gateway.h"
 #include "protocol/common/standard.h"
 #include "protocol/version.h"
+#include "options/arguments.h"
+#include "options/complete.h"
+#include "options/daemon.h"
+#include "options/image_path.h"
+#include "options/interrupt.h"
+#include "options/job.h"
+#include "options/models.h"
+#include "options/parse.h"
+#include "options/talk.h"
 
 #include <errno.h>
 #include <pthread.h>

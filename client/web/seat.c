@@ -5,6 +5,11 @@
 #include "web/error_map.h"
 #include "web/inbox.h"
 #include "protocol/common/clock.h"
+#include "options/complete.h"
+#include "options/edit_history.h"
+#include "options/job.h"
+#include "options/retry.h"
+#include "options/talk.h"
 
 #include <errno.h>
 #include <poll.h>

@@ -3,10 +3,11 @@
 #ifndef FARLIGHT_CLIENT_WEB_SEAT_H
 #define FARLIGHT_CLIENT_WEB_SEAT_H
 
-#include "cli/cli.h"
 #include "web/outage.h"
 #include "web/queue.h"
 #include "web/request.h"
+
+struct cli_job;
 
 struct seat_options {
     const char *server, *key_file, *scene; /* as of fl_connect and fl_scene_attach */

@@ -68,9 +68,15 @@ MAY_INCLUDE = {
     "client/output": ("protocol", "protocol/common", "client/helper"),
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
-    "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
-    "client/web": ("protocol/common", "client/lib", "client/cli"),  # no scene file; pixels are compared, but never encoded
-    "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/cli"),  # the command line is parsed as that of render
+    "client/options": ("protocol", "protocol/common", "client/lib"),  # the command line of a picture, a window and a page
+    "client/cli/shot": ("client/lib", "client/options"),
+    "client/cli/jobs": ("protocol", "protocol/common", "client/lib", "client/options", "client/cli/shot"),
+    "client/cli/compare": ("client/lib", "client/options", "client/cli/jobs"),
+    "client/cli/daemon": ("protocol", "protocol/sealed", "client/lib", "client/options"),
+    "client/cli": (
+        "protocol/common", "client/lib", "client/options", "client/cli/jobs", "client/cli/compare", "client/cli/daemon"),
+    "client/web": ("protocol/common", "client/lib", "client/options"),  # no scene file; pixels are compared, but never encoded
+    "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/options"),
 }
 # Files that every room may include.
 FOR_EVERYBODY = re.compile(r"^protocol/((version|plain_text)\.h|(words|tracers)\.(h|def))$")

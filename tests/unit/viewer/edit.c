@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Editing in the viewer: rows of an object's fields, what keys and drags make of them, the panel that shows them,
  * and undoing. */
-#include "cli/edit_history.h"
+#include "options/edit_history.h"
 #include "viewer/edit_rows.h"
 #include "viewer/hud_edit.h"
 #include "tests/harness/test.h"

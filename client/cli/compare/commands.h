@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: MIT */
+/* Subcommands that compare. argv[0] is "farlight NAME". They return the exit status. */
+#ifndef FARLIGHT_CLI_COMPARE_COMMANDS_H
+#define FARLIGHT_CLI_COMPARE_COMMANDS_H
+
+int cli_compare(int argc, char **argv);
+int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
+int cli_compare_views(int argc, char **argv);   /* likewise --stereo and what else is made of depth layers */
+
+#endif

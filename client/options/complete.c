@@ -1,0 +1,559 @@
+/* SPDX-License-Identifier: MIT */
+/* Settings that depend on several options: derived defaults, and invalid combinations. */
+#include "complete.h"
+#include "image_path.h"
+#include "models.h"
+#include "progress.h"
+#include "views.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RADIANS_PER_DEGREE 0.017453292519943295
+#define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
+#define AUTO_SAMPLES 256u                      /* of --samples auto: the most that a pixel gets */
+#define AUTO_NOISE 0.03f                       /* likewise: hardly to be seen */
+#define PATH_SAMPLES 64u                       /* where nothing is said */
+#define CLAMP 10.0f                            /* likewise; times white, as Cycles has it for indirect light */
+#define CLAMP_SAMPLES 64.0f /* with so many samples or more; with fewer by as much less, as each shows more, */
+#define CLAMP_MIN 1.25f     /* down to this */
+#define NOISE_SAMPLES 4096u /* likewise with --noise: most pixels need far fewer */
+#define AO_SAMPLES 16u      /* of 8 rays: 128 a pixel, as in the paper */
+
+/* ---- where pictures go ---- */
+
+bool cli_writes_to_stdout(const struct cli_job *job)
+{
+    for (size_t i = 0; i < job->output_count; i++)
+        if (strcmp(job->outputs[i].path, "-") == 0)
+            return true;
+    return false;
+}
+
+static bool complete_output(struct cli_job *job, struct cli_output *output, bool is_series)
+{
+    const bool to_stdout = strcmp(output->path, "-") == 0;
+    if (output->image == CLI_IMAGE_UNKNOWN && to_stdout)
+        output->image = is_series ? CLI_IMAGE_Y4M : CLI_IMAGE_PNG;
+    if (output->image == CLI_IMAGE_UNKNOWN)
+        output->image = cli_image_by_path(output->path);
+    if (output->image == CLI_IMAGE_UNKNOWN) {
+        cli_usage(job, output->path, "its ending names no %sformat", is_series ? "" : "image ");
+        return fl_error_remedy(&job->error,
+                               "known: .png .jpg .jpeg .exr .hdr .webp .tiff .tif .gif%s, or --format",
+                               is_series ? " .mp4 .mkv .y4m" : "");
+    }
+    if (is_series)
+        output->image = cli_image_of_series(output->image, output->path);
+    if (!is_series && cli_image_is_video(output->image)) {
+        cli_usage(job, output->path, "one picture is no video");
+        return fl_error_remedy(&job->error, "use 'farlight animate'");
+    }
+    if (to_stdout && is_series && !cli_image_is_video(output->image)) {
+        cli_usage(job, "--output", "a series of %s files cannot go to standard output",
+                  cli_image_name(output->image));
+        return fl_error_remedy(&job->error, "-o - writes raw video (y4m); -o 'frames/%%04d.%s' writes files",
+                               cli_image_name(output->image));
+    }
+    if (!cli_image_is_video(output->image))
+        return true;
+    if (job->series.resume || job->series.shard_parts > 1 || job->series.digests) {
+        cli_usage(job,
+                  job->series.resume     ? "--resume"
+                  : job->series.digests  ? "--digests"
+                  : job->series.is_chunk ? "--chunk"
+                                         : "--shard",
+                  "a video is made of all frames at once");
+        return fl_error_remedy(&job->error,
+                               "write images, such as 'frames/%%04d.png', and a video of all of them");
+    }
+    if (job->lossless && output->image != CLI_IMAGE_MKV && output->image != CLI_IMAGE_MOVING_WEBP) {
+        cli_usage(job, "--lossless", "%s files are not lossless", cli_image_name(output->image));
+        return fl_error_remedy(&job->error, "write an .mkv or .webp file");
+    }
+    return true;
+}
+
+static bool is_linear(enum cli_image image)
+{
+    return image == CLI_IMAGE_EXR || image == CLI_IMAGE_HDR;
+}
+
+/* Beside the layers of --layers, which are the picture where it is not given. */
+static void add_light_groups(struct cli_job *job)
+{
+    struct message_render *wanted = &job->options;
+    if (job->light_group_count == 0)
+        return;
+    wanted->layers |= wanted->layers == 0 ? 1u << PROTOCOL_LAYER_BEAUTY : 0;
+    wanted->layers |= ((2u << job->light_group_count) - 1) << PROTOCOL_LAYER_LIGHT_REST;
+}
+
+/* Of all formats only EXR has named channels; half floats are not precise enough for their contents. */
+static bool complete_layers(struct cli_job *job)
+{
+    struct message_render *wanted = &job->options;
+    const uint64_t bytes =
+        (uint64_t)wanted->width * wanted->views_across * wanted->height * wanted->views_down * 16;
+    const char *option = wanted->layers == 0 ? "--light-group" : "--layers";
+    add_light_groups(job);
+    if (wanted->layers == 0)
+        return true;
+    for (size_t i = 0; i < job->output_count; i++) {
+        if (job->outputs[i].image == CLI_IMAGE_EXR)
+            continue;
+        cli_usage(job, job->outputs[i].path, "%s files do not have the layers of %s",
+                  cli_image_name(job->outputs[i].image), option);
+        return fl_error_remedy(&job->error, "write an .exr file, or leave out %s", option);
+    }
+    if (wanted->encoding == PROTOCOL_ENCODING_JPEG) {
+        cli_usage(job, "--encoding", "jpeg does not carry the layers of %s", option);
+        return fl_error_remedy(&job->error, "choose raw, zstd or predicted");
+    }
+    if (bytes * (unsigned)__builtin_popcount(wanted->layers) > FRAME_BYTES_MAX) {
+        cli_usage(job, "--layers", "so many layers of %ux%u pixels are more than a frame can have", wanted->width,
+                  wanted->height);
+        return fl_error_remedy(&job->error, "render some of them at a time, or a smaller --size");
+    }
+    wanted->format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    return true;
+}
+
+/* A picture of 8 bits is made of linear light by the program that writes it. */
+static bool complete_colours(struct cli_job *job)
+{
+    const char *option = job->colour_space ? "--colour-space" : "--display-view", *configured = getenv("OCIO");
+    if (!job->colour_space && !job->display_view)
+        return true;
+    if (!job->ocio && configured && configured[0] != '\0')
+        job->ocio = configured;
+    for (size_t i = 0; i < job->output_count; i++) {
+        const enum cli_image image = job->outputs[i].image;
+        if (job->colour_space && image != CLI_IMAGE_EXR) {
+            cli_usage(job, option, "%s files do not have it", cli_image_name(image));
+            return fl_error_remedy(&job->error, "write an .exr file, or choose a view by --display-view");
+        }
+        if (job->display_view && (is_linear(image) || cli_image_is_video(image))) {
+            cli_usage(job, option, "%s files do not have it", cli_image_name(image));
+            return fl_error_remedy(&job->error, "write pictures of 8 bits, such as .png");
+        }
+    }
+    if (job->display_view && !job->ocio) {
+        cli_usage(job, option, "there is no configuration that has views");
+        return fl_error_remedy(&job->error, "name one by --ocio FILE or $OCIO");
+    }
+    job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    return true;
+}
+
+/* All outputs are made of the same frames. */
+static bool complete_pixels(struct cli_job *job)
+{
+    bool has[CLI_IMAGE_COUNT] = {false};
+    for (size_t i = 0; i < job->output_count; i++) {
+        has[job->outputs[i].image] = true;
+        if (is_linear(job->outputs[i].image) != is_linear(job->outputs[0].image)) {
+            cli_usage(job, job->outputs[i].path, "8-bit pictures and linear light cannot come of one rendering");
+            return fl_error_remedy(&job->error, "render once for EXR and HDR, and once for all else");
+        }
+    }
+    if (job->float_pixels && job->half_pixels)
+        return cli_usage(job, "--float", "cannot go with --half") == 0;
+    if ((job->float_pixels && !has[CLI_IMAGE_EXR] && !has[CLI_IMAGE_HDR]) ||
+        (job->half_pixels && !has[CLI_IMAGE_EXR]))
+        return cli_usage(job, job->float_pixels ? "--float" : "--half", "%s files do not have such pixels",
+                         cli_image_name(job->outputs[0].image)) == 0;
+    if (job->dwaa && !has[CLI_IMAGE_EXR])
+        return cli_usage(job, "--exr-compression", "%s files do not have it",
+                         cli_image_name(job->outputs[0].image)) == 0;
+    if (has[CLI_IMAGE_HDR] || job->float_pixels)
+        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    else if (has[CLI_IMAGE_EXR])
+        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    return complete_colours(job) && complete_layers(job);
+}
+
+/* One that is none of a picture is that of a model, which files do not need. */
+static bool complete_format(struct cli_job *job)
+{
+    const char *letters = "abcdefghijklmnopqrstuvwxyz0123456789";
+    const size_t length = job->model_format ? strlen(job->model_format) : 1;
+    if (!job->model_format ||
+        (cli_has_input(job) && length > 0 && length < 8 && strspn(job->model_format, letters) == length))
+        return true;
+    return cli_usage(job, "--format",
+                     "unknown format '%s' (known: png, jpeg, exr, hdr, webp, tiff, gif, mp4, mkv, y4m)",
+                     job->model_format) == 0;
+}
+
+static bool complete_outputs(struct cli_job *job, bool is_series)
+{
+    if (job->output) {
+        /* It has no folder in which a finished file could replace it. */
+        const char *path = strcmp(job->output, "/dev/stdout") == 0 ? "-" : job->output;
+        job->outputs[0] = (struct cli_output){.path = path, .image = job->image};
+        job->output_count = 1;
+    }
+    if (job->output_count == 0) {
+        cli_usage(job, "--output", "no image file is named");
+        return fl_error_remedy(&job->error, is_series ? "-o 'frames/%%04d.exr'" : "-o picture.png, or '-'");
+    }
+    for (size_t i = 0; i < job->output_count; i++)
+        if (!complete_output(job, &job->outputs[i], is_series))
+            return false;
+    if (job->has_progress && job->progress == CLI_PROGRESS_OPENJD && cli_writes_to_stdout(job))
+        return cli_usage(job, "--progress", "openjd is written to standard output, as the picture is") == 0;
+    return complete_pixels(job);
+}
+
+static bool complete_encoding(struct cli_job *job)
+{
+    if (!job->has_encoding && job->server && strncmp(job->server, "unix:", 5) != 0)
+        job->options.encoding = PROTOCOL_ENCODING_ZSTD;
+    if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
+        return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",
+                         cli_image_name(job->outputs[0].image)) == 0;
+    for (size_t i = 0; i < job->output_count; i++) {
+        const enum cli_image image = job->outputs[i].image;
+        const unsigned quality = job->file_quality > 0 ? job->file_quality : job->options.quality;
+        const bool is_picture =
+            image == CLI_IMAGE_JPEG || image == CLI_IMAGE_WEBP || image == CLI_IMAGE_MOVING_WEBP;
+        if (image == CLI_IMAGE_MOVING_GIF || (!is_picture && !cli_image_is_video(image)))
+            continue;
+        if (!is_picture && quality > 51)
+            return cli_usage(job, "--quality", "a video has 1 (best) to 51") == 0;
+        job->file_quality = quality;
+        if (job->options.encoding != PROTOCOL_ENCODING_JPEG)
+            job->options.quality = 0; /* the number is meant for the file */
+    }
+    if (job->options.encoding == PROTOCOL_ENCODING_ZSTD && job->options.quality > 19)
+        return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
+    return true;
+}
+
+/* ---- camera ---- */
+
+static bool is_zero(const float vector[3])
+{
+    return vector[0] == 0 && vector[1] == 0 && vector[2] == 0;
+}
+
+/* Whether `up` and the view direction leave the picture's upright undefined. */
+static bool is_degenerate(const struct cli_job *job)
+{
+    const struct record_camera_key *key = &job->key;
+    double view[3], cross = 0, lengths = 0, view2 = 0, up2 = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        view[i] =
+            (double)key->look_at_world[i] - (double)key->eye_world[i] + job->look_at_rest[i] - job->eye_rest[i];
+        view2 += view[i] * view[i];
+        up2 += (double)key->up_world[i] * (double)key->up_world[i];
+    }
+    lengths = view2 * up2;
+    for (unsigned i = 0; i < 3; i++) {
+        const unsigned j = (i + 1) % 3, k = (i + 2) % 3;
+        const double part = view[j] * (double)key->up_world[k] - view[k] * (double)key->up_world[j];
+        cross += part * part;
+    }
+    return !(cross > lengths * 1e-12);
+}
+
+static bool complete_camera(struct cli_job *job)
+{
+    const bool has_key = job->has_eye || job->has_look_at;
+    if (job->has_eye != job->has_look_at)
+        return cli_usage(job, job->has_eye ? "--eye" : "--look-at", "needs %s as well",
+                         job->has_eye ? "--look-at" : "--eye") == 0;
+    if (has_key && job->camera)
+        return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
+    if (!has_key && job->has_up && !cli_turn_models(job))
+        return false;
+    if (job->has_framing && (has_key || job->camera))
+        return cli_usage(
+                   job, job->camera ? "--camera" : "--eye",
+                   "cannot go with --view, --azimuth, --elevation, --frame, --zoom or --margin, which place the "
+                   "camera, too") == 0;
+    if (job->has_fov && job->camera)
+        return cli_usage(job, "--fov", "cannot go with --camera, which has its own") == 0;
+    if (!has_key) {
+        if (job->has_fov)
+            job->options.auto_fov = (float)((double)job->key.fov_y / RADIANS_PER_DEGREE);
+        job->has_framing |= job->has_fov;
+        return true;
+    }
+    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof(job->key.eye_world)) == 0 &&
+        memcmp(job->eye_rest, job->look_at_rest, sizeof(job->eye_rest)) == 0)
+        return cli_usage(job, "--look-at", "is where --eye is") == 0;
+    if (is_zero(job->key.up_world) || is_degenerate(job))
+        return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
+    job->options.ground_up_x = job->key.up_world[0];
+    job->options.ground_up_y = job->key.up_world[1];
+    job->options.ground_up_z = job->key.up_world[2];
+    job->options.camera_path = PROTOCOL_CAMERA_KEYS;
+    job->options.keys = &job->key;
+    job->options.keys_count = 1;
+    return true;
+}
+
+static void move_place(float place[3], const double rest[3], const double by[3])
+{
+    for (unsigned i = 0; i < 3; i++)
+        place[i] = (float)((double)place[i] + rest[i] - by[i]);
+}
+
+/* The script's camera; tangents of splines are no places. */
+static void move_channel(const struct fl_channel *channel, const double by[3])
+{
+    static const double nothing[3];
+    const bool has_tangents = channel->interpolation == PROTOCOL_INTERPOLATION_CUBIC_SPLINE;
+    const uint32_t parts = has_tangents || channel->interpolation == PROTOCOL_INTERPOLATION_BEZIER ? 3 : 1;
+    float *values = (float *)(uintptr_t)channel->values; /* the script's own */
+    for (uint32_t i = 0; i < channel->key_count * parts; i++)
+        if (!has_tangents || i % 3 == 1)
+            move_place(values + (size_t)i * 3, nothing, by);
+}
+
+void cli_move_camera(struct cli_job *job, const double origin[3])
+{
+    double by[3];
+    bool moves = false;
+    for (unsigned i = 0; i < 3; i++) {
+        by[i] = origin[i] - job->origin[i];
+        moves = moves || by[i] < 0 || by[i] > 0;
+        job->origin[i] = origin[i];
+    }
+    if (!moves)
+        return;
+    move_place(job->key.eye_world, job->eye_rest, by);
+    move_place(job->key.look_at_world, job->look_at_rest, by);
+    memset(job->eye_rest, 0, sizeof(job->eye_rest));
+    memset(job->look_at_rest, 0, sizeof(job->look_at_rest));
+    for (uint32_t i = 0; job->series.keys && i < job->options.keys_count; i++) {
+        static const double nothing[3];
+        move_place(job->series.keys[i].eye_world, nothing, by);
+        move_place(job->series.keys[i].look_at_world, nothing, by);
+    }
+    for (size_t i = 0; i < job->channel_count; i++)
+        if (job->channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_EYE ||
+            job->channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_LOOK_AT)
+            move_channel(&job->channels[i].channel, by);
+}
+
+bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,
+                     const struct fl_scene *scene, struct fl_error *error)
+{
+    if (framed && !fl_scene_find_object(scene, PROTOCOL_OBJECT_NODE, framed, &render->auto_node, error))
+        return false;
+    if (render->keys_count > 0 || is_placed)
+        return true;
+    if (camera) {
+        render->camera_path = PROTOCOL_CAMERA_NODE;
+        return fl_scene_find_camera(scene, camera, &render->camera_node, error);
+    }
+    const struct fl_camera_info *first = fl_scene_camera(scene, 0);
+    if (first) {
+        render->camera_path = PROTOCOL_CAMERA_NODE;
+        render->camera_node = first->node;
+    }
+    return true;
+}
+
+/* Whether its pictures are for eyes, and not linear light for programs. */
+static bool is_shown(const struct cli_job *job)
+{
+    return job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8 || job->display_view;
+}
+
+void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene)
+{
+    const bool shows = render->integrator == PROTOCOL_INTEGRATOR_WHITTED ||
+                       render->integrator == PROTOCOL_INTEGRATOR_DISTRIBUTED ||
+                       render->integrator == PROTOCOL_INTEGRATOR_PATH;
+    if (job->filters && !job->without_studio && !job->scene && shows && is_shown(job) &&
+        render->background == PROTOCOL_BACKGROUND_ENVIRONMENT && render->camera_path != PROTOCOL_CAMERA_NODE &&
+        render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS && !fl_scene_is_lit(scene))
+        render->ground = 1;
+}
+
+/* Lenses, shutters and several samples need the integrator distributed; one sharp sample needs no random choices,
+ * and whitted makes no noise. */
+static void complete_integrator(struct cli_job *job)
+{
+    const struct message_render *wanted = &job->options;
+    const bool spreads =
+        wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 || job->lens_changes || job->endless;
+    if (!job->has_integrator)
+        job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
+}
+
+static float usual_clamp(uint32_t samples)
+{
+    const float clamp = CLAMP * fminf((float)samples / CLAMP_SAMPLES, 1.0f);
+    return fmaxf(clamp, CLAMP_MIN);
+}
+
+/* Random choices show as noise in one sample. Pictures that are refined without an end have no number of
+ * samples. */
+static void complete_samples(struct cli_job *job, bool is_series)
+{
+    struct message_render *wanted = &job->options;
+    if (job->auto_samples) {
+        wanted->samples = AUTO_SAMPLES;
+        wanted->noise = wanted->noise > 0.0f ? wanted->noise : AUTO_NOISE;
+    }
+    const bool by_error = wanted->noise > 0.0f;
+    job->endless = job->progressive && !job->has_samples && !by_error;
+    job->by_error = by_error && !is_series;
+    if (!job->has_samples && by_error)
+        wanted->samples = NOISE_SAMPLES;
+    else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
+        wanted->samples = PATH_SAMPLES;
+    else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
+        wanted->samples = AO_SAMPLES;
+    else if (!job->has_samples && !job->progressive && job->usual_samples > 0)
+        wanted->samples = job->usual_samples;
+    if (!job->has_clamp && !job->endless)
+        wanted->clamp = usual_clamp(wanted->samples);
+}
+
+static bool complete_tracer(struct cli_job *job)
+{
+    struct message_render *wanted = &job->options;
+    struct setting_fault fault;
+    if (!tracer_settings_check(&wanted->settings, "--", &fault)) {
+        cli_usage(job, fault.field, "%s", fault.text);
+        return fl_error_remedy(&job->error, "%s", fault.remedy);
+    }
+    if (!job->has_primary)
+        wanted->primary = PROTOCOL_PRIMARY_AUTO;
+    return true;
+}
+
+static bool complete_clips(struct cli_job *job)
+{
+    for (size_t i = 0; i < job->clip_count; i++) {
+        struct cli_clip *clip = &job->clips[i];
+        if (clip->line == 0) {
+            clip->start_s = (float)job->clip_start_s;
+            clip->speed = job->clip_speed > 0 ? (float)job->clip_speed : 1;
+            clip->loop = !job->clip_once;
+        }
+    }
+    if (job->clip_count == 0 && (job->clip_once || job->clip_start_s != 0 || job->clip_speed > 0)) {
+        cli_usage(job,
+                  job->clip_once        ? "--clip-once"
+                  : job->clip_speed > 0 ? "--clip-speed"
+                                        : "--clip-start",
+                  "no clip is played");
+        return fl_error_remedy(&job->error, "add --clip NAME");
+    }
+    return true;
+}
+
+/* A shared scene cannot be given another environment, and only a daemon with an address has one. */
+static bool complete_scene(struct cli_job *job)
+{
+    if (!job->scene)
+        return job->model || cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (job->model)
+        return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other", job->model) == 0;
+    if (job->light_group_count > 0) {
+        cli_usage(job, "--light-group", "cannot go with --scene: it would change the scene of all its clients");
+        return fl_error_remedy(&job->error, "'farlight edit' sets light_group of its nodes, and --layers "
+                                            "beauty,light_group has all of them");
+    }
+    if (job->edit_count > 0) {
+        cli_usage(job, "--edit", "cannot go with --scene: it would change the scene of all its clients");
+        return fl_error_remedy(&job->error, "'farlight edit' does that");
+    }
+    if (job->environment)
+        return cli_usage(job, "--environment", "cannot go with --scene: that has its light already") == 0;
+    if (job->server)
+        return true;
+    cli_usage(job, "--scene", "no address of a daemon is given, and a shared scene is on one");
+    return fl_error_remedy(&job->error, "add --server ADDRESS");
+}
+
+/* Depth layers are rendered with a number of samples. */
+static bool complete_noise(struct cli_job *job)
+{
+    const struct message_render *wanted = &job->options;
+    const bool is_made =
+        wanted->views_across * wanted->views_down > 1 || wanted->aperture > 0 || wanted->upsample > 1;
+    if (!(wanted->noise > 0.0f) || wanted->view_source != PROTOCOL_VIEW_SOURCE_LAYERS || !is_made)
+        return true;
+    cli_usage(job, "--noise", "pictures that are made of depth layers have a number of samples");
+    return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
+}
+
+/* They are made from what an eye sees, and nothing is there to be seen of a ground. */
+static bool complete_ground(struct cli_job *job)
+{
+    if (job->options.ground == 0 || job->options.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+        return true;
+    cli_usage(job, "--ground", "pictures that are made of depth layers show none");
+    return fl_error_remedy(&job->error, "render them as they are: --views rays, --lens rays");
+}
+
+static bool complete_crop(struct cli_job *job)
+{
+    const struct message_render *wanted = &job->options;
+    if (wanted->crop_width == 0)
+        return true;
+    if (wanted->crop_x + wanted->crop_width > wanted->width ||
+        wanted->crop_y + wanted->crop_height > wanted->height) {
+        cli_usage(job, "--crop", "%ux%u pixels from (%u, %u) on are not in a picture of %ux%u", wanted->crop_width,
+                  wanted->crop_height, wanted->crop_x, wanted->crop_y, wanted->width, wanted->height);
+        return fl_error_remedy(&job->error, "--size is that of the whole picture");
+    }
+    const char *other = wanted->noise > 0.0f                                 ? "--noise"
+                        : wanted->denoise != PROTOCOL_DENOISE_OFF            ? "--denoise"
+                        : job->views.has_stereo                              ? "--stereo"
+                        : job->views.has_light_field                         ? "--light-field"
+                        : wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS ? "--lens quadtree"
+                                                                             : NULL;
+    if (!other)
+        return true;
+    cli_usage(job, "--crop", "cannot go with %s, which looks at pixels around", other);
+    return fl_error_remedy(&job->error, "leave out one of them");
+}
+
+/* Files in linear light are for programs that have filters of their own. */
+static void complete_denoise(struct cli_job *job)
+{
+    if (!job->has_denoise && job->filters && is_shown(job) && job->options.crop_width == 0)
+        job->options.denoise = PROTOCOL_DENOISE_AUTO;
+}
+
+bool cli_job_complete(struct cli_job *job, bool is_series)
+{
+    if (!complete_scene(job) || !complete_format(job))
+        return false;
+    complete_samples(job, is_series);
+    complete_integrator(job);
+    if (!cli_views_complete(job, is_series) || !complete_noise(job) || !complete_crop(job) ||
+        !complete_ground(job) || !complete_tracer(job) || !complete_clips(job) ||
+        !complete_outputs(job, is_series) || !complete_encoding(job) || !complete_camera(job))
+        return false;
+    complete_denoise(job);
+    return true;
+}
+
+bool cli_job_complete_view(struct cli_job *job)
+{
+    struct message_render *wanted = &job->options;
+    if (!complete_scene(job))
+        return false;
+    if (!job->has_clamp)
+        wanted->clamp = CLAMP;
+    if (wanted->noise > 0.0f && !job->has_samples)
+        wanted->samples = NOISE_SAMPLES;
+    /* An integrator without noise is better while the camera moves. */
+    if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
+        wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
+    if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)
+        return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
+    return cli_views_complete(job, false) && complete_noise(job) && complete_tracer(job) && complete_clips(job) &&
+           complete_camera(job);
+}
