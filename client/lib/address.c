@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "lib/connection.h"
+#include "lib/address.h"
+#include "lib/stream.h"
 #include "lib/text.h"
 
 #include <errno.h>

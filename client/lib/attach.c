@@ -39,19 +39,13 @@ bool fl_scene_list(struct fl_connection *connection, struct fl_scene_entry **lis
 
 /* ---- one scene ---- */
 
-static void note_revision(struct fl_scene *scene, uint64_t revision)
-{
-    if (revision > scene->revision)
-        scene->revision = revision;
-}
-
 static bool describe(struct fl_scene *scene, struct fl_received *received, struct fl_error *error)
 {
     struct message question = {.type = MESSAGE_SCENE_DESCRIBE};
     question.scene_describe.scene = scene->scene;
     if (!fl_connection_ask(scene->connection, &question, MESSAGE_SCENE_DESCRIPTION, received, error))
         return false;
-    note_revision(scene, received->message.scene_description.revision);
+    fl_scene_note_revision(scene, received->message.scene_description.revision);
     return true;
 }
 
@@ -118,7 +112,7 @@ static bool come_to(struct fl_scene *scene, const char *name, struct fl_error *e
     question.scene_attach.name = short_name;
     if (!fl_connection_ask(scene->connection, &question, MESSAGE_OK, &received, error))
         return false;
-    note_revision(scene, received.message.ok.revision);
+    fl_scene_note_revision(scene, received.message.ok.revision);
     scene->attached = true;
     if (!describe(scene, &received, error) || !learn(scene, &received.message.scene_description, error))
         return false;
@@ -169,11 +163,4 @@ bool fl_scene_refresh(struct fl_scene *scene, struct fl_scene_bounds *bounds, st
 uint64_t fl_scene_revision(const struct fl_scene *scene)
 {
     return scene->revision;
-}
-
-void fl_scenes_changed(struct fl_connection *connection, const struct message_scene_changed *changed)
-{
-    for (struct fl_scene *scene = connection->scenes; scene; scene = scene->next)
-        if (scene->scene == changed->scene)
-            note_revision(scene, changed->revision);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Copies bytes between two descriptors and a daemon's socket: the far end of an ssh connection. */
+#include "lib/address.h"
 #include "lib/connection.h"
 #include "protocol/common/clock.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/connection.h"
+#include "lib/address.h"
 
 #include "protocol/sealed/key.h"
 #include "protocol/sealed/secret.h"
@@ -206,13 +207,26 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
     return true;
 }
 
-/* Messages of a job or a view may arrive at any time, also while another answer is awaited. */
-static int consume_frames(struct fl_connection *connection, const struct framing_header *header,
-                          const struct message *message, struct fl_error *error)
+void fl_connection_add(struct fl_connection *connection, struct fl_receiver *receiver)
 {
-    int taken = connection->view ? fl_view_take(connection->view, header, message, error) : 0;
-    if (taken == 0 && connection->job)
-        taken = fl_job_take(connection->job, header, message, error);
+    receiver->next = connection->receivers;
+    connection->receivers = receiver;
+}
+
+void fl_connection_remove(struct fl_connection *connection, struct fl_receiver *receiver)
+{
+    struct fl_receiver **place = &connection->receivers;
+    while (*place != receiver)
+        place = &(*place)->next;
+    *place = receiver->next;
+}
+
+static int offer(struct fl_connection *connection, const struct framing_header *header,
+                 const struct message *message, struct fl_error *error)
+{
+    int taken = 0;
+    for (struct fl_receiver *one = connection->receivers; one && taken == 0; one = one->next)
+        taken = one->take(one, header, message, error);
     if (taken < 0)
         fl_connection_break(connection, error);
     return taken;
@@ -232,16 +246,15 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
         return 1;
     }
     case MESSAGE_PONG:
-        return header->request == PING_REQUEST ? 1 : consume_frames(connection, header, message, error);
+        return header->request == PING_REQUEST ? 1 : offer(connection, header, message, error);
     case MESSAGE_CREDIT:
         if (message->credit.channel == FL_UPLOAD_CHANNEL && message->credit.total > connection->upload_credit)
             connection->upload_credit = message->credit.total;
         return 1;
     case MESSAGE_BLOCKED:
         return 1;
-    case MESSAGE_SCENE_CHANGED:
-        fl_scenes_changed(connection, &message->scene_changed);
-        return 1;
+    case MESSAGE_SCENE_CHANGED: /* maybe of a scene that is closed already */
+        return offer(connection, header, message, error) < 0 ? -1 : 1;
     case MESSAGE_GOODBYE:
         fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon ended the connection: %s",
                      message->goodbye.text[0] != '\0' ? message->goodbye.text
@@ -250,11 +263,11 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
         break;
     case MESSAGE_ERROR:
         if (header->request != 0)
-            return consume_frames(connection, header, message, error);
+            return offer(connection, header, message, error);
         fl_error_from_message(error, &message->error);
         break;
     default:
-        return consume_frames(connection, header, message, error);
+        return offer(connection, header, message, error);
     }
     connection->broken = *error;
     return -1;

@@ -17,6 +17,16 @@ struct fl_late {
     struct message message;
 };
 
+struct fl_receiver;
+/* 1: the message was the receiver's; 0: it may be another's; -1: the connection is broken, *error says why. */
+typedef int fl_take_fn(struct fl_receiver *receiver, const struct framing_header *header,
+                       const struct message *message, struct fl_error *error);
+/* A job, a view or a scene: messages may arrive for it at any time, also while another answer is awaited. */
+struct fl_receiver {
+    struct fl_receiver *next; /* of the connection's */
+    fl_take_fn *take;
+};
+
 struct fl_connection {
     struct fl_stream stream;
     struct fl_process process; /* the private daemon or ssh */
@@ -25,9 +35,8 @@ struct fl_connection {
     uint32_t last_request, last_scene, last_channel;
     uint64_t upload_credit;           /* the daemon's total for the upload channel */
     uint64_t upload_sent;             /* bytes of blob data sent on it so far */
-    struct fl_job *job;               /* the one that runs */
-    struct fl_view *view;             /* likewise */
-    struct fl_scene *scenes;          /* all that are there */
+    struct fl_receiver *receivers;    /* not owned */
+    bool has_job, has_view;           /* one of each may run */
     struct fl_late *late, **late_end; /* owned: sent before everything else as soon as the buffer has space */
     bool read_only;                   /* the daemon lets it change nothing */
     bool can_h264;                    /* this client and the daemon */
@@ -64,14 +73,16 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
 void fl_connection_send_late(struct fl_connection *connection, uint32_t request, const struct message *message);
 /* Moves delayed messages to the stream as far as they fit. False: the connection is broken. */
 bool fl_connection_push_late(struct fl_connection *connection, struct fl_error *error);
-/* Handles messages for the connection itself (ping, credit for uploads, blocked, scene_changed, goodbye, an error
- * of request 0), its job or its view: 1: handled; 0: it is for the caller; -1: the connection is broken, *error
- * says why. */
+/* Until it is removed, the receiver is offered what is not for the connection itself. */
+void fl_connection_add(struct fl_connection *connection, struct fl_receiver *receiver);
+void fl_connection_remove(struct fl_connection *connection, struct fl_receiver *receiver);
+/* Handles messages for the connection itself (ping, credit for uploads, blocked, goodbye, an error of request 0)
+ * or a receiver: 1: handled; 0: it is for the caller; -1: the connection is broken, *error says why. */
 int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error);
 enum fl_step {
     FL_STEP_MESSAGE, /* for the caller */
-    FL_STEP_SERVED,  /* bytes came or went, or a message was for the connection, its job or its view */
+    FL_STEP_SERVED,  /* bytes came or went, or a message was for the connection or a receiver */
     FL_STEP_FAILED
 };
 /* One message, or one round of waiting if there is none. */
@@ -96,19 +107,5 @@ bool fl_connection_ask(struct fl_connection *connection, const struct message *q
 bool fl_connection_heed_silence(struct fl_connection *connection, struct fl_error *error);
 /* The daemon's error as ours; returns false. */
 bool fl_error_from_message(struct fl_error *error, const struct message_error *message);
-
-/* ---- job.c, view.c, attach.c ---- */
-
-/* Whether a message was the job's or the view's, as fl_connection_consume: complete frames are kept until the
- * caller fetches them. */
-int fl_job_take(struct fl_job *job, const struct framing_header *header, const struct message *message,
-                struct fl_error *error);
-int fl_view_take(struct fl_view *view, const struct framing_header *header, const struct message *message,
-                 struct fl_error *error);
-/* Of another client's doing. */
-void fl_scenes_changed(struct fl_connection *connection, const struct message_scene_changed *changed);
-/* Connects a socket to "unix:PATH" or "tcp:HOST:PORT"; -1 on failure. `local`: see fl_connection_is_local. */
-int fl_address_connect(const char *address, uint64_t deadline_ns, int interrupt_fd, bool *local,
-                       struct fl_error *error);
 
 #endif

@@ -14,11 +14,6 @@
 #define H264_EXTRA_BYTES 65536u /* likewise */
 #define ATTACHMENT_PIXEL_BYTES 4u
 
-uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
-{
-    return (unsigned)format < PROTOCOL_PIXEL_FORMAT_COUNT ? protocol_pixel_format_bytes(format) : 0;
-}
-
 /* Bytes of all layers together; 0: more than a size_t holds. */
 static size_t pixels_bytes_of(const struct message_frame_begin *begin)
 {

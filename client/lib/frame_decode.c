@@ -14,6 +14,11 @@
 
 #define ATTACHMENT_PIXEL_BYTES 4u
 
+uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
+{
+    return (unsigned)format < PROTOCOL_PIXEL_FORMAT_COUNT ? protocol_pixel_format_bytes(format) : 0;
+}
+
 /* ---- colours ---- */
 
 static size_t colours_come(const struct fl_encoded *encoded)

@@ -10,6 +10,7 @@
 #define CANCEL_NS 10000000000ull
 
 struct fl_job {
+    struct fl_receiver receiver; /* first */
     struct fl_connection *connection;
     uint32_t request, channel;
     uint64_t credit;     /* frames that the daemon may have sent by now */
@@ -21,6 +22,8 @@ struct fl_job {
     struct fl_frame_queue done; /* that nobody has asked for yet */
 };
 
+static fl_take_fn take_message;
+
 struct message_render fl_render_defaults(void)
 {
     struct message message;
@@ -31,7 +34,7 @@ struct message_render fl_render_defaults(void)
 struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_render *wanted, struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
-    if (connection->job) {
+    if (connection->has_job) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another job runs on this connection");
         return NULL;
     }
@@ -71,7 +74,9 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_rend
         free(job);
         return NULL;
     }
-    connection->job = job;
+    job->receiver.take = take_message;
+    connection->has_job = true;
+    fl_connection_add(connection, &job->receiver);
     return job;
 }
 
@@ -120,9 +125,11 @@ static bool take(struct fl_job *job, const struct message *message, struct fl_er
     }
 }
 
-int fl_job_take(struct fl_job *job, const struct framing_header *header, const struct message *message,
-                struct fl_error *error)
+/* Complete frames are kept until the caller fetches them. */
+static int take_message(struct fl_receiver *receiver, const struct framing_header *header,
+                        const struct message *message, struct fl_error *error)
 {
+    struct fl_job *job = (struct fl_job *)receiver;
     struct fl_error why = {0};
     if (header->request != job->request)
         return 0;
@@ -198,6 +205,7 @@ void fl_render_destroy(struct fl_job *job)
         fl_render_cancel(job, &ignored);
     fl_assembly_finish(&job->assembly);
     fl_frame_queue_finish(&job->done);
-    job->connection->job = NULL;
+    job->connection->has_job = false;
+    fl_connection_remove(job->connection, &job->receiver);
     free(job);
 }

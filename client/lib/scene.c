@@ -6,6 +6,25 @@
 #include <stdlib.h>
 #include <string.h>
 
+void fl_scene_note_revision(struct fl_scene *scene, uint64_t revision)
+{
+    if (revision > scene->revision)
+        scene->revision = revision;
+}
+
+/* The message is for all that have the scene. */
+static int take_message(struct fl_receiver *receiver, const struct framing_header *header,
+                        const struct message *message, struct fl_error *error)
+{
+    struct fl_scene *scene = (struct fl_scene *)receiver;
+    (void)header;
+    (void)error;
+    if (message->type != MESSAGE_SCENE_CHANGED || message->scene_changed.scene != scene->scene)
+        return 0;
+    fl_scene_note_revision(scene, message->scene_changed.revision);
+    return 1;
+}
+
 struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_error *error)
 {
     struct fl_scene *scene = calloc(1, sizeof(*scene));
@@ -15,8 +34,8 @@ struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_err
     }
     scene->connection = connection;
     scene->scene = ++connection->last_scene;
-    scene->next = connection->scenes;
-    connection->scenes = scene;
+    scene->receiver.take = take_message;
+    fl_connection_add(connection, &scene->receiver);
     return scene;
 }
 
@@ -56,10 +75,7 @@ void fl_scene_destroy(struct fl_scene *scene)
         take_clips_away(scene);
     close.scene_close.scene = scene->scene;
     fl_connection_send_late(scene->connection, fl_connection_next_request(scene->connection), &close);
-    struct fl_scene **place = &scene->connection->scenes;
-    while (*place != scene)
-        place = &(*place)->next;
-    *place = scene->next;
+    fl_connection_remove(scene->connection, &scene->receiver);
     free(scene->clips);
     fl_scene_forget_import(scene);
     free(scene);

@@ -7,7 +7,7 @@
 #include "lib/imported.h"
 
 struct fl_scene {
-    struct fl_scene *next; /* of the connection's */
+    struct fl_receiver receiver; /* first: of changes by other clients */
     struct fl_connection *connection;
     uint32_t scene;
     uint64_t revision; /* the newest that the daemon has named */
@@ -25,6 +25,8 @@ struct fl_scene {
 
 /* A new scene of the connection, with its own number; nothing is sent. NULL: out of memory. */
 struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_error *error);
+/* Keeps the newest revision that the daemon has named. */
+void fl_scene_note_revision(struct fl_scene *scene, uint64_t revision);
 /* Frees what an import has told of it. */
 void fl_scene_forget_import(struct fl_scene *scene);
 

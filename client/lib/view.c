@@ -25,6 +25,7 @@ struct asked {
 };
 
 struct fl_view {
+    struct fl_receiver receiver; /* first */
     struct fl_connection *connection;
     uint32_t scene, channel;
     uint64_t credit;     /* frames that the daemon may have sent by now */
@@ -108,10 +109,12 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
     return true;
 }
 
+static fl_take_fn take_message;
+
 struct fl_view *fl_view_start(struct fl_scene *scene, const struct message_render *wanted, struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
-    if (connection->view) {
+    if (connection->has_view) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another view runs on this connection");
         return NULL;
     }
@@ -129,7 +132,9 @@ struct fl_view *fl_view_start(struct fl_scene *scene, const struct message_rende
         return NULL;
     }
     view->credit = view->done.capacity;
-    connection->view = view;
+    view->receiver.take = take_message;
+    connection->has_view = true;
+    fl_connection_add(connection, &view->receiver);
     return view;
 }
 
@@ -337,9 +342,11 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
     }
 }
 
-int fl_view_take(struct fl_view *view, const struct framing_header *header, const struct message *message,
-                 struct fl_error *error)
+/* Complete frames are kept until the caller fetches them. */
+static int take_message(struct fl_receiver *receiver, const struct framing_header *header,
+                        const struct message *message, struct fl_error *error)
 {
+    struct fl_view *view = (struct fl_view *)receiver;
     struct fl_error why = {0};
     size_t index = 0;
     while (index < view->asked_count && view->asked[index].request != header->request)
@@ -397,6 +404,7 @@ void fl_view_destroy(struct fl_view *view)
     }
     fl_assembly_finish(&view->assembly);
     fl_frame_queue_finish(&view->done);
-    connection->view = NULL;
+    connection->has_view = false;
+    fl_connection_remove(connection, &view->receiver);
     free(view);
 }
