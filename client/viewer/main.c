@@ -11,7 +11,7 @@
 #include "options/talk.h"
 #include "options/views.h"
 #include "lib/text.h"
-#include "viewer/input.h"
+#include "viewer/input/controls.h"
 #include "viewer/viewer.h"
 #include "protocol/common/standard.h"
 #include "protocol/version.h"

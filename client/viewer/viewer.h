@@ -4,8 +4,8 @@
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_H
 
-#include "viewer/plan.h"
-#include "viewer/recall.h"
+#include "viewer/view/plan.h"
+#include "viewer/input/recall.h"
 
 struct viewer_options {
     const char *server, *key_file, *model, *environment, *scene_name; /* as of session_options */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The viewer's outputs: picture and overlay, screenshots, its state as JSON. */
-#include "viewer/paint.h"
-#include "viewer/snapshot.h"
+#include "viewer/overlay/paint.h"
+#include "viewer/overlay/snapshot.h"
 #include "viewer/viewer_state.h"
 #include "protocol/common/clock.h"
 

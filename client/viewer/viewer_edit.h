@@ -4,8 +4,8 @@
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_EDIT_H
 
 #include "options/edit_history.h"
-#include "viewer/edit_rows.h"
-#include "viewer/input.h"
+#include "viewer/edit/rows.h"
+#include "viewer/input/controls.h"
 
 #include <pthread.h>
 #include <stdatomic.h>

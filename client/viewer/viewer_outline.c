@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The outline of what the panel changes: asked for once the picture is at rest, and drawn over that picture alone.
  */
-#include "viewer/outline.h"
+#include "viewer/overlay/outline.h"
 #include "viewer/viewer_state.h"
 
 #include <math.h>

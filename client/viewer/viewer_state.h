@@ -3,14 +3,14 @@
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_STATE_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_STATE_H
 
-#include "viewer/decode.h"
-#include "viewer/hud.h"
-#include "viewer/replay.h"
-#include "viewer/session.h"
+#include "viewer/view/decode.h"
+#include "viewer/overlay/hud.h"
+#include "viewer/input/replay.h"
+#include "viewer/view/session.h"
 #include "viewer/viewer.h"
 #include "viewer/viewer_edit.h"
-#include "viewer/views.h"
-#include "viewer/window.h"
+#include "viewer/view/views.h"
+#include "viewer/overlay/window.h"
 
 /* What a job beside the view is for. */
 enum viewer_task {

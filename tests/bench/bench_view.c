@@ -10,8 +10,8 @@
 #include "tests/bench/bench.h"
 
 #include "lib/farlight.h"
-#include "viewer/camera.h"
-#include "viewer/decode.h"
+#include "viewer/input/camera.h"
+#include "viewer/view/decode.h"
 #include "protocol/common/clock.h"
 
 #include <dirent.h>

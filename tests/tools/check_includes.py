@@ -76,7 +76,14 @@ MAY_INCLUDE = {
     "client/cli": (
         "protocol/common", "client/lib", "client/options", "client/cli/jobs", "client/cli/compare", "client/cli/daemon"),
     "client/web": ("protocol/common", "client/lib", "client/options"),  # no scene file; pixels are compared, but never encoded
-    "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/options"),
+    "client/viewer/input": ("protocol", "client/warp", "client/lib", "client/options"),
+    "client/viewer/overlay": ("protocol/common", "client/lib", "client/viewer/input"),
+    "client/viewer/view": (
+        "protocol/common", "client/warp", "client/lib", "client/options", "client/viewer/input", "client/viewer/overlay"),
+    "client/viewer/edit": ("client/lib", "client/viewer/overlay"),
+    "client/viewer": (
+        "protocol/common", "client/lib", "client/options", *(f"client/viewer/{room}" for room in (
+            "input", "overlay", "view", "edit"))),
 }
 # Files that every room may include.
 FOR_EVERYBODY = re.compile(r"^protocol/((version|plain_text)\.h|(words|tracers)\.(h|def))$")

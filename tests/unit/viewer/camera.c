@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The viewer's camera, what mouse and keys do to it, the way through cameras and clips, and what keys switch. */
-#include "viewer/input.h"
-#include "viewer/settings.h"
-#include "viewer/tour.h"
+#include "viewer/input/controls.h"
+#include "viewer/input/settings.h"
+#include "viewer/input/tour.h"
 #include "tests/harness/test.h"
 
 #include <math.h>

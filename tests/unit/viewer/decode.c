@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* H.264 as the viewer decodes it: made by an encoder of the same library. */
-#include "viewer/decode.h"
+#include "viewer/view/decode.h"
 #include "tests/harness/test.h"
 
 #include <libavcodec/avcodec.h>

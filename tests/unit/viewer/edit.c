@@ -2,8 +2,8 @@
 /* Editing in the viewer: rows of an object's fields, what keys and drags make of them, the panel that shows them,
  * and undoing. */
 #include "options/edit_history.h"
-#include "viewer/edit_rows.h"
-#include "viewer/hud_edit.h"
+#include "viewer/edit/rows.h"
+#include "viewer/overlay/edit_panel.h"
 #include "tests/harness/test.h"
 
 #include <math.h>

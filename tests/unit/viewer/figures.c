@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What the viewer tells of frames: rates, latencies, two clocks on one axis, errors as heat, and that the overlay
  * stays within the window. */
-#include "viewer/hud.h"
+#include "viewer/overlay/hud.h"
 #include "tests/harness/test.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The outline of what is chosen: what belongs to it, and where its line is. */
-#include "viewer/outline.h"
+#include "viewer/overlay/outline.h"
 #include "tests/harness/test.h"
 
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* When views are made here, of which camera the daemon is asked for a picture, and in which quality. */
-#include "viewer/plan.h"
+#include "viewer/view/plan.h"
 #include "tests/harness/test.h"
 
 #include <math.h>

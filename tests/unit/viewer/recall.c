@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What the viewer remembers: it comes back as it was, and a file that holds anything else does no harm. */
-#include "viewer/recall.h"
+#include "viewer/input/recall.h"
 #include "tests/harness/test.h"
 
 #include <stdio.h>

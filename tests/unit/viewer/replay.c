@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The viewer's list of timed events: what it may hold, and what is told about what it may not. */
-#include "viewer/replay.h"
+#include "viewer/input/replay.h"
 #include "tests/harness/test.h"
 
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The window's side of SDL: what its events become, and what is painted; with drivers that need no display. */
-#include "viewer/paint.h"
-#include "viewer/window.h"
+#include "viewer/overlay/paint.h"
+#include "viewer/overlay/window.h"
 #include "tests/harness/test.h"
 
 #include <SDL2/SDL.h>
