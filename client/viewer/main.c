@@ -138,7 +138,7 @@ static error_t set_encoding(struct command_line *line, const char *value)
 static error_t set_still_encoding(struct command_line *line, const char *value)
 {
     struct viewer_options *viewer = &line->viewer;
-    viewer->has_still_encoding = true;
+    viewer->view.has_still_encoding = true;
     if (protocol_encoding_parse(value, &line->job.options.still_encoding) &&
         line->job.options.still_encoding != PROTOCOL_ENCODING_H264)
         return 0;
@@ -196,7 +196,7 @@ static error_t set_moving_rate(struct command_line *line, const char *value)
     double real = 0;
     const error_t status =
         name_field(&line->job, "--moving-rate", fl_text_real(value, 0, 1000, &real, &line->job.error));
-    line->viewer.moving_rate = (float)real;
+    line->viewer.view.moving_rate = (float)real;
     line->has_moving_rate = true;
     return status;
 }
@@ -227,10 +227,10 @@ static error_t parse(int key, char *value, struct argp_state *state)
         viewer->replay = value;
         return 0;
     case KEY_ADAPT:
-        viewer->always_adapt = true;
+        viewer->view.always_adapt = true;
         return 0;
     case KEY_NO_ADAPT:
-        viewer->never_adapt = true;
+        viewer->view.never_adapt = true;
         return 0;
     case KEY_MOVING_RATE:
         return set_moving_rate(line, value);
@@ -319,20 +319,20 @@ static void fill(struct command_line *line)
     viewer->edit_count = job->edit_count;
     viewer->point_size = job->point_size;
     viewer->scene_name = job->scene;
-    viewer->view = job->options;
-    viewer->view.views_across = viewer->view.views_down = 1;
-    viewer->view.eyes_over = 0;
-    viewer->view.baseline = 0;
-    viewer->view.view_source = job->views.has_lens ? job->views.lens : PROTOCOL_VIEW_SOURCE_RAYS;
+    viewer->view.render = job->options;
+    viewer->view.render.views_across = viewer->view.render.views_down = 1;
+    viewer->view.render.eyes_over = 0;
+    viewer->view.render.baseline = 0;
+    viewer->view.render.view_source = job->views.has_lens ? job->views.lens : PROTOCOL_VIEW_SOURCE_RAYS;
     viewer->stereo = job->views.has_stereo;
-    viewer->stereo_m = job->views.has_stereo ? job->views.stereo_m : STEREO_DEFAULT_M;
-    viewer->stereo_over = job->views.layout == CLI_STEREO_OVER;
+    viewer->view.stereo_m = job->views.has_stereo ? job->views.stereo_m : STEREO_DEFAULT_M;
+    viewer->view.stereo_over = job->views.layout == CLI_STEREO_OVER;
     viewer->views = job->views.has_stereo ? job->options.view_source : PROTOCOL_VIEW_SOURCE_LAYERS;
     if (!line->has_moving_rate)
-        viewer->moving_rate = viewer->never_adapt ? 0.0f : MOVING_RATE_DEFAULT;
-    viewer->has_encoding = job->has_encoding;
-    viewer->has_primary = job->has_primary;
-    viewer->has_integrator = job->has_integrator;
+        viewer->view.moving_rate = viewer->view.never_adapt ? 0.0f : MOVING_RATE_DEFAULT;
+    viewer->view.has_encoding = job->has_encoding;
+    viewer->view.has_primary = job->has_primary;
+    viewer->view.jumps = viewer->replay != NULL;
     viewer->camera = job->camera;
     viewer->framed = job->framed;
     viewer->has_framing = job->has_framing;

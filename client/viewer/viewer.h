@@ -4,8 +4,8 @@
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_H
 
-#include "viewer/view/plan.h"
 #include "viewer/input/recall.h"
+#include "viewer/view/view.h"
 
 struct viewer_options {
     const char *server, *key_file, *model, *environment, *scene_name; /* as of session_options */
@@ -18,20 +18,15 @@ struct viewer_options {
     size_t edit_count;
     double environment_degrees, point_size; /* likewise */
     bool without_studio;                    /* likewise */
-    /* From the command line; width and height are the window's, in pixels of the desktop. */
-    struct message_render view;      /* of one eye */
-    bool stereo, stereo_over;        /* two views from the beginning; the left one above the other */
-    float stereo_m;                  /* between the eyes */
+    struct view_options view;
+    bool stereo;                     /* two views from the beginning */
     enum protocol_view_source views; /* of two eyes */
-    bool has_encoding, has_still_encoding, has_primary, has_integrator;
-    bool always_adapt, never_adapt;
-    float moving_rate;         /* frames a second */
-    const char *camera, *clip; /* names or numbers; NULL: none is named */
-    const char *framed;        /* node that is to be in view, likewise */
-    bool has_framing;          /* the camera is placed by the side that it looks from */
-    double speed;              /* of the clip */
-    unsigned coarser;          /* as of struct settings */
-    enum local_views local;    /* likewise */
+    const char *camera, *clip;       /* names or numbers; NULL: none is named */
+    const char *framed;              /* node that is to be in view, likewise */
+    bool has_framing;                /* the camera is placed by the side that it looks from */
+    double speed;                    /* of the clip */
+    unsigned coarser;                /* as of struct settings */
+    enum local_views local;          /* likewise */
     enum overlay_mode overlay;
     enum fl_warp_holes holes;
     const char *state;    /* the file of what is remembered; NULL: none */

@@ -80,7 +80,8 @@ MAY_INCLUDE = {
     "client/viewer/overlay": ("protocol/common", "client/lib", "client/viewer/input"),
     "client/viewer/view": (
         "protocol/common", "client/warp", "client/lib", "client/options", "client/viewer/input", "client/viewer/overlay"),
-    "client/viewer/edit": ("client/lib", "client/viewer/overlay"),
+    "client/viewer/edit": (
+        "protocol/common", "client/lib", "client/options", "client/viewer/input", "client/viewer/overlay", "client/viewer/view"),
     "client/viewer": (
         "protocol/common", "client/lib", "client/options", *(f"client/viewer/{room}" for room in (
             "input", "overlay", "view", "edit"))),

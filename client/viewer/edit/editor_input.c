@@ -1,74 +1,71 @@
 /* SPDX-License-Identifier: MIT */
 /* Mouse and keys in the panel in which an object is edited. */
-#include "viewer/viewer_edit.h"
-#include "viewer/viewer_state.h"
+#include "editor.h"
 
 #include <string.h>
 
 #define FINE 0.1 /* of a step, with Shift */
 
-static bool has_number(const struct viewer_edit *edit)
+static bool has_number(const struct editor *edit)
 {
-    return viewer_edit_has_field(edit) && !edit_row_is_choice(&edit->state, edit->rows[edit->chosen - 1]);
+    return editor_has_field(edit) && !edit_row_is_choice(&edit->state, edit->rows[edit->chosen - 1]);
 }
 
-static void end_typing(struct viewer *viewer)
+static void end_typing(struct editor *edit)
 {
-    struct viewer_edit *edit = &viewer->edit;
     struct fl_error error = {0};
     double value;
-    if (viewer_edit_must_wait(viewer))
+    if (editor_must_wait(edit))
         return;
     if (edit->typed[0] != '\0' &&
         edit_row_read(&edit->state, edit->rows[edit->chosen - 1], edit->typed, &value, &error))
-        viewer_edit_apply(viewer, edit->chosen - 1, value, false);
+        editor_apply(edit, edit->chosen - 1, value, false);
     else if (edit->typed[0] != '\0')
-        viewer_say(viewer, "%s", error.text);
-    viewer_edit_stop_typing(edit);
+        screen_say(edit->screen, "%s", error.text);
+    editor_stop_typing(edit);
 }
 
-static void slide_to(struct viewer *viewer, double x)
+static void slide_to(struct editor *edit, double x)
 {
-    struct viewer_edit *edit = &viewer->edit;
     const struct edit_row row = edit->rows[edit->chosen - 1];
-    edit->pending =
-        edit->slides
-            ? edit_row_slide(&edit->state, row, hud_edit_share(viewer->width, viewer->scale, x))
-            : edit_row_drag(&edit->state, row, edit->drag_from, (x - edit->drag_x) / viewer->scale, edit->metre);
+    edit->pending = edit->slides ? edit_row_slide(&edit->state, row,
+                                                  hud_edit_share(edit->screen->width, edit->screen->scale, x))
+                                 : edit_row_drag(&edit->state, row, edit->drag_from,
+                                                 (x - edit->drag_x) / edit->screen->scale, edit->metre);
     edit->pending_row = edit->chosen - 1;
-    edit->has_pending = true;
+    edit->choice.has_pending = true;
 }
 
-static bool press(struct viewer *viewer, const struct input *input)
+static bool press(struct editor *edit, const struct input *input)
 {
-    struct viewer_edit *edit = &viewer->edit;
     struct hud_edit_hit hit;
-    hud_edit_find(viewer_edit_hud(viewer), viewer->width, viewer->height, viewer->scale, input->x, input->y, &hit);
+    hud_edit_find(editor_hud(edit), edit->screen->width, edit->screen->height, edit->screen->scale, input->x,
+                  input->y, &hit);
     /* What begins must wait until the daemon has the last change. */
-    if (!hit.is_panel || input->button != INPUT_LEFT || viewer_edit_must_wait(viewer) || edit->has_pending)
+    if (!hit.is_panel || input->button != INPUT_LEFT || editor_must_wait(edit) || edit->choice.has_pending)
         return hit.is_panel;
-    viewer_edit_stop_typing(edit);
+    editor_stop_typing(edit);
     if (hit.part == HUD_EDIT_TAB)
-        viewer_edit_choose_tab(viewer, hit.index);
+        editor_choose_tab(edit, hit.index);
     if (hit.part != HUD_EDIT_ROW && hit.part != HUD_EDIT_SLIDER)
         return true;
     edit->chosen = hit.index;
     if (!has_number(edit)) {
-        viewer_edit_step(viewer, 1);
+        editor_turn(edit, 1);
         return true;
     }
-    edit->dragging = true;
+    edit->choice.dragging = true;
     edit->drag_is_noted = false;
     edit->slides = hit.part == HUD_EDIT_SLIDER;
     edit->drag_x = input->x;
     edit->drag_from = edit_row_value(&edit->state, edit->rows[edit->chosen - 1]);
     if (edit->slides)
-        slide_to(viewer, input->x);
+        slide_to(edit, input->x);
     return true;
 }
 
 /* A number begins by itself: signs and dots are keys of something else. */
-static bool take_text(struct viewer_edit *edit, const char *text)
+static bool take_text(struct editor *edit, const char *text)
 {
     const char c = text[0] == ',' ? '.' : text[0];
     const size_t length = strlen(edit->typed);
@@ -82,35 +79,33 @@ static bool take_text(struct viewer_edit *edit, const char *text)
     return true;
 }
 
-static bool type(struct viewer *viewer, const struct input *input)
+static bool type(struct editor *edit, const struct input *input)
 {
-    struct viewer_edit *edit = &viewer->edit;
     const size_t length = strlen(edit->typed);
     if (strcmp(input->key, "escape") == 0)
-        viewer_edit_stop_typing(edit);
+        editor_stop_typing(edit);
     else if (strcmp(input->key, "backspace") == 0 && length > 0)
         edit->typed[length - 1] = '\0';
     else if (strcmp(input->key, "return") == 0 || strcmp(input->key, "keypad enter") == 0)
-        end_typing(viewer);
+        end_typing(edit);
     return true;
 }
 
-static bool press_key(struct viewer *viewer, const struct input *input)
+static bool press_key(struct editor *edit, const struct input *input)
 {
-    struct viewer_edit *edit = &viewer->edit;
     const size_t count = edit->row_count + 1;
     if (edit->typing)
-        return type(viewer, input);
+        return type(edit, input);
     if (strcmp(input->key, "escape") == 0)
-        edit->shown = false;
+        edit->choice.shown = false;
     else if (strcmp(input->key, "up") == 0 || strcmp(input->key, "down") == 0)
         edit->chosen = (edit->chosen + (input->key[0] == 'd' ? 1 : count - 1)) % count;
     else if (strcmp(input->key, "left") == 0 || strcmp(input->key, "right") == 0)
-        viewer_edit_step(viewer, (input->key[0] == 'r' ? 1 : -1) * (input->shift ? FINE : 1));
+        editor_turn(edit, (input->key[0] == 'r' ? 1 : -1) * (input->shift ? FINE : 1));
     else if (strcmp(input->key, "tab") == 0)
-        viewer_edit_choose_tab(viewer, edit->tab + (input->shift ? EDIT_TABS - 1 : 1));
-    else if (strcmp(input->key, "return") == 0 && edit->tab == EDIT_LIGHT && edit->chosen == 0)
-        viewer_edit_choose_node_of_light(viewer);
+        editor_choose_tab(edit, edit->choice.tab + (input->shift ? EDIT_TABS - 1 : 1));
+    else if (strcmp(input->key, "return") == 0 && edit->choice.tab == EDIT_LIGHT && edit->chosen == 0)
+        editor_choose_node_of_light(edit);
     else if (strcmp(input->key, "return") == 0 && has_number(edit))
         edit->typing = true;
     else
@@ -118,43 +113,42 @@ static bool press_key(struct viewer *viewer, const struct input *input)
     return true;
 }
 
-static bool is_on_panel(struct viewer *viewer, double x, double y)
+static bool is_on_panel(struct editor *edit, double x, double y)
 {
     struct hud_edit_hit hit;
-    hud_edit_find(viewer_edit_hud(viewer), viewer->width, viewer->height, viewer->scale, x, y, &hit);
+    hud_edit_find(editor_hud(edit), edit->screen->width, edit->screen->height, edit->screen->scale, x, y, &hit);
     return hit.is_panel;
 }
 
-bool viewer_edit_input(struct viewer *viewer, const struct input *input)
+bool editor_input(struct editor *edit, const struct input *input)
 {
-    struct viewer_edit *edit = &viewer->edit;
-    if (!edit->shown || viewer->settings.help || !session_has_scene(viewer->session))
+    if (!edit->choice.shown || !session_has_scene(edit->session))
         return false;
-    viewer->must_draw = true;
+    edit->screen->must_draw = true;
     switch (input->kind) {
     case INPUT_BUTTON_DOWN:
-        return press(viewer, input);
+        return press(edit, input);
     case INPUT_MOTION:
-        if (edit->dragging)
-            slide_to(viewer, input->x);
-        return edit->dragging;
+        if (edit->choice.dragging)
+            slide_to(edit, input->x);
+        return edit->choice.dragging;
     case INPUT_BUTTON_UP:
-        edit->dragging = false; /* the last value of it may be pending */
+        edit->choice.dragging = false; /* the last value of it may be pending */
         return false;
     case INPUT_WHEEL:
-        if (!is_on_panel(viewer, viewer->pointer_x, viewer->pointer_y))
+        if (!is_on_panel(edit, edit->screen->pointer_x, edit->screen->pointer_y))
             return false;
-        if (!edit->dragging && !edit->typing)
+        if (!edit->choice.dragging && !edit->typing)
             edit->chosen = input->wheel > 0 ? edit->chosen - (edit->chosen > 0)
                                             : edit->chosen + (edit->chosen < edit->row_count);
         return true;
     case INPUT_FOCUS_LOST:
-        viewer_edit_stop_typing(edit);
+        editor_stop_typing(edit);
         return false;
     case INPUT_TEXT:
         return take_text(edit, input->text);
     case INPUT_KEY_DOWN:
-        return press_key(viewer, input);
+        return press_key(edit, input);
     default:
         return false;
     }

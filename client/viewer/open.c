@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Opens scenes: that of the command line, and the file that is dropped on the window. The shown scene stays until
  * the other one is there. */
-#include "viewer/viewer_state.h"
+#include "state.h"
 #include "options/talk.h"
 #include "lib/importer.h"
 #include "protocol/common/clock.h"
@@ -14,7 +14,7 @@ static void say_stale(void *user, const struct fl_error *error)
 {
     char line[1200];
     fl_error_print(error, line, sizeof(line));
-    viewer_say(user, "%s", line);
+    screen_say(user, "%s", line);
     cli_report(error);
 }
 
@@ -29,7 +29,7 @@ struct session *viewer_open_session(struct viewer *viewer, const char *dropped, 
                                             .input_fd = options->input_fd,
                                             .watch = options->watch,
                                             .stale = say_stale,
-                                            .user = viewer,
+                                            .user = &viewer->screen,
                                             .environment = options->environment,
                                             .environment_degrees = options->environment_degrees,
                                             .without_studio = options->without_studio,
@@ -58,87 +58,81 @@ void viewer_open(struct viewer *viewer, const char *path)
 {
     struct fl_error error = {0};
     char line[HUD_TEXT_MAX];
-    if (viewer->next) {
-        viewer_say(viewer, "%.60s is being opened still", viewer->next_model);
+    if (viewer->opening.session) {
+        screen_say(&viewer->screen, "%.60s is being opened still", viewer->opening.model);
         return;
     }
-    viewer->next_model = strdup(path);
-    if (viewer->next_model && fl_importer_check_file(path, &error))
-        viewer->next = viewer_open_session(viewer, viewer->next_model, &error);
-    if (viewer->next)
+    viewer->opening.model = strdup(path);
+    if (viewer->opening.model && fl_importer_check_file(path, &error))
+        viewer->opening.session = viewer_open_session(viewer, viewer->opening.model, &error);
+    if (viewer->opening.session)
         return;
-    free(viewer->next_model);
-    viewer->next_model = NULL;
+    free(viewer->opening.model);
+    viewer->opening.model = NULL;
     fl_error_print(&error, line, sizeof(line));
-    viewer_say(viewer, "%s", line);
+    screen_say(&viewer->screen, "%s", line);
 }
 
 /* Cameras, clips and nodes that the command line names are of its model. */
 static void forget_scene(struct viewer *viewer)
 {
-    viewer->view = viewer->options->view;
-    viewer->view.camera_path = fl_view_defaults().camera_path;
-    viewer->view.keys = NULL;
-    viewer->view.keys_count = 0;
-    viewer->view.auto_node = 0;
-    viewer_forget_local(viewer);
-    viewer_edit_forget(viewer);
-    viewer->has_camera = viewer->has_home = viewer->is_live = false;
-    viewer->followed = 0;
-    viewer->glide_begin_ns = 0;
+    struct view *view = &viewer->view;
+    view->render = viewer->options->view.render;
+    view->render.camera_path = fl_view_defaults().camera_path;
+    view->render.keys = NULL;
+    view->render.keys_count = 0;
+    view->render.auto_node = 0;
+    view_forget_local(view);
+    editor_forget(&viewer->edit);
+    view->eye.has_camera = view->eye.has_home = view->frames.is_live = false;
+    view->eye.followed = 0;
+    view->eye.glide_begin_ns = 0;
     viewer->times_live = 0;
-    viewer->frames = 0;
-    viewer->structure_count = 0;
-    viewer->refused[0] = '\0';
-    viewer->wanted = TASK_NONE;
+    view->frames.count = 0;
+    view->frames.structure_count = 0;
+    view->refused[0] = '\0';
+    view->tasks.next = TASK_NONE;
 }
 
 static void replace(struct viewer *viewer)
 {
-    session_destroy(viewer->session);
+    struct view *view = &viewer->view;
+    session_destroy(view->session);
     free(viewer->model);
-    viewer->session = viewer->next;
-    viewer->model = viewer->next_model;
-    viewer->next = NULL;
-    viewer->next_model = NULL;
-    viewer->notice_ns = 0; /* that it is being opened */
+    view->session = viewer->edit.session = viewer->opening.session;
+    viewer->model = viewer->opening.model;
+    view->is_dropped = true;
+    viewer->opening.session = NULL;
+    viewer->opening.model = NULL;
+    viewer->screen.notice_ns = 0; /* that it is being opened */
     forget_scene(viewer);
-    if (viewer->window)
-        window_set_title(viewer->window, viewer_scene_name(viewer));
+    if (viewer->screen.window)
+        window_set_title(viewer->screen.window, viewer_scene_name(viewer));
 }
 
 void viewer_step_opening(struct viewer *viewer, uint64_t now_ns)
 {
     char line[HUD_TEXT_MAX];
     double share = 0;
-    if (!viewer->next || viewer_edit_works(viewer, false))
+    if (!viewer->opening.session || editor_works(&viewer->edit, false))
         return;
-    const enum session_state state = session_step(viewer->next, now_ns);
+    const enum session_state state = session_step(viewer->opening.session, now_ns);
     if (state == SESSION_LIVE) {
         replace(viewer);
     } else if (state == SESSION_FAILED) {
-        fl_error_print(session_error(viewer->next), line, sizeof(line));
-        viewer_say(viewer, "%s", line);
+        fl_error_print(session_error(viewer->opening.session), line, sizeof(line));
+        screen_say(&viewer->screen, "%s", line);
         viewer_abandon_opening(viewer);
     } else {
-        const char *what = session_progress(viewer->next, &share);
-        viewer_say(viewer, "opening %.60s: %.40s %.0f %%", viewer->next_model, what, share * 100);
+        const char *what = session_progress(viewer->opening.session, &share);
+        screen_say(&viewer->screen, "opening %.60s: %.40s %.0f %%", viewer->opening.model, what, share * 100);
     }
 }
 
 void viewer_abandon_opening(struct viewer *viewer)
 {
-    session_destroy(viewer->next);
-    free(viewer->next_model);
-    viewer->next = NULL;
-    viewer->next_model = NULL;
-}
-
-void viewer_refuse_scene(struct viewer *viewer, const struct fl_error *refusal)
-{
-    if (viewer->model)
-        snprintf(viewer->refused, sizeof(viewer->refused), "%.120s", refusal->text);
-    else
-        viewer->failure = *refusal;
-    viewer->must_draw = true;
+    session_destroy(viewer->opening.session);
+    free(viewer->opening.model);
+    viewer->opening.session = NULL;
+    viewer->opening.model = NULL;
 }

@@ -1,27 +1,26 @@
 /* SPDX-License-Identifier: MIT */
 /* The object that is edited in the window: its panel, its changes, and what undoes them. */
-#ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_EDIT_H
-#define FARLIGHT_CLIENT_VIEWER_VIEWER_EDIT_H
+#ifndef FARLIGHT_VIEWER_EDIT_EDITOR_H
+#define FARLIGHT_VIEWER_EDIT_EDITOR_H
 
 #include "options/edit_history.h"
-#include "viewer/edit/rows.h"
+#include "rows.h"
 #include "viewer/input/controls.h"
+#include "viewer/overlay/screen.h"
+#include "viewer/view/outline.h"
+#include "viewer/view/session.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
 
-struct session;
-struct viewer;
-
-enum viewer_edit_tab { EDIT_NODE, EDIT_MATERIAL, EDIT_LIGHT, EDIT_ENVIRONMENT, EDIT_TABS };
 #define EDIT_ROWS_MAX (HUD_EDIT_ROWS_MAX - 1) /* the first says which object it is */
 
-/* The object that is edited. */
-struct viewer_edit {
-    bool shown;
-    size_t tab;
-    uint32_t picked;           /* node; that of `ids` is it, or one above it */
-    uint32_t ids[EDIT_TABS];   /* 0: none */
+/* The screen and the session are the owner's. */
+struct editor {
+    struct screen *screen;
+    struct session *session; /* the shown one */
+    struct edit_choice choice;
+    uint32_t picked;           /* node; that of the choice is it, or one above it */
     struct fl_object *objects; /* of the tab's kind; NULL: not asked for yet */
     size_t object_count;
     bool has_state;
@@ -35,9 +34,8 @@ struct viewer_edit {
     bool typing;
     char typed[24];
     /* The chosen row is dragged, on its slider or from a value on. */
-    bool dragging, slides, drag_is_noted; /* the history has what undoes the drag */
+    bool slides, drag_is_noted; /* the history has what undoes the drag */
     double drag_x, drag_from;
-    bool has_pending;
     double pending;     /* a value that the daemon is not told yet .. */
     size_t pending_row; /* .. and its row, counted from 0 */
 
@@ -58,30 +56,29 @@ struct viewer_edit {
 };
 
 /* Shows the object in the panel. */
-void viewer_edit_object(struct viewer *viewer, uint32_t node, uint32_t material);
-void viewer_edit_toggle(struct viewer *viewer); /* the panel */
-void viewer_edit_undo(struct viewer *viewer, bool redo);
-/* True: the input was meant for the panel. */
-bool viewer_edit_input(struct viewer *viewer, const struct input *input);
-void viewer_step_edit(struct viewer *viewer, uint64_t now_ns);
+void editor_show(struct editor *edit, uint32_t node, uint32_t material);
+void editor_toggle(struct editor *edit); /* the panel */
+void editor_undo(struct editor *edit, bool redo);
+/* True: the input was meant for the panel. Not while the help hides it. */
+bool editor_input(struct editor *edit, const struct input *input);
+void editor_step(struct editor *edit, uint64_t now_ns);
 /* Whether the connection is in use by an edit; `wait`: until it is not. */
-bool viewer_edit_works(struct viewer *viewer, bool wait);
-bool viewer_edit_must_wait(
-    const struct viewer *viewer);               /* it is in use by that, or by a file that is read again */
-void viewer_edit_forget(struct viewer *viewer); /* of a scene that is gone */
+bool editor_works(struct editor *edit, bool wait);
+bool editor_must_wait(const struct editor *edit); /* it is in use by that, or by a file that is read again */
+void editor_forget(struct editor *edit);          /* of a scene that is gone */
 /* Its files have changed: they are the same scene, or another one, of which nothing is chosen yet. */
-void viewer_edit_read_again(struct viewer *viewer, bool is_same);
-const struct hud_edit *viewer_edit_hud(struct viewer *viewer);
+void editor_read_again(struct editor *edit, bool is_same);
+const struct hud_edit *editor_hud(struct editor *edit);
 
 /* ---- from input to it: nothing happens while it must wait ---- */
 
-void viewer_edit_choose_tab(struct viewer *viewer, size_t tab);
-void viewer_edit_choose_node_of_light(struct viewer *viewer);
+void editor_choose_tab(struct editor *edit, size_t tab);
+void editor_choose_node_of_light(struct editor *edit);
 /* The chosen row, by so many steps; in the first one another object. */
-void viewer_edit_step(struct viewer *viewer, double steps);
+void editor_turn(struct editor *edit, double steps);
 /* A row counted from 0 gets a value. `more`: of a drag, which is undone as one change. */
-void viewer_edit_apply(struct viewer *viewer, size_t row, double value, bool more);
-void viewer_edit_stop_typing(struct viewer_edit *edit);
-bool viewer_edit_has_field(const struct viewer_edit *edit); /* the chosen row is one */
+void editor_apply(struct editor *edit, size_t row, double value, bool more);
+void editor_stop_typing(struct editor *edit);
+bool editor_has_field(const struct editor *edit); /* the chosen row is one */
 
 #endif

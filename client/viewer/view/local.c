@@ -1,0 +1,305 @@
+/* SPDX-License-Identifier: MIT */
+#include "local.h"
+#include "view.h"
+#include "protocol/common/clock.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MARGIN 0.1f        /* share of the picture's edges on each side */
+#define DEPTH_PIXELS 0.25f /* that the rounding of depths may move what an eye within the radius sees */
+#define HIDDEN_LAYERS                                                                                             \
+    1 /* has most of what eyes see past edges: of a class room two thirds, a second one a tenth */
+#define RADIUS_FACTOR 4 /* another distance of what is looked at is another radius, if it is so much */
+#define ROUNDS_MIN 3u   /* frames before it is decided: the first ones are of structures that are built */
+/* Between the daemon's camera and the same one here, both in floats: less than a hundredth of a pixel. */
+#define SAME 1e-5
+
+/* ---- whether ---- */
+
+bool view_has_local(const struct view *view)
+{
+    const enum local_views mode = view->settings.local;
+    /* Where a clip moves the camera, only the daemon knows where it is. */
+    return (mode == LOCAL_ON || (mode == LOCAL_AUTO && view->local.switched.on)) && !view_follows(view);
+}
+
+void view_plan_local(struct view *view, uint64_t now_ns)
+{
+    struct metrics_summary summary;
+    metrics_summarise(&view->frames.metrics, now_ns, &summary);
+    if (view->frames.last.moving)
+        plan_pace_add(&view->local.pace, view->frames.last.command_sent_ns, now_ns);
+    if (view->frames.count == 1) /* else the first drag would find no picture to make views from */
+        view->local.switched.on = true;
+    else if (summary.round_frames >= ROUNDS_MIN)
+        plan_switch(&view->local.switched, summary.round_s, now_ns);
+}
+
+/* ---- what the daemon is asked for ---- */
+
+/* Between both eyes; 0: there is one. */
+static float baseline_of(const struct view *view)
+{
+    return view->settings.stereo ? view->options->stereo_m : 0;
+}
+
+static float radius_of(const struct view *view)
+{
+    return view->eye.has_camera
+               ? (float)(PLAN_RADIUS_SHARE * camera_distance(&view->eye.camera)) + baseline_of(view) / 2
+               : 0;
+}
+
+void view_ask_local(struct view *view, struct message_render *render)
+{
+    view->local.asked = view_has_local(view);
+    view->local.granted = false;
+    if (!view->local.asked)
+        return;
+    if (radius_of(view) > 0)
+        render->depth_radius = radius_of(view);
+    view->local.radius = render->depth_radius;
+    render->attachments |= FL_ATTACH_DEPTH | FL_ATTACH_STICKING;
+    render->depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
+    render->depth_pixels = DEPTH_PIXELS;
+    render->margin = MARGIN;
+    /* Of a lens or an open shutter the daemon has none. */
+    render->hidden_layers = render->aperture > 0 || render->shutter > 0 ? 0 : HIDDEN_LAYERS;
+}
+
+bool view_asks_otherwise(const struct view *view)
+{
+    const float radius = radius_of(view), asked = view->local.radius;
+    if (view_has_local(view) != view->local.asked)
+        return true;
+    return view->local.asked && radius > 0 && (radius > asked * RADIUS_FACTOR || radius < asked / RADIUS_FACTOR);
+}
+
+void view_refuse_local(struct view *view)
+{
+    if (view->local.asked && !view->local.granted)
+        view->settings.local = LOCAL_OFF;
+}
+
+/* ---- of which camera, and when ---- */
+
+static void follow_motion(struct view *view, uint64_t now_ns)
+{
+    if (!view->eye.has_camera ||
+        memcmp(&view->local.followed_camera, &view->eye.camera, sizeof(view->eye.camera)) == 0)
+        return;
+    plan_motion_add(&view->local.motion, &view->eye.camera, now_ns);
+    view->local.followed_camera = view->eye.camera;
+}
+
+void view_aim(const struct view *view, bool moving, uint64_t now_ns, struct viewer_camera *camera)
+{
+    *camera = view->eye.camera;
+    if (moving && view->local.asked)
+        plan_motion_predict(&view->local.motion, now_ns, plan_pace_ahead_ns(&view->local.pace), camera);
+}
+
+/* ---- what comes ---- */
+
+/* What is left without the margin. */
+static void leave_margin(struct fl_frame *frame)
+{
+    const double inner = (double)(frame->height - 2 * frame->margin_y) / frame->height;
+    frame->width -= 2 * frame->margin_x;
+    frame->height -= 2 * frame->margin_y;
+    frame->fov_y = (float)(2 * atan(inner * tan((double)frame->fov_y / 2)));
+    frame->ortho_height *= (float)inner;
+}
+
+/* Leaves the picture to the key where it is not shown as well. */
+static bool give_key(struct view *view, struct fl_frame *frame, bool is_shown)
+{
+    struct views_key key = {
+        .depth_step = frame->depth_step,
+        .radius = view->local.radius,
+        .is_smeared = frame->encoding == PROTOCOL_ENCODING_JPEG || frame->encoding == PROTOCOL_ENCODING_H264,
+        .is_moving = frame->moving,
+        .is_final = !frame->moving && !frame->more_follows && view_has_samples(view, frame, view->render.samples),
+        .came_ns = monotonic_now_ns()};
+    if (!view->local.views)
+        view->local.views = views_create(&view->failure);
+    if (!view->local.views || (is_shown && !pixmap_copy(&key.picture, &view->frames.arrived, &view->failure)))
+        return false;
+    if (!is_shown)
+        pixmap_exchange(&key.picture, &view->frames.arrived);
+    memcpy(key.camera.world_from_view, frame->world_from_view, sizeof(key.camera.world_from_view));
+    key.camera.fov_y = frame->fov_y;
+    key.depth = frame->depth;
+    key.sticking = frame->sticking;
+    frame->depth = NULL;
+    frame->sticking = NULL;
+    views_give_key(view->local.views, &key);
+    view->local.key_frame = frame->frame;
+    view->local.has_keys = view->local.granted = true;
+    return true;
+}
+
+bool view_take_picture(struct view *view, struct fl_frame *frame)
+{
+    const bool has_margin = frame->margin_x > 0 || frame->margin_y > 0;
+    const bool is_key = frame->depth && frame->fov_y > 0 && view_has_local(view);
+    /* Of two eyes, whose own picture has no depth. */
+    const bool is_middle = view->settings.stereo && frame->depth;
+    const bool is_shown = !is_middle;
+    if (is_middle && !is_key)
+        return false; /* no view is made of it any more */
+    view->frames.is_live = is_shown && (!frame->moving || !is_key);
+    if (is_key && !give_key(view, frame, is_shown))
+        return false;
+    const int margin_x = (int)frame->margin_x, margin_y = (int)frame->margin_y;
+    if (is_shown && has_margin &&
+        !pixmap_crop(&view->frames.live, &view->frames.arrived, margin_x, margin_y, &view->failure))
+        return false;
+    if (is_shown && !has_margin)
+        pixmap_exchange(&view->frames.live, &view->frames.arrived);
+    leave_margin(frame);
+    return true;
+}
+
+void view_take_hidden(struct view *view, struct fl_frame *frame)
+{
+    struct views_layer layer = {0};
+    metrics_add_bytes(&view->frames.metrics, frame->wire_bytes);
+    if (!view->local.has_keys || frame->of_frame != view->local.key_frame || !frame->depth || !frame->pixels)
+        return;
+    pixmap_take(&layer.picture, frame);
+    layer.depth = frame->depth;
+    frame->depth = NULL;
+    views_give_layer(view->local.views, &layer);
+}
+
+/* ---- what is shown ---- */
+
+void view_forget_local(struct view *view)
+{
+    view->screen->must_draw |= view->local.shows_made;
+    view->local.has_keys = view->local.has_made = view->local.shows_made = false;
+    view->local.wish = 0;
+    if (view->local.views)
+        views_forget_keys(view->local.views);
+}
+
+static bool same_camera(const struct view *view)
+{
+    const struct fl_frame *frame = &view->frames.last;
+    const double eye_scale = camera_distance(&view->eye.camera);
+    float pose[12];
+    camera_pose(&view->eye.camera, pose);
+    bool same = fabs((double)frame->fov_y - view->eye.camera.fov_y) < SAME;
+    for (int i = 0; i < 12; i++)
+        same &= fabs((double)(pose[i] - frame->world_from_view[i])) < SAME * (i % 4 == 3 ? eye_scale : 1);
+    return same;
+}
+
+/* The last frame itself shows what the camera sees. */
+static bool is_newest(const struct view *view)
+{
+    const bool is_asked = view->frames.last.command == view->told.command && !view->told.must_look;
+    return view->frames.is_live && ((is_asked && !view->frames.last.moving) || same_camera(view));
+}
+
+static struct views_wish wish_of(const struct view *view)
+{
+    struct views_wish wish = {.holes = view->settings.holes,
+                              .baseline = baseline_of(view),
+                              .over = view->options->stereo_over,
+                              .frame_ns =
+                                  view->screen->window ? window_frame_ns(view->screen->window) : PLAN_FRAME_NS,
+                              .moved_ns = view->eye.moved_ns};
+    view_render_size(view, &wish.width, &wish.height);
+    camera_pose(&view->eye.camera, wish.camera.world_from_view);
+    wish.camera.fov_y = (float)view->eye.camera.fov_y;
+    return wish;
+}
+
+static bool is_wanted(const struct view *view, const struct views_wish *wish)
+{
+    const struct views_wish *before = &view->local.wished;
+    return view->local.wish != 0 && memcmp(&wish->camera, &before->camera, sizeof(wish->camera)) == 0 &&
+           wish->width == before->width && wish->height == before->height && wish->holes == before->holes &&
+           (wish->baseline > 0) == (before->baseline > 0);
+}
+
+static void want(struct view *view)
+{
+    const struct views_wish wish = wish_of(view);
+    if (is_wanted(view, &wish))
+        return;
+    view->local.wished = wish;
+    view->local.wish = views_want(view->local.views, &wish);
+}
+
+/* How much else a picture of that camera shows than one of the present camera: the angle between both views, and
+ * that between their eyes as seen from what is looked at. Radians, about. */
+static double off(const struct view *view, const float world_from_view[12])
+{
+    float now[12];
+    double along = 0, aside = 0;
+    camera_pose(&view->eye.camera, now);
+    for (int i = 0; i < 3; i++) {
+        along += (double)(now[i * 4 + 2] * world_from_view[i * 4 + 2]);
+        aside = hypot(aside, (double)(now[i * 4 + 3] - world_from_view[i * 4 + 3]));
+    }
+    return acos(fmax(-1, fmin(1, along))) + aside / camera_distance(&view->eye.camera);
+}
+
+/* The view is nearer to the truth than the daemon's own last picture: hardly a hole, and no older camera. Of two
+ * eyes there is no picture of the daemon's own. */
+static bool is_better(const struct view *view)
+{
+    const struct views_made *made = &view->local.made_of;
+    return view->settings.stereo ||
+           (views_unseen(made) <= (float)PLAN_UNSEEN_MAX &&
+            off(view, made->camera.world_from_view) <= off(view, view->frames.last.world_from_view));
+}
+
+static void show_view(struct view *view)
+{
+    const uint64_t before = view->local.has_made ? view->local.made_of.wish : 0;
+    const bool has_come = views_take(view->local.views, &view->local.made, &view->local.made_of),
+               was_shown = view->local.shows_made;
+    view->local.has_made |= has_come;
+    view->local.shows_made = view->local.has_made && is_better(view);
+    view->screen->must_draw |= view->local.shows_made ? has_come || !was_shown : was_shown;
+    if (!has_come || !view->local.shows_made)
+        return;
+    /* One from a newer key is no answer to a move. */
+    const uint64_t moved_ns = view->local.made_of.wish != before ? view->local.made_of.moved_ns : 0;
+    metrics_add_view(&view->frames.metrics, moved_ns, monotonic_now_ns());
+    view->local.count++;
+}
+
+void view_step_local(struct view *view, uint64_t now_ns)
+{
+    struct fl_warp_error why;
+    follow_motion(view, now_ns);
+    if (!view->local.views)
+        return;
+    if (view->local.has_keys && !view_has_local(view))
+        view_forget_local(view); /* they would be old when views are made again */
+    if (!view->eye.has_camera || !view->local.has_keys || is_newest(view)) {
+        views_want_none(view->local.views);
+        view->local.wish = 0;
+        view->screen->must_draw |= view->local.shows_made;
+        view->local.has_made = view->local.shows_made = false;
+        return;
+    }
+    want(view);
+    show_view(view);
+    if (views_take_error(view->local.views, &why))
+        screen_say(view->screen, "no view can be made: %s %s", why.field, why.text);
+}
+
+bool view_shows_camera(const struct view *view)
+{
+    const struct views_wish wish = wish_of(view);
+    if (view->local.shows_made)
+        return is_wanted(view, &wish) && views_is_best(view->local.views, &view->local.made_of, view->local.wish);
+    return view->frames.count > 0 && is_newest(view);
+}

@@ -1,0 +1,249 @@
+/* SPDX-License-Identifier: MIT */
+/* The view: its settings as sent to the daemon, and its frames. */
+#include "view.h"
+#include "protocol/common/clock.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define LOOK_PAUSE_NS 4000000ull   /* between cameras: no screen shows more */
+#define REST_PAUSE_NS 120000000ull /* without movement: that was all of it */
+#define EDGE_MIN 16u
+#define EDGE_MAX 8192u
+#define FRAMES_AT_ONCE 4u /* then people have their turn */
+/* Where a frame takes so long to come, its first parts are worth decoding by themselves, and making a key of. */
+#define PARTS_NS 100000000ull
+
+/* Of `views` beside one another, each with an even edge: the chroma of a video is subsampled by 2. */
+static uint32_t edge_of(uint32_t pixels, uint32_t views)
+{
+    const uint32_t edge = (pixels / views) & ~1u, maximum = EDGE_MAX / views;
+    return views * (edge > EDGE_MIN ? edge < maximum ? edge : maximum : EDGE_MIN);
+}
+
+void view_render_size(const struct view *view, uint32_t *width, uint32_t *height)
+{
+    const bool stereo = view->settings.stereo, over = view->options->stereo_over;
+    const uint32_t divisor = 1u << view->settings.coarser;
+    *width = edge_of((uint32_t)view->screen->width / divisor, stereo && !over ? 2 : 1);
+    *height = edge_of((uint32_t)view->screen->height / divisor, stereo && over ? 2 : 1);
+}
+
+void view_use_eyes(const struct view *view, struct message_render *render)
+{
+    const struct view_options *options = view->options;
+    if (!view->settings.stereo)
+        return;
+    render->eyes_over = options->stereo_over;
+    render->views_across = options->stereo_over ? 1 : 2;
+    render->views_down = options->stereo_over ? 2 : 1;
+    render->width /= render->views_across;
+    render->height /= render->views_down;
+    render->baseline = options->stereo_m;
+    render->view_source = view->settings.views;
+    if (render->view_source == PROTOCOL_VIEW_SOURCE_LAYERS)
+        render->ground = 0; /* pictures that are made of layers have none */
+}
+
+/* On this machine pixels travel as they are; over a network as video while they move, and without loss at rest. */
+static void choose_encodings(const struct view *view, struct message_render *render)
+{
+    const struct view_options *options = view->options;
+    const bool is_local = session_is_local(view->session);
+    if (!options->has_encoding)
+        render->encoding = is_local                          ? PROTOCOL_ENCODING_RAW
+                           : session_can_h264(view->session) ? PROTOCOL_ENCODING_H264
+                                                             : PROTOCOL_ENCODING_JPEG;
+    if (!options->has_still_encoding)
+        render->still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
+    render->adapt = options->always_adapt || (!is_local && !options->never_adapt);
+    render->parts = !is_local;
+}
+
+static void show(struct view *view)
+{
+    struct message_render render = view->render;
+    const struct settings *settings = &view->settings;
+    struct record_clip_use use = {.speed = 1, .loop = 1};
+    const struct fl_clip_info *clip =
+        view->eye.tour.clip != TOUR_NONE ? fl_scene_clip(session_scene(view->session), (size_t)view->eye.tour.clip)
+                                         : NULL;
+    view_render_size(view, &render.width, &render.height);
+    view_use_eyes(view, &render);
+    choose_encodings(view, &render);
+    render.tracer = settings->tracer;
+    render.integrator = settings->integrator;
+    render.settings = settings->tracers;
+    render.tone_map = settings->tone_map;
+    render.exposure_stops += (float)settings->exposure_thirds / 3;
+    render.primary = view_primary(view);
+    if (clip && clip->clip != 0) {
+        use.clip = clip->clip;
+        render.clips = &use;
+        render.clips_count = 1;
+    }
+    view_ask_local(view, &render);
+    render.moving_rate = view->options->moving_rate;
+    view->told.must_show = !session_show(view->session, &render, &view->told.change);
+    view->told.must_look = true; /* frames name a camera from which on they are the new ones */
+}
+
+static void look(struct view *view, bool moving, uint64_t now_ns)
+{
+    struct fl_view_camera camera = {.time_s = (float)view->eye.tour.time_s, .moving = moving};
+    struct viewer_camera aimed;
+    view_aim(view, moving, now_ns, &aimed);
+    camera_export(&aimed, &camera);
+    camera.node = view_follows(view) ? view->eye.followed : 0;
+    if (!session_look(view->session, &camera, &view->told.command))
+        return;
+    view->told.must_look = false;
+    view->told.has_looked = true;
+    view->told.moving = moving;
+    view->told.looked_ns = now_ns;
+}
+
+void view_tell(struct view *view, uint64_t now_ns)
+{
+    const bool is_moving = view->eye.moved_ns + REST_PAUSE_NS > now_ns;
+    /* Another stream begins the picture at rest from new, which matters little while it has its first samples. */
+    const bool is_young = view->frames.last.samples <= view->render.pass_samples;
+    if (view->told.must_show || ((is_moving || is_young) && view_asks_otherwise(view)))
+        show(view);
+    if (!view->eye.has_camera)
+        return;
+    if (view->told.must_look && now_ns >= view->told.looked_ns + LOOK_PAUSE_NS)
+        look(view, is_moving, now_ns);
+    else if (view->told.moving && !is_moving)
+        look(view, false, now_ns);
+}
+
+/* ---- frames ---- */
+
+static bool decode(struct view *view, struct fl_frame *frame)
+{
+    struct fl_error error = {0};
+    if (!frame->encoded) {
+        pixmap_take(&view->frames.arrived, frame);
+        return true;
+    }
+    if (!view->frames.decoder)
+        view->frames.decoder = decoder_create(&view->failure);
+    if (view->frames.decoder && decoder_decode(view->frames.decoder, frame, &view->frames.arrived, &error))
+        return true;
+    session_want_key_frame(view->session);
+    return false;
+}
+
+static void take_structure(struct view *view, const struct fl_frame *frame)
+{
+    struct fl_structure_part part;
+    view->frames.structure_count = 0;
+    for (size_t at = 0; view->frames.structure_count < HUD_STRUCTURE_MAX && fl_structure_next(frame, &at, &part);)
+        snprintf(view->frames.structure[view->frames.structure_count++], HUD_STRUCTURE_TEXT_MAX, "%.20s%s%.200s",
+                 part.name, part.name[0] != '\0' ? ": " : "", part.text);
+}
+
+static void take(struct view *view, struct fl_frame *frame)
+{
+    if (frame->hidden_layer > 0) {
+        if (!frame->more_follows)
+            view_take_hidden(view, frame);
+        return;
+    }
+    if (!decode(view, frame) || !view_take_picture(view, frame))
+        return;
+    if (!frame->more_follows) { /* it is one frame, whose costs come with its end */
+        metrics_add(&view->frames.metrics, frame, monotonic_now_ns());
+        take_structure(view, frame);
+        session_deliver_parts(view->session, frame->receive_ns > PARTS_NS);
+        view->frames.count++;
+    }
+    view->frames.last = *frame;
+    view->frames.last.stages = NULL;
+    view->frames.last.wave_comparisons = NULL;
+    view->frames.last.structure = NULL;
+    view->frames.last.encoded = NULL;
+    view->frames.last.depth = NULL;
+    view->frames.last.normals = NULL;
+    view->frames.last.pixels = NULL;
+    if (view_follows(view)) /* for a hand to begin there */
+        camera_from_frame(&view->eye.camera, frame, camera_distance(&view->eye.camera));
+    view->taken = view->settings;
+    view->screen->must_draw = true;
+    view_plan_local(view, monotonic_now_ns());
+}
+
+void view_refuse_scene(struct view *view, const struct fl_error *refusal)
+{
+    if (view->is_dropped)
+        snprintf(view->refused, sizeof(view->refused), "%.120s", refusal->text);
+    else
+        view->failure = *refusal;
+    view->screen->must_draw = true;
+}
+
+/* A change that the daemon refuses is reverted. */
+static void refuse(struct view *view, const struct fl_error *refusal)
+{
+    if (view->frames.count == 0) {
+        view_refuse_scene(view, refusal);
+        return;
+    }
+    screen_say(view->screen, "not possible: %s", refusal->text);
+    view->settings = view->taken;
+    view_refuse_local(view);
+    view->eye.followed = 0; /* somebody may have taken its node away */
+    view->told.must_show = true;
+}
+
+void view_receive(struct view *view, unsigned timeout_ms)
+{
+    struct fl_error refusal = {0};
+    struct fl_frame *frame = session_next(view->session, timeout_ms, &refusal);
+    for (unsigned count = 1; frame; count++) {
+        take(view, frame);
+        fl_frame_destroy(frame);
+        frame = count < FRAMES_AT_ONCE ? session_next(view->session, 0, &refusal) : NULL;
+    }
+    if (refusal.code != FL_ERROR_NONE)
+        refuse(view, &refusal);
+}
+
+bool view_has_samples(const struct view *view, const struct fl_frame *frame, unsigned enough)
+{
+    const float noise = view->render.noise;
+    return frame->samples >= enough || (noise > 0.0f && frame->noise <= noise);
+}
+
+bool view_is_at_rest(const struct view *view, unsigned samples)
+{
+    const unsigned maximum = view->render.samples, enough = samples > 0 && samples < maximum ? samples : maximum;
+    const struct fl_scene *scene = session_scene(view->session);
+    return view->eye.has_camera && view->told.has_looked && !view->told.must_show && !view->told.must_look &&
+           (!scene || view->frames.last.revision >= fl_scene_revision(scene)) && !view->told.moving &&
+           view->eye.glide_begin_ns == 0 && view->frames.count > 0 &&
+           view->frames.last.command == view->told.command && view->frames.last.change == view->told.change &&
+           !view->frames.last.moving && !view->frames.last.more_follows &&
+           view_has_samples(view, &view->frames.last, enough);
+}
+
+const struct pixmap *view_picture(const struct view *view)
+{
+    if (view_outline_is_shown(view))
+        return &view->outline.picture;
+    return view->heat.is_there ? &view->heat.map : view->local.shows_made ? &view->local.made : &view->frames.live;
+}
+
+void view_finish(struct view *view)
+{
+    session_destroy(view->session);
+    decoder_destroy(view->frames.decoder);
+    views_destroy(view->local.views);
+    pixmap_finish(&view->frames.arrived);
+    pixmap_finish(&view->local.made);
+    pixmap_finish(&view->frames.live);
+    pixmap_finish(&view->heat.compared);
+    pixmap_finish(&view->heat.map);
+    view_outline_forget(view);
+}

@@ -1,0 +1,349 @@
+/* SPDX-License-Identifier: MIT */
+#include "tasks.h"
+#include "view.h"
+#include "protocol/common/clock.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define COMPARED_SAMPLES 4u /* of a pixel: the reference may take long */
+#define NEAR_SHARE 0.05     /* of the scene's diagonal: nearer to the eye its middle is nothing to turn about */
+
+uint32_t view_primary(const struct view *view)
+{
+    if (view->options->has_primary)
+        return view->render.primary;
+    return view->settings.tracer == PROTOCOL_TRACER_REFERENCE ? PROTOCOL_PRIMARY_TRACE : PROTOCOL_PRIMARY_RASTER;
+}
+
+/* ---- asking ---- */
+
+/* One ray through the centre of one pixel, which returns its hit point. */
+static void fill_probe(const struct view *view, struct message_render *job)
+{
+    *job = view->render;
+    job->width = job->height = 1;
+    job->samples = 1;
+    job->depth = 0;
+    job->tracer = view->settings.tracer;
+    job->settings = view->settings.tracers;
+    job->integrator = PROTOCOL_INTEGRATOR_WHITTED;
+    job->aperture = job->shutter = 0;
+    job->layers = 1u << PROTOCOL_LAYER_POSITION;
+    job->format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    job->encoding = PROTOCOL_ENCODING_RAW;
+}
+
+static void fill_key(const struct viewer_camera *camera, struct record_camera_key *key)
+{
+    struct fl_view_camera out;
+    camera_export(camera, &out);
+    memcpy(key->eye_world, out.eye_world, sizeof(key->eye_world));
+    memcpy(key->look_at_world, out.look_at_world, sizeof(key->look_at_world));
+    memcpy(key->up_world, out.up_world, sizeof(key->up_world));
+    key->fov_y = out.fov_y;
+}
+
+static void use_node(struct message_render *job, uint32_t node)
+{
+    job->camera_path = PROTOCOL_CAMERA_NODE;
+    job->camera_node = node;
+}
+
+static void use_key(struct message_render *job, struct record_camera_key *key)
+{
+    job->camera_path = PROTOCOL_CAMERA_KEYS;
+    job->keys = key;
+    job->keys_count = 1;
+}
+
+/* The frame at the job's time 0 is that at the tour's time. */
+static void use_clip(const struct view *view, struct message_render *job, struct record_clip_use *use)
+{
+    const struct tour *tour = &view->eye.tour;
+    const struct fl_clip_info *clip =
+        tour->clip != TOUR_NONE ? fl_scene_clip(session_scene(view->session), (size_t)tour->clip) : NULL;
+    if (!clip || clip->clip == 0)
+        return;
+    *use = (struct record_clip_use){.clip = clip->clip, .start_s = -(float)tour->time_s, .speed = 1, .loop = 1};
+    job->clips = use;
+    job->clips_count = 1;
+}
+
+static void aim(const struct view *view, struct record_camera_key *key)
+{
+    struct viewer_camera camera = view->eye.camera;
+    double direction[3];
+    struct message_render render = {.width = (uint32_t)view->frames.live.width,
+                                    .height = (uint32_t)view->frames.live.height};
+    view_use_eyes(view, &render);
+    camera_ray(&camera, (double)render.width / render.height, view->tasks.x, view->tasks.y, direction);
+    const double distance = camera_distance(&camera);
+    for (int i = 0; i < 3; i++)
+        camera.look_at[i] = camera.eye[i] + direction[i] * distance;
+    fill_key(&camera, key);
+}
+
+/* That of the view. */
+static void use_camera(const struct view *view, struct message_render *job, struct record_camera_key *key)
+{
+    fill_key(&view->eye.camera, key);
+    if (view_follows(view))
+        use_node(job, view->eye.followed);
+    else
+        use_key(job, key);
+}
+
+/* All but the tracer as in the view. */
+static void fill_reference(const struct view *view, struct message_render *job, struct record_camera_key *key)
+{
+    *job = view->render;
+    job->width = (uint32_t)view->heat.compared.width;
+    job->height = (uint32_t)view->heat.compared.height;
+    job->samples = view->frames.last.samples;
+    job->tracer = PROTOCOL_TRACER_REFERENCE;
+    job->primary = view_primary(view);
+    job->integrator = view->settings.integrator;
+    job->tone_map = view->settings.tone_map;
+    job->exposure_stops += (float)view->settings.exposure_thirds / 3;
+    job->accumulate = PROTOCOL_ACCUMULATION_ON; /* with the random numbers of a view */
+    view_use_eyes(view, job);
+    job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* what layers lack is an error, too */
+    job->encoding = session_is_local(view->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
+    use_camera(view, job, key);
+}
+
+static void ask_for_ids(struct message_render *job)
+{
+    job->layers = 1u << PROTOCOL_LAYER_ID;
+    job->tracer = PROTOCOL_TRACER_BVH; /* sampled tracers do not know nodes */
+}
+
+static bool ask(struct view *view, enum view_task task, struct fl_error *refusal)
+{
+    struct message_render job;
+    struct record_camera_key key = {0};
+    struct record_clip_use use;
+    fill_probe(view, &job);
+    switch (task) {
+    case TASK_CAMERA:
+        use_node(&job, view->tasks.camera_node);
+        break;
+    case TASK_PICK:
+        ask_for_ids(&job);
+        aim(view, &key);
+        use_key(&job, &key);
+        break;
+    case TASK_FOCUS:
+        aim(view, &key);
+        use_key(&job, &key);
+        break;
+    case TASK_OUTLINE:
+        ask_for_ids(&job);
+        view_outline_ask(view, &job);
+        use_camera(view, &job, &key);
+        break;
+    case TASK_REFERENCE:
+        if (!pixmap_copy(&view->heat.compared, &view->frames.live, refusal))
+            return false;
+        view->heat.command = view->told.command;
+        view->heat.change = view->told.change;
+        view->heat.revision = view->frames.last.revision;
+        fill_reference(view, &job, &key);
+        break;
+    default:
+        break;
+    }
+    use_clip(view, &job, &use);
+    return session_ask(view->session, &job, refusal);
+}
+
+/* ---- answers ---- */
+
+/* Three numbers of what the ray met; false: nothing. */
+static bool met(const struct fl_frame *frame, double numbers[3])
+{
+    float values[4];
+    memcpy(values, frame->pixels, sizeof(values));
+    for (int i = 0; i < 3; i++)
+        numbers[i] = (double)values[i];
+    return values[3] > 0;
+}
+
+static double from_eye(const struct fl_frame *frame, int axis, double place)
+{
+    return place - (double)frame->world_from_view[axis * 4 + 3];
+}
+
+/* Along the view, to the middle of the scene; 0: it is not in front of the eye, or one node of it is framed. */
+static double depth_of_scene(const struct view *view, const struct fl_frame *frame)
+{
+    struct fl_scene_bounds bounds = {.empty = true};
+    struct fl_error ignored;
+    double depth = 0, diagonal = 0;
+    if (view->render.auto_node != 0 || !fl_scene_get_bounds(session_scene(view->session), &bounds, &ignored) ||
+        bounds.empty)
+        return 0;
+    for (int i = 0; i < 3; i++) {
+        const double lower = (double)bounds.lower_world[i], upper = (double)bounds.upper_world[i];
+        depth -= (double)frame->world_from_view[i * 4 + 2] * from_eye(frame, i, (lower + upper) / 2);
+        diagonal = hypot(diagonal, upper - lower);
+    }
+    return depth > NEAR_SHARE * diagonal ? depth : 0;
+}
+
+/* The distance of what the view turns about: the middle of the scene, else the surface in the middle of the
+ * picture.
+ */
+static double distance_from(const struct view *view, const struct fl_frame *frame)
+{
+    const double depth = depth_of_scene(view, frame);
+    double place[3], square = 0;
+    if (depth > 0)
+        return depth;
+    if (!met(frame, place))
+        return view->eye.has_camera ? camera_distance(&view->eye.camera) : 1;
+    for (int i = 0; i < 3; i++)
+        square += pow(from_eye(frame, i, place[i]), 2);
+    return square > 0 ? sqrt(square) : 1;
+}
+
+static void take_camera(struct view *view, enum view_task task, const struct fl_frame *frame)
+{
+    struct viewer_camera camera;
+    camera_from_frame(&camera, frame, distance_from(view, frame));
+    if (task == TASK_HOME) {
+        view->eye.home = camera;
+        view->eye.has_home = true;
+    }
+    view_go(view, &camera, task == TASK_HOME ? view_home_node(view) : view->tasks.camera_node);
+}
+
+static void take_focus(struct view *view, const struct fl_frame *frame)
+{
+    double place[3];
+    struct viewer_camera camera = view->eye.camera;
+    if (!met(frame, place)) {
+        screen_say(view->screen, "there is no surface to focus on");
+        return;
+    }
+    camera_focus(&camera, place);
+    view_go(view, &camera, 0);
+    screen_say(view->screen, "focus: %.4g m away", camera_distance(&camera));
+}
+
+static void take_pick(struct view *view, const struct fl_frame *frame)
+{
+    double numbers[3];
+    if (met(frame, numbers))
+        view->tasks.picked = (struct view_picked){true, (uint32_t)numbers[0], (uint32_t)numbers[1]};
+    else
+        screen_say(view->screen, "there is no surface");
+}
+
+static void take_reference(struct view *view, struct fl_frame *frame)
+{
+    const struct pixmap *compared = &view->heat.compared;
+    if (!pixmap_resize(&view->heat.map, compared->width, compared->height, &view->failure))
+        return;
+    struct pixmap reference = {0};
+    pixmap_take(&reference, frame); /* over black, as the other */
+    heat_map(compared->pixels, reference.pixels, (size_t)compared->width * (size_t)compared->height, HEAT_TOP,
+             view->heat.map.pixels, &view->heat.figures);
+    pixmap_finish(&reference);
+    view->heat.is_there = true;
+    view->screen->must_draw = true;
+}
+
+static void take(struct view *view, struct fl_frame *frame)
+{
+    const enum view_task task = view->tasks.current;
+    view->tasks.current = TASK_NONE;
+    if (task == TASK_FOCUS)
+        take_focus(view, frame);
+    else if (task == TASK_PICK)
+        take_pick(view, frame);
+    else if (task == TASK_REFERENCE)
+        take_reference(view, frame);
+    else if (task == TASK_OUTLINE)
+        view_outline_take(view, frame);
+    else
+        take_camera(view, task, frame);
+    fl_frame_destroy(frame);
+}
+
+static void refuse(struct view *view, enum view_task task, const struct fl_error *refusal)
+{
+    view->tasks.current = TASK_NONE;
+    if (refusal->code == FL_ERROR_NONE) /* the connection is lost */
+        return;
+    if (task == TASK_OUTLINE) {
+        view_outline_refuse(view);
+        return;
+    }
+    screen_say(view->screen, "not possible: %s", refusal->text);
+    if (task == TASK_REFERENCE)
+        view->heat.is_refused = true;
+    if (task == TASK_HOME && !view->eye.has_camera)
+        view_refuse_scene(view, refusal);
+}
+
+/* ---- which one ---- */
+
+static bool is_compared(const struct view *view)
+{
+    return view->heat.command == view->told.command && view->heat.change == view->told.change &&
+           view->heat.revision == view->frames.last.revision;
+}
+
+static enum view_task next_task(struct view *view)
+{
+    const enum view_task wanted = view->tasks.next;
+    view->tasks.next = TASK_NONE;
+    if (wanted != TASK_NONE)
+        return wanted;
+    if (view->tasks.current != TASK_NONE)
+        return TASK_NONE;
+    if (!view->eye.has_home && view->refused[0] == '\0')
+        return TASK_HOME;
+    if (view->settings.error_map && !view->heat.is_there && !view->heat.is_refused &&
+        view_is_at_rest(view, COMPARED_SAMPLES))
+        return TASK_REFERENCE;
+    return view_outline_is_due(view) ? TASK_OUTLINE : TASK_NONE;
+}
+
+void view_step_tasks(struct view *view)
+{
+    struct fl_error refusal = {0};
+    /* An answer for another picture is discarded. */
+    if (view->tasks.current == TASK_OUTLINE && !view_outline_is_asked(view)) {
+        session_give_up(view->session);
+        view->tasks.current = TASK_NONE;
+    }
+    if (!view->settings.error_map || !is_compared(view)) {
+        view->screen->must_draw = view->screen->must_draw || view->heat.is_there;
+        view->heat.is_there = view->heat.is_refused = false;
+        if (view->tasks.current == TASK_REFERENCE) {
+            session_give_up(view->session);
+            view->tasks.current = TASK_NONE;
+        }
+    }
+    const enum view_task next = next_task(view);
+    if (next != TASK_NONE) {
+        view->tasks.current = next;
+        if (!ask(view, next, &refusal))
+            refuse(view, next, &refusal);
+    }
+    struct fl_frame *frame = session_answer(view->session, &refusal);
+    if (frame)
+        take(view, frame);
+    else if (refusal.code != FL_ERROR_NONE)
+        refuse(view, view->tasks.current, &refusal);
+}
+
+void view_drop_tasks(struct view *view)
+{
+    view->tasks.current = TASK_NONE;
+    view->heat.is_there = false;
+}
