@@ -219,8 +219,8 @@ static error_t set_progress(struct cli_job *job, const char *value)
         [CLI_PROGRESS_LINES] = "lines", [CLI_PROGRESS_BAR] = "bar", [CLI_PROGRESS_OPENJD] = "openjd"};
     for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++)
         if (strcmp(value, forms[i]) == 0) {
-            job->has_progress = true;
-            job->progress = (enum cli_progress_form)i;
+            job->talk.has_progress = true;
+            job->talk.progress = (enum cli_progress_form)i;
             return 0;
         }
     cli_usage(job, "--progress", "'%s' is none of bar, lines and openjd", value);
@@ -264,9 +264,9 @@ static error_t set_format(struct cli_job *job, const char *value)
 {
     const enum cli_image image = cli_image_by_name(value);
     if (image == CLI_IMAGE_UNKNOWN)
-        job->model_format = value; /* cli_job_complete() knows whether there can be one */
+        job->input.format = value; /* cli_job_complete() knows whether there can be one */
     else
-        job->image = image;
+        job->output.image = image;
     return 0;
 }
 
@@ -279,9 +279,9 @@ static error_t set_real(struct cli_job *job, const char *field, const char *valu
 /* Read here, so that what is wrong is known early; meant by the scene, which is not there yet. */
 static error_t add_edit(struct cli_job *job, const char *field, const char *value)
 {
-    if (job->edit_count == CLI_EDITS_MAX)
+    if (job->input.edit_count == CLI_EDITS_MAX)
         return cli_usage(job, field, "more than %d assignments cannot be given", CLI_EDITS_MAX);
-    return fl_assignment_parse(value, &job->edits[job->edit_count++], &job->error) ? 0 : EINVAL;
+    return fl_assignment_parse(value, &job->input.edits[job->input.edit_count++], &job->error) ? 0 : EINVAL;
 }
 
 /* The number of the group whose name `value` begins with; a new name gets a new number. 0: there are too many. The
@@ -290,21 +290,21 @@ static unsigned light_group_of(struct cli_job *job, const char *value, size_t le
 {
     char name[CLI_LIGHT_GROUP_NAME] = "";
     memcpy(name, value, length);
-    for (unsigned i = 0; i < job->light_group_count; i++)
-        if (strcmp(job->light_groups[i], name) == 0)
+    for (unsigned i = 0; i < job->light_groups.count; i++)
+        if (strcmp(job->light_groups.names[i], name) == 0)
             return i + 1;
-    if (job->light_group_count == CLI_LIGHT_GROUPS)
+    if (job->light_groups.count == CLI_LIGHT_GROUPS)
         return 0;
-    memcpy(job->light_groups[job->light_group_count++], name, sizeof(name));
-    return job->light_group_count;
+    memcpy(job->light_groups.names[job->light_groups.count++], name, sizeof(name));
+    return job->light_groups.count;
 }
 
 static error_t add_to_group(struct cli_job *job, const char *field, unsigned group, const char *node,
                             size_t length)
 {
-    if (job->edit_count == CLI_EDITS_MAX)
+    if (job->input.edit_count == CLI_EDITS_MAX)
         return cli_usage(job, field, "with all of --edit more than %d names cannot be given", CLI_EDITS_MAX);
-    struct fl_assignment *edit = &job->edits[job->edit_count];
+    struct fl_assignment *edit = &job->input.edits[job->input.edit_count];
     *edit = (struct fl_assignment){
         .kind = PROTOCOL_OBJECT_NODE, .field = "light_group", .count = 1, .values = {group}};
     if (length == 0 || length >= sizeof(edit->which))
@@ -312,7 +312,7 @@ static error_t add_to_group(struct cli_job *job, const char *field, unsigned gro
     memcpy(edit->which, node, length);
     if (strcmp(edit->which, "environment") == 0)
         edit->kind = PROTOCOL_OBJECT_ENVIRONMENT;
-    job->edit_count++;
+    job->input.edit_count++;
     return 0;
 }
 
@@ -359,8 +359,8 @@ static error_t set_fov(struct cli_job *job, const char *field, const char *value
 {
     double degrees = 0;
     const error_t status = set_real(job, field, value, 0.1, 177, &degrees);
-    job->key.fov_y = (float)(degrees * RADIANS_PER_DEGREE);
-    job->has_fov = true;
+    job->camera.key.fov_y = (float)(degrees * RADIANS_PER_DEGREE);
+    job->camera.has_fov = true;
     return status;
 }
 
@@ -376,7 +376,7 @@ static error_t set_view(struct cli_job *job, const char *field, const char *valu
             continue;
         job->options.auto_azimuth = views[i].azimuth;
         job->options.auto_elevation = views[i].elevation;
-        job->has_framing = true;
+        job->camera.has_framing = true;
         return 0;
     }
     return cli_usage(job, field, "'%s' is not known (known: front, back, left, right, top, bottom, iso)", value);
@@ -402,7 +402,7 @@ error_t cli_set_background(struct cli_job *job, const char *field, const char *v
 
 error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value)
 {
-    return set_real(job, field, value, -360, 360, &job->environment_degrees);
+    return set_real(job, field, value, -360, 360, &job->input.environment_degrees);
 }
 
 /* The layers that add up to the beauty. */
@@ -434,114 +434,116 @@ static error_t set_retries(struct cli_job *job, const char *field, const char *v
     uint64_t number = 0;
     if (!fl_text_integer(value, 0, 1000, &number, &job->error))
         return name_field(job, field);
-    job->retries.has_count = true;
-    job->retries.count = (unsigned)number;
+    job->daemon.retries.has_count = true;
+    job->daemon.retries.count = (unsigned)number;
     return 0;
 }
 
 static error_t set_retry_duration(struct cli_job *job, const char *field, const char *value)
 {
-    return cli_read_retry_for(value, &job->retries, &job->error) ? 0 : name_field(job, field);
+    return cli_read_retry_for(value, &job->daemon.retries, &job->error) ? 0 : name_field(job, field);
 }
 
 static error_t set_lost_after(struct cli_job *job, const char *field, const char *value)
 {
-    return cli_read_lost_after(value, &job->retries, &job->error) ? 0 : name_field(job, field);
+    return cli_read_lost_after(value, &job->daemon.retries, &job->error) ? 0 : name_field(job, field);
 }
 
 static error_t set_option(struct cli_job *job, int key, const char *field, const char *value)
 {
     switch (key) {
     case KEY_SERVER:
-        job->server = value;
+        job->daemon.server = value;
         return 0;
     case KEY_KEY:
-        job->key_file = value;
+        job->daemon.key_file = value;
         return 0;
     case KEY_AT:
         return cli_set_place(job, field, value);
     case KEY_PARENTS:
-        job->parents = true;
+        job->output.parents = true;
         return 0;
     case KEY_OUTPUT:
-        job->output = value;
+        job->output.path = value;
         return 0;
     case KEY_ENVIRONMENT:
-        job->environment = value;
+        job->input.environment = value;
         return 0;
     case KEY_ENVIRONMENT_ROTATION:
         return cli_set_environment_rotation(job, field, value);
     case KEY_VARIANT:
-        job->variant = value;
+        job->input.variant = value;
         return 0;
     case KEY_EDIT:
         return add_edit(job, field, value);
     case KEY_POINT_SIZE:
-        return set_real(job, field, value, 1e-6, 1e6, &job->point_size);
+        return set_real(job, field, value, 1e-6, 1e6, &job->input.point_size);
     case KEY_BACKGROUND:
         return cli_set_background(job, field, value);
     case KEY_GROUND:
         job->options.ground = 1;
         return 0;
     case KEY_STUDIO:
-        job->without_studio = strcmp(value, "off") == 0;
-        return job->without_studio || strcmp(value, "on") == 0 ? 0
-                                                               : cli_unknown_value(job, field, "studio", value);
+        job->input.without_studio = strcmp(value, "off") == 0;
+        return job->input.without_studio || strcmp(value, "on") == 0
+                   ? 0
+                   : cli_unknown_value(job, field, "studio", value);
     case KEY_DENOISE:
-        job->has_denoise = true;
+        job->sampling.has_denoise = true;
         return protocol_denoise_parse(value ? value : "on", &job->options.denoise)
                    ? 0
                    : cli_unknown_value(job, field, "denoise", value);
     case KEY_CAMERA:
-        job->camera = value;
+        job->camera.name = value;
         return 0;
     case KEY_EYE:
-        return set_place(job, field, value, job->key.eye_world, job->eye_rest, &job->has_eye);
+        return set_place(job, field, value, job->camera.key.eye_world, job->camera.eye_rest, &job->camera.has_eye);
     case KEY_LOOK_AT:
-        return set_place(job, field, value, job->key.look_at_world, job->look_at_rest, &job->has_look_at);
+        return set_place(job, field, value, job->camera.key.look_at_world, job->camera.look_at_rest,
+                         &job->camera.has_look_at);
     case KEY_UP:
         value = axis_of(value);
-        return set_vector(job, field, value, job->key.up_world, &job->has_up);
+        return set_vector(job, field, value, job->camera.key.up_world, &job->camera.has_up);
     case KEY_HALF:
-        job->half_pixels = true;
+        job->output.half_pixels = true;
         return 0;
     case KEY_FLOAT:
-        job->float_pixels = true;
+        job->output.float_pixels = true;
         return 0;
     case KEY_EXR_COMPRESSION:
-        job->dwaa = strcmp(value, "dwaa") == 0;
-        return job->dwaa || strcmp(value, "zip") == 0
+        job->output.dwaa = strcmp(value, "dwaa") == 0;
+        return job->output.dwaa || strcmp(value, "zip") == 0
                    ? 0
                    : cli_usage(job, field, "'%s' is not known (known: zip, dwaa)", value);
     case KEY_COLOUR_SPACE:
-        job->colour_space = value;
+        job->output.colour_space = value;
         return 0;
     case KEY_DISPLAY_VIEW:
-        job->display_view = value;
+        job->output.display_view = value;
         return 0;
     case KEY_OCIO:
-        job->ocio = value;
+        job->output.ocio = value;
         return 0;
     case KEY_CLIP:
-        if (job->clip_count == CLI_CLIPS_MAX)
+        if (job->clips.count == CLI_CLIPS_MAX)
             return cli_usage(job, field, "more than %d clips cannot be played at once", CLI_CLIPS_MAX);
-        job->clips[job->clip_count++] = (struct cli_clip){.which = value};
+        job->clips.list[job->clips.count++] = (struct cli_clip){.which = value};
         return 0;
     case KEY_CLIP_ONCE:
-        job->clip_once = true;
+        job->clips.once = true;
         return 0;
     case KEY_PROGRESS:
         return set_progress(job, value);
     case KEY_QUIET:
-        job->quiet = true;
+        job->talk.quiet = true;
         return 0;
     case KEY_TRACE_FILE:
-        job->trace_file = value;
+        job->talk.trace_file = value;
         return 0;
     case KEY_TIMINGS:
         if (value && strcmp(value, "json") != 0)
             return cli_usage(job, field, "'%s' is not known (known: json)", value);
-        job->timings = value ? CLI_TIMINGS_JSON : CLI_TIMINGS_TABLE;
+        job->talk.timings = value ? CLI_TIMINGS_JSON : CLI_TIMINGS_TABLE;
         return 0;
     case KEY_SIZE:
         return fl_text_size(value, &job->options.width, &job->options.height, &job->error)
@@ -556,20 +558,20 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_VIEW:
         return set_view(job, field, value);
     case KEY_FRAME:
-        job->framed = value;
-        job->has_framing = true;
+        job->camera.framed = value;
+        job->camera.has_framing = true;
         return 0;
     case KEY_CLIP_START:
-        return set_real(job, field, value, -1e6, 1e6, &job->clip_start_s);
+        return set_real(job, field, value, -1e6, 1e6, &job->clips.start_s);
     case KEY_CLIP_SPEED:
-        return set_real(job, field, value, 0.001, 1000, &job->clip_speed);
+        return set_real(job, field, value, 0.001, 1000, &job->clips.speed);
     case KEY_LAYERS:
         return set_layers(job, field, value);
     case KEY_LIGHT_GROUP:
         return set_light_group(job, field, value);
     case KEY_METADATA:
-        job->full_metadata = strcmp(value, "full") == 0;
-        return job->full_metadata || strcmp(value, "stable") == 0
+        job->output.full_metadata = strcmp(value, "full") == 0;
+        return job->output.full_metadata || strcmp(value, "stable") == 0
                    ? 0
                    : cli_usage(job, field, "'%s' is not known (known: stable, full)", value);
     case KEY_LOST_AFTER:
@@ -775,7 +777,7 @@ static bool read_environment(struct cli_job *job)
 
 bool cli_job_begin(struct cli_job *job, struct message_render defaults)
 {
-    *job = (struct cli_job){.key = {.up_world = {0, 1, 0}, .fov_y = (float)(45 * RADIANS_PER_DEGREE)},
+    *job = (struct cli_job){.camera.key = {.up_world = {0, 1, 0}, .fov_y = (float)(45 * RADIANS_PER_DEGREE)},
                             .series = {.orbit_degrees = TURN_DEGREES},
                             .options = defaults};
     return read_environment(job);

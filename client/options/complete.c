@@ -25,8 +25,8 @@
 
 bool cli_writes_to_stdout(const struct cli_job *job)
 {
-    for (size_t i = 0; i < job->output_count; i++)
-        if (strcmp(job->outputs[i].path, "-") == 0)
+    for (size_t i = 0; i < job->output.count; i++)
+        if (strcmp(job->output.list[i].path, "-") == 0)
             return true;
     return false;
 }
@@ -68,7 +68,7 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
         return fl_error_remedy(&job->error,
                                "write images, such as 'frames/%%04d.png', and a video of all of them");
     }
-    if (job->lossless && output->image != CLI_IMAGE_MKV && output->image != CLI_IMAGE_MOVING_WEBP) {
+    if (job->output.lossless && output->image != CLI_IMAGE_MKV && output->image != CLI_IMAGE_MOVING_WEBP) {
         cli_usage(job, "--lossless", "%s files are not lossless", cli_image_name(output->image));
         return fl_error_remedy(&job->error, "write an .mkv or .webp file");
     }
@@ -84,10 +84,10 @@ static bool is_linear(enum cli_image image)
 static void add_light_groups(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
-    if (job->light_group_count == 0)
+    if (job->light_groups.count == 0)
         return;
     wanted->layers |= wanted->layers == 0 ? 1u << PROTOCOL_LAYER_BEAUTY : 0;
-    wanted->layers |= ((2u << job->light_group_count) - 1) << PROTOCOL_LAYER_LIGHT_REST;
+    wanted->layers |= ((2u << job->light_groups.count) - 1) << PROTOCOL_LAYER_LIGHT_REST;
 }
 
 /* Of all formats only EXR has named channels; half floats are not precise enough for their contents. */
@@ -100,11 +100,11 @@ static bool complete_layers(struct cli_job *job)
     add_light_groups(job);
     if (wanted->layers == 0)
         return true;
-    for (size_t i = 0; i < job->output_count; i++) {
-        if (job->outputs[i].image == CLI_IMAGE_EXR)
+    for (size_t i = 0; i < job->output.count; i++) {
+        if (job->output.list[i].image == CLI_IMAGE_EXR)
             continue;
-        cli_usage(job, job->outputs[i].path, "%s files do not have the layers of %s",
-                  cli_image_name(job->outputs[i].image), option);
+        cli_usage(job, job->output.list[i].path, "%s files do not have the layers of %s",
+                  cli_image_name(job->output.list[i].image), option);
         return fl_error_remedy(&job->error, "write an .exr file, or leave out %s", option);
     }
     if (wanted->encoding == PROTOCOL_ENCODING_JPEG) {
@@ -123,23 +123,24 @@ static bool complete_layers(struct cli_job *job)
 /* A picture of 8 bits is made of linear light by the program that writes it. */
 static bool complete_colours(struct cli_job *job)
 {
-    const char *option = job->colour_space ? "--colour-space" : "--display-view", *configured = getenv("OCIO");
-    if (!job->colour_space && !job->display_view)
+    const char *option = job->output.colour_space ? "--colour-space" : "--display-view",
+               *configured = getenv("OCIO");
+    if (!job->output.colour_space && !job->output.display_view)
         return true;
-    if (!job->ocio && configured && configured[0] != '\0')
-        job->ocio = configured;
-    for (size_t i = 0; i < job->output_count; i++) {
-        const enum cli_image image = job->outputs[i].image;
-        if (job->colour_space && image != CLI_IMAGE_EXR) {
+    if (!job->output.ocio && configured && configured[0] != '\0')
+        job->output.ocio = configured;
+    for (size_t i = 0; i < job->output.count; i++) {
+        const enum cli_image image = job->output.list[i].image;
+        if (job->output.colour_space && image != CLI_IMAGE_EXR) {
             cli_usage(job, option, "%s files do not have it", cli_image_name(image));
             return fl_error_remedy(&job->error, "write an .exr file, or choose a view by --display-view");
         }
-        if (job->display_view && (is_linear(image) || cli_image_is_video(image))) {
+        if (job->output.display_view && (is_linear(image) || cli_image_is_video(image))) {
             cli_usage(job, option, "%s files do not have it", cli_image_name(image));
             return fl_error_remedy(&job->error, "write pictures of 8 bits, such as .png");
         }
     }
-    if (job->display_view && !job->ocio) {
+    if (job->output.display_view && !job->output.ocio) {
         cli_usage(job, option, "there is no configuration that has views");
         return fl_error_remedy(&job->error, "name one by --ocio FILE or $OCIO");
     }
@@ -151,23 +152,24 @@ static bool complete_colours(struct cli_job *job)
 static bool complete_pixels(struct cli_job *job)
 {
     bool has[CLI_IMAGE_COUNT] = {false};
-    for (size_t i = 0; i < job->output_count; i++) {
-        has[job->outputs[i].image] = true;
-        if (is_linear(job->outputs[i].image) != is_linear(job->outputs[0].image)) {
-            cli_usage(job, job->outputs[i].path, "8-bit pictures and linear light cannot come of one rendering");
+    for (size_t i = 0; i < job->output.count; i++) {
+        has[job->output.list[i].image] = true;
+        if (is_linear(job->output.list[i].image) != is_linear(job->output.list[0].image)) {
+            cli_usage(job, job->output.list[i].path,
+                      "8-bit pictures and linear light cannot come of one rendering");
             return fl_error_remedy(&job->error, "render once for EXR and HDR, and once for all else");
         }
     }
-    if (job->float_pixels && job->half_pixels)
+    if (job->output.float_pixels && job->output.half_pixels)
         return cli_usage(job, "--float", "cannot go with --half") == 0;
-    if ((job->float_pixels && !has[CLI_IMAGE_EXR] && !has[CLI_IMAGE_HDR]) ||
-        (job->half_pixels && !has[CLI_IMAGE_EXR]))
-        return cli_usage(job, job->float_pixels ? "--float" : "--half", "%s files do not have such pixels",
-                         cli_image_name(job->outputs[0].image)) == 0;
-    if (job->dwaa && !has[CLI_IMAGE_EXR])
+    if ((job->output.float_pixels && !has[CLI_IMAGE_EXR] && !has[CLI_IMAGE_HDR]) ||
+        (job->output.half_pixels && !has[CLI_IMAGE_EXR]))
+        return cli_usage(job, job->output.float_pixels ? "--float" : "--half", "%s files do not have such pixels",
+                         cli_image_name(job->output.list[0].image)) == 0;
+    if (job->output.dwaa && !has[CLI_IMAGE_EXR])
         return cli_usage(job, "--exr-compression", "%s files do not have it",
-                         cli_image_name(job->outputs[0].image)) == 0;
-    if (has[CLI_IMAGE_HDR] || job->float_pixels)
+                         cli_image_name(job->output.list[0].image)) == 0;
+    if (has[CLI_IMAGE_HDR] || job->output.float_pixels)
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     else if (has[CLI_IMAGE_EXR])
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
@@ -178,52 +180,52 @@ static bool complete_pixels(struct cli_job *job)
 static bool complete_format(struct cli_job *job)
 {
     const char *letters = "abcdefghijklmnopqrstuvwxyz0123456789";
-    const size_t length = job->model_format ? strlen(job->model_format) : 1;
-    if (!job->model_format ||
-        (cli_has_input(job) && length > 0 && length < 8 && strspn(job->model_format, letters) == length))
+    const size_t length = job->input.format ? strlen(job->input.format) : 1;
+    if (!job->input.format ||
+        (cli_has_input(job) && length > 0 && length < 8 && strspn(job->input.format, letters) == length))
         return true;
     return cli_usage(job, "--format",
                      "unknown format '%s' (known: png, jpeg, exr, hdr, webp, tiff, gif, mp4, mkv, y4m)",
-                     job->model_format) == 0;
+                     job->input.format) == 0;
 }
 
 static bool complete_outputs(struct cli_job *job, bool is_series)
 {
-    if (job->output) {
+    if (job->output.path) {
         /* It has no folder in which a finished file could replace it. */
-        const char *path = strcmp(job->output, "/dev/stdout") == 0 ? "-" : job->output;
-        job->outputs[0] = (struct cli_output){.path = path, .image = job->image};
-        job->output_count = 1;
+        const char *path = strcmp(job->output.path, "/dev/stdout") == 0 ? "-" : job->output.path;
+        job->output.list[0] = (struct cli_output){.path = path, .image = job->output.image};
+        job->output.count = 1;
     }
-    if (job->output_count == 0) {
+    if (job->output.count == 0) {
         cli_usage(job, "--output", "no image file is named");
         return fl_error_remedy(&job->error, is_series ? "-o 'frames/%%04d.exr'" : "-o picture.png, or '-'");
     }
-    for (size_t i = 0; i < job->output_count; i++)
-        if (!complete_output(job, &job->outputs[i], is_series))
+    for (size_t i = 0; i < job->output.count; i++)
+        if (!complete_output(job, &job->output.list[i], is_series))
             return false;
-    if (job->has_progress && job->progress == CLI_PROGRESS_OPENJD && cli_writes_to_stdout(job))
+    if (job->talk.has_progress && job->talk.progress == CLI_PROGRESS_OPENJD && cli_writes_to_stdout(job))
         return cli_usage(job, "--progress", "openjd is written to standard output, as the picture is") == 0;
     return complete_pixels(job);
 }
 
 static bool complete_encoding(struct cli_job *job)
 {
-    if (!job->has_encoding && job->server && strncmp(job->server, "unix:", 5) != 0)
+    if (!job->given.encoding && job->daemon.server && strncmp(job->daemon.server, "unix:", 5) != 0)
         job->options.encoding = PROTOCOL_ENCODING_ZSTD;
     if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
         return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",
-                         cli_image_name(job->outputs[0].image)) == 0;
-    for (size_t i = 0; i < job->output_count; i++) {
-        const enum cli_image image = job->outputs[i].image;
-        const unsigned quality = job->file_quality > 0 ? job->file_quality : job->options.quality;
+                         cli_image_name(job->output.list[0].image)) == 0;
+    for (size_t i = 0; i < job->output.count; i++) {
+        const enum cli_image image = job->output.list[i].image;
+        const unsigned quality = job->output.quality > 0 ? job->output.quality : job->options.quality;
         const bool is_picture =
             image == CLI_IMAGE_JPEG || image == CLI_IMAGE_WEBP || image == CLI_IMAGE_MOVING_WEBP;
         if (image == CLI_IMAGE_MOVING_GIF || (!is_picture && !cli_image_is_video(image)))
             continue;
         if (!is_picture && quality > 51)
             return cli_usage(job, "--quality", "a video has 1 (best) to 51") == 0;
-        job->file_quality = quality;
+        job->output.quality = quality;
         if (job->options.encoding != PROTOCOL_ENCODING_JPEG)
             job->options.quality = 0; /* the number is meant for the file */
     }
@@ -242,11 +244,11 @@ static bool is_zero(const float vector[3])
 /* Whether `up` and the view direction leave the picture's upright undefined. */
 static bool is_degenerate(const struct cli_job *job)
 {
-    const struct record_camera_key *key = &job->key;
+    const struct record_camera_key *key = &job->camera.key;
     double view[3], cross = 0, lengths = 0, view2 = 0, up2 = 0;
     for (unsigned i = 0; i < 3; i++) {
-        view[i] =
-            (double)key->look_at_world[i] - (double)key->eye_world[i] + job->look_at_rest[i] - job->eye_rest[i];
+        view[i] = (double)key->look_at_world[i] - (double)key->eye_world[i] + job->camera.look_at_rest[i] -
+                  job->camera.eye_rest[i];
         view2 += view[i] * view[i];
         up2 += (double)key->up_world[i] * (double)key->up_world[i];
     }
@@ -261,37 +263,37 @@ static bool is_degenerate(const struct cli_job *job)
 
 static bool complete_camera(struct cli_job *job)
 {
-    const bool has_key = job->has_eye || job->has_look_at;
-    if (job->has_eye != job->has_look_at)
-        return cli_usage(job, job->has_eye ? "--eye" : "--look-at", "needs %s as well",
-                         job->has_eye ? "--look-at" : "--eye") == 0;
-    if (has_key && job->camera)
+    const bool has_key = job->camera.has_eye || job->camera.has_look_at;
+    if (job->camera.has_eye != job->camera.has_look_at)
+        return cli_usage(job, job->camera.has_eye ? "--eye" : "--look-at", "needs %s as well",
+                         job->camera.has_eye ? "--look-at" : "--eye") == 0;
+    if (has_key && job->camera.name)
         return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
-    if (!has_key && job->has_up && !cli_turn_models(job))
+    if (!has_key && job->camera.has_up && !cli_turn_models(job))
         return false;
-    if (job->has_framing && (has_key || job->camera))
+    if (job->camera.has_framing && (has_key || job->camera.name))
         return cli_usage(
-                   job, job->camera ? "--camera" : "--eye",
+                   job, job->camera.name ? "--camera" : "--eye",
                    "cannot go with --view, --azimuth, --elevation, --frame, --zoom or --margin, which place the "
                    "camera, too") == 0;
-    if (job->has_fov && job->camera)
+    if (job->camera.has_fov && job->camera.name)
         return cli_usage(job, "--fov", "cannot go with --camera, which has its own") == 0;
     if (!has_key) {
-        if (job->has_fov)
-            job->options.auto_fov = (float)((double)job->key.fov_y / RADIANS_PER_DEGREE);
-        job->has_framing |= job->has_fov;
+        if (job->camera.has_fov)
+            job->options.auto_fov = (float)((double)job->camera.key.fov_y / RADIANS_PER_DEGREE);
+        job->camera.has_framing |= job->camera.has_fov;
         return true;
     }
-    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof(job->key.eye_world)) == 0 &&
-        memcmp(job->eye_rest, job->look_at_rest, sizeof(job->eye_rest)) == 0)
+    if (memcmp(job->camera.key.eye_world, job->camera.key.look_at_world, sizeof(job->camera.key.eye_world)) == 0 &&
+        memcmp(job->camera.eye_rest, job->camera.look_at_rest, sizeof(job->camera.eye_rest)) == 0)
         return cli_usage(job, "--look-at", "is where --eye is") == 0;
-    if (is_zero(job->key.up_world) || is_degenerate(job))
+    if (is_zero(job->camera.key.up_world) || is_degenerate(job))
         return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
-    job->options.ground_up_x = job->key.up_world[0];
-    job->options.ground_up_y = job->key.up_world[1];
-    job->options.ground_up_z = job->key.up_world[2];
+    job->options.ground_up_x = job->camera.key.up_world[0];
+    job->options.ground_up_y = job->camera.key.up_world[1];
+    job->options.ground_up_z = job->camera.key.up_world[2];
     job->options.camera_path = PROTOCOL_CAMERA_KEYS;
-    job->options.keys = &job->key;
+    job->options.keys = &job->camera.key;
     job->options.keys_count = 1;
     return true;
 }
@@ -319,25 +321,25 @@ void cli_move_camera(struct cli_job *job, const double origin[3])
     double by[3];
     bool moves = false;
     for (unsigned i = 0; i < 3; i++) {
-        by[i] = origin[i] - job->origin[i];
+        by[i] = origin[i] - job->camera.origin[i];
         moves = moves || by[i] < 0 || by[i] > 0;
-        job->origin[i] = origin[i];
+        job->camera.origin[i] = origin[i];
     }
     if (!moves)
         return;
-    move_place(job->key.eye_world, job->eye_rest, by);
-    move_place(job->key.look_at_world, job->look_at_rest, by);
-    memset(job->eye_rest, 0, sizeof(job->eye_rest));
-    memset(job->look_at_rest, 0, sizeof(job->look_at_rest));
+    move_place(job->camera.key.eye_world, job->camera.eye_rest, by);
+    move_place(job->camera.key.look_at_world, job->camera.look_at_rest, by);
+    memset(job->camera.eye_rest, 0, sizeof(job->camera.eye_rest));
+    memset(job->camera.look_at_rest, 0, sizeof(job->camera.look_at_rest));
     for (uint32_t i = 0; job->series.keys && i < job->options.keys_count; i++) {
         static const double nothing[3];
         move_place(job->series.keys[i].eye_world, nothing, by);
         move_place(job->series.keys[i].look_at_world, nothing, by);
     }
-    for (size_t i = 0; i < job->channel_count; i++)
-        if (job->channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_EYE ||
-            job->channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_LOOK_AT)
-            move_channel(&job->channels[i].channel, by);
+    for (size_t i = 0; i < job->clips.channel_count; i++)
+        if (job->clips.channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_EYE ||
+            job->clips.channels[i].channel.path == PROTOCOL_CHANNEL_VIEW_LOOK_AT)
+            move_channel(&job->clips.channels[i].channel, by);
 }
 
 bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,
@@ -362,7 +364,7 @@ bool cli_find_camera(struct message_render *render, const char *camera, const ch
 /* Whether its pictures are for eyes, and not linear light for programs. */
 static bool is_shown(const struct cli_job *job)
 {
-    return job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8 || job->display_view;
+    return job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8 || job->output.display_view;
 }
 
 void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene)
@@ -370,7 +372,7 @@ void cli_choose_ground(const struct cli_job *job, struct message_render *render,
     const bool shows = render->integrator == PROTOCOL_INTEGRATOR_WHITTED ||
                        render->integrator == PROTOCOL_INTEGRATOR_DISTRIBUTED ||
                        render->integrator == PROTOCOL_INTEGRATOR_PATH;
-    if (job->filters && !job->without_studio && !job->scene && shows && is_shown(job) &&
+    if (job->sampling.filters && !job->input.without_studio && !job->input.scene && shows && is_shown(job) &&
         render->background == PROTOCOL_BACKGROUND_ENVIRONMENT && render->camera_path != PROTOCOL_CAMERA_NODE &&
         render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS && !fl_scene_is_lit(scene))
         render->ground = 1;
@@ -381,9 +383,9 @@ void cli_choose_ground(const struct cli_job *job, struct message_render *render,
 static void complete_integrator(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
-    const bool spreads =
-        wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 || job->lens_changes || job->endless;
-    if (!job->has_integrator)
+    const bool spreads = wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 ||
+                         job->clips.change_lens || job->sampling.endless;
+    if (!job->given.integrator)
         job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
 }
 
@@ -398,22 +400,22 @@ static float usual_clamp(uint32_t samples)
 static void complete_samples(struct cli_job *job, bool is_series)
 {
     struct message_render *wanted = &job->options;
-    if (job->auto_samples) {
+    if (job->sampling.is_auto) {
         wanted->samples = AUTO_SAMPLES;
         wanted->noise = wanted->noise > 0.0f ? wanted->noise : AUTO_NOISE;
     }
     const bool by_error = wanted->noise > 0.0f;
-    job->endless = job->progressive && !job->has_samples && !by_error;
-    job->by_error = by_error && !is_series;
-    if (!job->has_samples && by_error)
+    job->sampling.endless = job->sampling.progressive && !job->sampling.has_samples && !by_error;
+    job->sampling.by_error = by_error && !is_series;
+    if (!job->sampling.has_samples && by_error)
         wanted->samples = NOISE_SAMPLES;
-    else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
+    else if (!job->sampling.has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
         wanted->samples = PATH_SAMPLES;
-    else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
+    else if (!job->sampling.has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
         wanted->samples = AO_SAMPLES;
-    else if (!job->has_samples && !job->progressive && job->usual_samples > 0)
-        wanted->samples = job->usual_samples;
-    if (!job->has_clamp && !job->endless)
+    else if (!job->sampling.has_samples && !job->sampling.progressive && job->sampling.usual > 0)
+        wanted->samples = job->sampling.usual;
+    if (!job->given.clamp && !job->sampling.endless)
         wanted->clamp = usual_clamp(wanted->samples);
 }
 
@@ -425,26 +427,26 @@ static bool complete_tracer(struct cli_job *job)
         cli_usage(job, fault.field, "%s", fault.text);
         return fl_error_remedy(&job->error, "%s", fault.remedy);
     }
-    if (!job->has_primary)
+    if (!job->given.primary)
         wanted->primary = PROTOCOL_PRIMARY_AUTO;
     return true;
 }
 
 static bool complete_clips(struct cli_job *job)
 {
-    for (size_t i = 0; i < job->clip_count; i++) {
-        struct cli_clip *clip = &job->clips[i];
+    for (size_t i = 0; i < job->clips.count; i++) {
+        struct cli_clip *clip = &job->clips.list[i];
         if (clip->line == 0) {
-            clip->start_s = (float)job->clip_start_s;
-            clip->speed = job->clip_speed > 0 ? (float)job->clip_speed : 1;
-            clip->loop = !job->clip_once;
+            clip->start_s = (float)job->clips.start_s;
+            clip->speed = job->clips.speed > 0 ? (float)job->clips.speed : 1;
+            clip->loop = !job->clips.once;
         }
     }
-    if (job->clip_count == 0 && (job->clip_once || job->clip_start_s != 0 || job->clip_speed > 0)) {
+    if (job->clips.count == 0 && (job->clips.once || job->clips.start_s != 0 || job->clips.speed > 0)) {
         cli_usage(job,
-                  job->clip_once        ? "--clip-once"
-                  : job->clip_speed > 0 ? "--clip-speed"
-                                        : "--clip-start",
+                  job->clips.once        ? "--clip-once"
+                  : job->clips.speed > 0 ? "--clip-speed"
+                                         : "--clip-start",
                   "no clip is played");
         return fl_error_remedy(&job->error, "add --clip NAME");
     }
@@ -454,22 +456,23 @@ static bool complete_clips(struct cli_job *job)
 /* A shared scene cannot be given another environment, and only a daemon with an address has one. */
 static bool complete_scene(struct cli_job *job)
 {
-    if (!job->scene)
-        return job->model || cli_usage(job, "MODEL", "no model file is named") == 0;
-    if (job->model)
-        return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other", job->model) == 0;
-    if (job->light_group_count > 0) {
+    if (!job->input.scene)
+        return job->input.model || cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (job->input.model)
+        return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other",
+                         job->input.model) == 0;
+    if (job->light_groups.count > 0) {
         cli_usage(job, "--light-group", "cannot go with --scene: it would change the scene of all its clients");
         return fl_error_remedy(&job->error, "'farlight edit' sets light_group of its nodes, and --layers "
                                             "beauty,light_group has all of them");
     }
-    if (job->edit_count > 0) {
+    if (job->input.edit_count > 0) {
         cli_usage(job, "--edit", "cannot go with --scene: it would change the scene of all its clients");
         return fl_error_remedy(&job->error, "'farlight edit' does that");
     }
-    if (job->environment)
+    if (job->input.environment)
         return cli_usage(job, "--environment", "cannot go with --scene: that has its light already") == 0;
-    if (job->server)
+    if (job->daemon.server)
         return true;
     cli_usage(job, "--scene", "no address of a daemon is given, and a shared scene is on one");
     return fl_error_remedy(&job->error, "add --server ADDRESS");
@@ -522,7 +525,7 @@ static bool complete_crop(struct cli_job *job)
 /* Files in linear light are for programs that have filters of their own. */
 static void complete_denoise(struct cli_job *job)
 {
-    if (!job->has_denoise && job->filters && is_shown(job) && job->options.crop_width == 0)
+    if (!job->sampling.has_denoise && job->sampling.filters && is_shown(job) && job->options.crop_width == 0)
         job->options.denoise = PROTOCOL_DENOISE_AUTO;
 }
 
@@ -545,12 +548,12 @@ bool cli_job_complete_view(struct cli_job *job)
     struct message_render *wanted = &job->options;
     if (!complete_scene(job))
         return false;
-    if (!job->has_clamp)
+    if (!job->given.clamp)
         wanted->clamp = CLAMP;
-    if (wanted->noise > 0.0f && !job->has_samples)
+    if (wanted->noise > 0.0f && !job->sampling.has_samples)
         wanted->samples = NOISE_SAMPLES;
     /* An integrator without noise is better while the camera moves. */
-    if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
+    if (!job->given.integrator && (wanted->aperture > 0 || wanted->shutter > 0))
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
     if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)
         return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;

@@ -23,7 +23,7 @@ static const struct row {
      "Samples per pixel, or auto: until no noise is seen, up to 256 (default 16 for a picture, 1 for animations "
      "and "
      "comparisons; 16 for the integrator ao, 64 for path)",
-     CLI_GROUP_PICTURE, GIVEN(has_samples), true},
+     CLI_GROUP_PICTURE, GIVEN(sampling.has_samples), true},
     {"noise", "noise", "ERROR",
      "Sample each part of the picture until its error is below this, such as 0.02 for 2 %; --samples is the most "
      "that a pixel gets (default 4096)",
@@ -36,19 +36,19 @@ static const struct row {
      CLI_GROUP_PICTURE, 0, false},
     {"azimuth", "auto_azimuth", "DEGREES",
      "Look from this side: 0 is the front (+z), 90 the right (+x), 180 the back (default 24)", CLI_GROUP_CAMERA,
-     GIVEN(has_framing), true},
+     GIVEN(camera.has_framing), true},
     {"elevation", "auto_elevation", "DEGREES", "Look from so far above: 0 is level, 90 from the top (default 18)",
-     CLI_GROUP_CAMERA, GIVEN(has_framing), true},
+     CLI_GROUP_CAMERA, GIVEN(camera.has_framing), true},
     {"zoom", "auto_zoom", "FACTOR", "Magnify the middle of the picture (default 1: all is in view)",
-     CLI_GROUP_CAMERA, GIVEN(has_framing), true},
+     CLI_GROUP_CAMERA, GIVEN(camera.has_framing), true},
     {"margin", "auto_margin", "SHARE",
      "Of the picture, free at the edges that the model would touch (default 0.03)", CLI_GROUP_CAMERA,
-     GIVEN(has_framing), true},
+     GIVEN(camera.has_framing), true},
     {"aperture", "aperture", "METRES",
      "Diameter of the lens: what is not at --focus is out of focus (default 0: all is sharp)", CLI_GROUP_CAMERA,
-     GIVEN(has_aperture), false},
+     GIVEN(camera.has_aperture), false},
     {"focus", "focus", "METRES", "Distance that is sharp (default: that of what is looked at)", CLI_GROUP_CAMERA,
-     GIVEN(has_focus), false},
+     GIVEN(camera.has_focus), false},
     {"shutter", "shutter", "FRAMES",
      "How long the shutter is open; 0.5 is a film camera's 180 degrees (default 0: nothing moves in a frame)",
      CLI_GROUP_CAMERA, 0, true},
@@ -56,18 +56,18 @@ static const struct row {
      0, true},
     {"primary", "primary", "NAME",
      "How first hits are found: raster, trace, or auto, chosen for tracer and device (default)", CLI_GROUP_METHOD,
-     GIVEN(has_primary), true},
+     GIVEN(given.primary), true},
     {"encoding", "encoding", "NAME",
      "How pixels travel: raw, zstd, predicted, jpeg (default: raw on this machine, zstd over a network)",
-     CLI_GROUP_METHOD, GIVEN(has_encoding), true},
+     CLI_GROUP_METHOD, GIVEN(given.encoding), true},
     {"quality", "quality", "N",
      "Quality of JPEG and WebP, 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51 (default "
      "0: by the "
      "encoding)",
-     CLI_GROUP_METHOD, GIVEN(has_quality), true},
+     CLI_GROUP_METHOD, GIVEN(given.quality), true},
     {"integrator", "integrator", "NAME",
      "Light transport (default: distributed for several samples, a lens or a shutter, else whitted)",
-     CLI_GROUP_LIGHT, GIVEN(has_integrator), true},
+     CLI_GROUP_LIGHT, GIVEN(given.integrator), true},
     {"depth", "depth", "N", "Bounces after the first hit", CLI_GROUP_LIGHT, 0, true},
     {"bounces", "depth", "N", "The same as --depth", CLI_GROUP_LIGHT, 0, true},
     {"brdf", "brdf", "NAME", "How rough surfaces reflect, for path", CLI_GROUP_LIGHT, 0, true},
@@ -75,7 +75,7 @@ static const struct row {
      "Bound fireflies, for distributed and path: limit light over a rough surface and another one to X times "
      "white, and see no sharp mirror behind a rough one (default 10, with fewer than 64 samples by as much less, "
      "down to 1.25; 0, which is off, for pictures that are refined without an end)",
-     CLI_GROUP_LIGHT, GIVEN(has_clamp), true},
+     CLI_GROUP_LIGHT, GIVEN(given.clamp), true},
     {"ao-distance", "ao_distance", "METRES",
      "What is farther away does not occlude, for ao (default 0: a tenth of the scene's diagonal)", CLI_GROUP_LIGHT,
      0, true},
@@ -301,10 +301,10 @@ error_t cli_field_set(struct cli_job *job, const struct cli_field *option, const
     void *place = (char *)&job->options + field->offset;
     const bool is_samples = strcmp(option->option, "samples") == 0;
     if (is_samples)
-        job->auto_samples = strcmp(value, "auto") == 0;
+        job->sampling.is_auto = strcmp(value, "auto") == 0;
     if (option->given_offset != 0)
         *(bool *)((char *)job + option->given_offset) = true;
-    if (is_samples && job->auto_samples)
+    if (is_samples && job->sampling.is_auto)
         return 0;
     return field->kind == FIELD_ENUM   ? set_enum(job, field, name, value, place)
            : field->kind == FIELD_REAL ? set_real(job, field, name, value, place)

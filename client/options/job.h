@@ -4,13 +4,11 @@
 #define FARLIGHT_OPTIONS_JOB_H
 
 #include "lib/frame_set.h"
-#include "options/image_path.h"
-#include "options/progress.h"
-#include "options/retry.h"
+#include "daemon.h"
+#include "image_path.h"
+#include "progress.h"
 
 #include <argp.h>
-
-enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
 #define CLI_OUTPUTS_MAX 8
 
@@ -66,68 +64,99 @@ struct cli_channel {
     const struct fl_json_place *place; /* in the script, for people */
 };
 
-struct cli_job {
-    const char *scene; /* a shared scene of the server, in place of the model */
-    struct fl_model
-        models[FL_MODELS_MAX]; /* of the command line; `model` is the first one's path, or a script's */
-    size_t model_count;
-    int input_fd;             /* of a model "-": its bytes, once cli_read_input() has them */
-    const char *model_format; /* of it; NULL: by its first bytes */
-    bool watch;               /* again and again, as its files change */
-    const char *model, *server, *key_file, *environment, *output, *camera, *keys_file, *trace_file;
-    double environment_degrees, point_size; /* as of fl_load_options */
-    const char *variant;                    /* likewise */
-    enum cli_image image;
-    struct cli_output
-        outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */
-    size_t output_count;
-    struct cli_series series;
-    bool parents;      /* a missing folder of an output is made */
-    bool has_progress; /* else by whether there is a terminal */
-    enum cli_progress_form progress;
-    struct cli_retries retries;
-    const char *script; /* path; NULL: none */
-    const struct fl_json *script_json;
-    struct cli_clip clips[CLI_CLIPS_MAX];
-    size_t clip_count;
+/* What is rendered. */
+struct cli_input {
+    const char *scene;                     /* a shared scene of the server, in place of the model */
+    struct fl_model models[FL_MODELS_MAX]; /* of the command line */
+    size_t count;
+    const char *model;  /* the first one's path, or a script's */
+    int fd;             /* of a model "-": its bytes, once cli_read_input() has them */
+    const char *format; /* of it; NULL: by its first bytes */
+    bool watch;         /* again and again, as its files change */
+    const char *environment;
+    double environment_degrees, point_size;    /* as of fl_load_options */
+    const char *variant;                       /* likewise */
+    bool without_studio;                       /* --studio off */
     struct fl_assignment edits[CLI_EDITS_MAX]; /* of a model's scene */
     size_t edit_count;
-    struct cli_channel *channels; /* the script's */
-    size_t channel_count;
-    struct record_clip_use clip_uses[CLI_CLIPS_MAX + 1];
-    bool clip_once;      /* of the command line's clips, as is: */
-    double clip_start_s; /* time at which they begin */
-    double clip_speed;
-    double time_s;         /* of `render`: the time of the clips */
-    bool progressive;      /* of `render`: the picture is written repeatedly, with more samples */
-    bool endless;          /* likewise, until it is interrupted */
-    bool by_error;         /* of one picture: sampled in passes until its error is small */
-    uint32_t pass_samples; /* more each time; 0: as many as there are */
-    uint32_t part, parts;  /* of `render`: which one, of how many of the picture; 0 parts: all of it */
-    const char *part_name; /* for its file, once it is known */
-    bool lens_changes;     /* opened by clips: the integrator must support lenses */
-    bool lossless;         /* of a video */
-    bool full_metadata;    /* with times and paths */
-    bool has_aperture, has_focus;
-    struct cli_views views;
-    bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
-    bool has_framing;                           /* something of the automatic camera is given */
-    const char *framed;                         /* node that it shows, name or number; NULL: all */
-    bool float_pixels, half_pixels, dwaa, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
-        is_orbit;
-    char light_groups[CLI_LIGHT_GROUPS][CLI_LIGHT_GROUP_NAME]; /* their names; their nodes are in `edits` */
-    unsigned light_group_count;
+};
+
+/* Where pictures go, and in which form. */
+struct cli_destination {
+    const char *path;
+    enum cli_image image;
+    struct cli_output list[CLI_OUTPUTS_MAX]; /* `path`, or several of a script */
+    size_t count;
+    bool parents; /* a missing folder is made */
+    bool float_pixels, half_pixels, dwaa;
+    bool lossless;                                  /* of a video */
+    bool full_metadata;                             /* with times and paths */
+    unsigned quality;                               /* of JPEG, WebP and video files; 0: default */
     const char *colour_space, *display_view, *ocio; /* NULL: none */
-    bool has_samples, auto_samples;                 /* --samples auto */
-    bool without_studio;                            /* --studio off */
-    bool has_denoise, filters; /* filters: 8-bit pictures are denoised where nothing is said */
-    uint32_t usual_samples;    /* where nothing is said and the integrator has no number of its own; 0: 1 */
-    char depth_field[24];      /* the option that set the depth, for messages; empty: none */
-    unsigned file_quality;     /* of JPEG, WebP and video files; 0: default */
-    enum cli_timings_form timings;
+};
+
+/* The camera and its lens. */
+struct cli_camera {
+    const char *name; /* of the model's, or number; NULL: none is chosen */
+    const char *keys_file;
+    bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
+    bool has_aperture, has_focus;
+    bool has_framing;   /* something of the automatic camera is given */
+    const char *framed; /* node that it shows, name or number; NULL: all */
+    bool is_orbit;
     struct record_camera_key key;
     double eye_rest[3], look_at_rest[3]; /* what the key's floats lose of --eye and --look-at */
     double origin[3];                    /* subtracted from all places of the camera so far */
+};
+
+/* What moves. */
+struct cli_clips {
+    struct cli_clip list[CLI_CLIPS_MAX];
+    size_t count;
+    struct cli_channel *channels; /* the script's */
+    size_t channel_count;
+    struct record_clip_use uses[CLI_CLIPS_MAX + 1];
+    bool once;      /* of the command line's clips, as is: */
+    double start_s; /* time at which they begin */
+    double speed;
+    double time_s;    /* of `render`: the time of the clips */
+    bool change_lens; /* they open it: the integrator must support lenses */
+};
+
+struct cli_sampling {
+    bool has_samples, is_auto; /* --samples auto */
+    uint32_t usual;            /* where nothing is said and the integrator has no number of its own; 0: 1 */
+    bool progressive;          /* of `render`: the picture is written repeatedly, with more samples */
+    bool endless;              /* likewise, until it is interrupted */
+    bool by_error;             /* of one picture: sampled in passes until its error is small */
+    uint32_t pass_samples;     /* more each time; 0: as many as there are */
+    bool has_denoise, filters; /* filters: 8-bit pictures are denoised where nothing is said */
+};
+
+struct cli_job {
+    struct cli_input input;
+    struct cli_daemon daemon;
+    struct cli_destination output;
+    struct cli_talk talk;
+    struct cli_camera camera;
+    struct cli_clips clips;
+    struct cli_sampling sampling;
+    struct cli_series series;
+    struct cli_views views;
+    struct {
+        uint32_t number, count; /* of `render`: which one, of how many of the picture; 0: all of it */
+        const char *name;       /* for its file, once it is known */
+    } part;
+    struct {
+        char names[CLI_LIGHT_GROUPS][CLI_LIGHT_GROUP_NAME]; /* their nodes are in the input's edits */
+        unsigned count;
+    } light_groups;
+    struct {
+        bool encoding, primary, quality, integrator, clamp;
+    } given;            /* of `options`, by the command line */
+    const char *script; /* path; NULL: none */
+    const struct fl_json *script_json;
+    char depth_field[24]; /* the option that set the depth, for messages; empty: none */
     struct message_render options;
     struct fl_error error; /* of what was typed */
 };

@@ -20,7 +20,7 @@
 static void on_note(void *user, const struct fl_note *note)
 {
     struct cli_loading *loading = user;
-    if (loading->job->quiet || loading->again || note->severity != PROTOCOL_SEVERITY_WARNING ||
+    if (loading->job->talk.quiet || loading->again || note->severity != PROTOCOL_SEVERITY_WARNING ||
         loading->warnings++ >= NOTES_SHOWN)
         return;
     cli_progress_clear(loading->progress);
@@ -36,12 +36,12 @@ static void on_progress(void *user, uint64_t done_bytes, uint64_t total_bytes, c
 static bool connect_to(struct cli_loading *loading, struct fl_error *error)
 {
     const struct cli_job *job = loading->job;
-    const struct fl_connect_options connect = {.server = job->server,
-                                               .key_file = cli_key_file(job->server, job->key_file),
+    const struct fl_connect_options connect = {.server = job->daemon.server,
+                                               .key_file = cli_key_file(job->daemon.server, job->daemon.key_file),
                                                .name = "farlight",
                                                .interrupt_fd = cli_interrupt_fd(),
                                                .timeout_ms = loading->timeout_ms,
-                                               .lost_after_ms = job->retries.lost_after_ms,
+                                               .lost_after_ms = job->daemon.retries.lost_after_ms,
                                                .daemon_arguments = loading->daemon_arguments};
     loading->connect_begin_ns = monotonic_now_ns();
     loading->connection = fl_connect(&connect, error);
@@ -52,22 +52,23 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
  */
 static bool remembers_import(const struct cli_job *job)
 {
-    return job->parts > 0 || (job->watch && cli_watch_can_edit_again(job->edits, job->edit_count));
+    return job->part.count > 0 ||
+           (job->input.watch && cli_watch_can_edit_again(job->input.edits, job->input.edit_count));
 }
 
 static void fill_options(struct cli_loading *loading)
 {
     const struct cli_job *job = loading->job;
-    loading->load = (struct fl_load_options){.model = job->model,
-                                             .models = job->models,
-                                             .model_count = job->model_count,
-                                             .input_fd = job->input_fd,
-                                             .input_format = job->model_format,
-                                             .environment = job->environment,
-                                             .environment_degrees = job->environment_degrees,
-                                             .without_studio = job->without_studio,
-                                             .variant = job->variant,
-                                             .point_size = job->point_size,
+    loading->load = (struct fl_load_options){.model = job->input.model,
+                                             .models = job->input.models,
+                                             .model_count = job->input.count,
+                                             .input_fd = job->input.fd,
+                                             .input_format = job->input.format,
+                                             .environment = job->input.environment,
+                                             .environment_degrees = job->input.environment_degrees,
+                                             .without_studio = job->input.without_studio,
+                                             .variant = job->input.variant,
+                                             .point_size = job->input.point_size,
                                              .note = on_note,
                                              .progress = on_progress,
                                              .user = loading,
@@ -88,20 +89,20 @@ static bool start_import(struct cli_loading *loading, struct fl_error *error)
 
 bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
 {
-    return (loading->job->scene || start_import(loading, error)) && connect_to(loading, error);
+    return (loading->job->input.scene || start_import(loading, error)) && connect_to(loading, error);
 }
 
 /* An edit that --light-group has made is named by that option. */
 static bool blame_light_group(const struct cli_job *job, struct fl_error *error)
 {
     char text[sizeof(error->field)];
-    for (size_t i = 0; i < job->edit_count; i++) {
-        const struct fl_assignment *edit = &job->edits[i];
+    for (size_t i = 0; i < job->input.edit_count; i++) {
+        const struct fl_assignment *edit = &job->input.edits[i];
         const size_t group = (size_t)edit->values[0];
-        if (strcmp(edit->field, "light_group") == 0 && group > 0 && group <= job->light_group_count &&
+        if (strcmp(edit->field, "light_group") == 0 && group > 0 && group <= job->light_groups.count &&
             strcmp(error->field, fl_assignment_print(edit, text, sizeof(text))) == 0)
-            snprintf(error->field, sizeof(error->field), "--light-group %s=%.100s", job->light_groups[group - 1],
-                     edit->which);
+            snprintf(error->field, sizeof(error->field), "--light-group %s=%.100s",
+                     job->light_groups.names[group - 1], edit->which);
     }
     return false;
 }
@@ -109,7 +110,8 @@ static bool blame_light_group(const struct cli_job *job, struct fl_error *error)
 /* Makes the job's edits in a scene that has just been loaded. */
 static bool apply_edits(const struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
-    return job->edit_count == 0 || fl_scene_edit(scene, job->edits, job->edit_count, NULL, error) ||
+    return job->input.edit_count == 0 ||
+           fl_scene_edit(scene, job->input.edits, job->input.edit_count, NULL, error) ||
            blame_light_group(job, error);
 }
 
@@ -133,8 +135,8 @@ static bool check_loaded(const struct fl_scene *scene, struct fl_error *error)
 
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
 {
-    if (loading->job->scene) {
-        loading->scene = fl_scene_attach(loading->connection, loading->job->scene, error);
+    if (loading->job->input.scene) {
+        loading->scene = fl_scene_attach(loading->connection, loading->job->input.scene, error);
         return loading->scene && check_loaded(loading->scene, error);
     }
     loading->scene = fl_scene_load(loading->connection, &loading->load, error);
@@ -160,7 +162,7 @@ bool cli_loading_again(struct cli_loading *loading, struct fl_error *error)
 void cli_loading_print_sent(const struct cli_loading *loading, const char *what)
 {
     const struct fl_import_stats *stats = fl_scene_import_stats(loading->scene);
-    if (loading->job->quiet)
+    if (loading->job->talk.quiet)
         return;
     fputs("farlight: ", stderr);
     plain_text_print(stderr, what);
@@ -180,9 +182,10 @@ void cli_loading_close(struct cli_loading *loading)
 
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error)
 {
-    if (!job->scene)
+    if (!job->input.scene)
         cli_move_camera(job, fl_scene_import_stats(scene)->origin);
-    if (!cli_find_camera(&job->options, job->camera, job->framed, job->has_framing || job->is_orbit, scene, error))
+    if (!cli_find_camera(&job->options, job->camera.name, job->camera.framed,
+                         job->camera.has_framing || job->camera.is_orbit, scene, error))
         return false;
     cli_choose_ground(job, &job->options, scene);
     return true;

@@ -22,13 +22,13 @@
 
 error_t cli_set_model(struct cli_job *job, const char *path)
 {
-    for (size_t i = 0; strcmp(path, "-") == 0 && i < job->model_count; i++)
-        if (strcmp(job->models[i].path, "-") == 0)
+    for (size_t i = 0; strcmp(path, "-") == 0 && i < job->input.count; i++)
+        if (strcmp(job->input.models[i].path, "-") == 0)
             return cli_usage(job, "MODEL", "standard input can be read only once");
-    if (job->model_count == FL_MODELS_MAX)
+    if (job->input.count == FL_MODELS_MAX)
         return cli_usage(job, path, "more than %d models cannot be shown at once", FL_MODELS_MAX);
-    job->models[job->model_count++] = (struct fl_model){.path = path};
-    job->model = job->models[0].path;
+    job->input.models[job->input.count++] = (struct fl_model){.path = path};
+    job->input.model = job->input.models[0].path;
     return 0;
 }
 
@@ -55,7 +55,7 @@ static bool read_place(const char *value, struct fl_model *model, struct fl_erro
 error_t cli_set_place(struct cli_job *job, const char *field, const char *value)
 {
     struct fl_model placed = {.path = NULL};
-    if (job->model_count == 0) {
+    if (job->input.count == 0) {
         cli_usage(job, field, "no model is named before it");
         fl_error_remedy(&job->error, "room.glb chair.glb %s %s", field, value);
         return EINVAL;
@@ -65,13 +65,13 @@ error_t cli_set_place(struct cli_job *job, const char *field, const char *value)
         fl_error_remedy(&job->error, "X,Y,Z, X,Y,Z:RX,RY,RZ or X,Y,Z:RX,RY,RZ:SCALE");
         return EINVAL;
     }
-    struct fl_model *last = &job->models[job->model_count - 1];
+    struct fl_model *last = &job->input.models[job->input.count - 1];
     placed.path = last->path;
     /* One more of the same. */
-    if (last->is_placed && job->model_count == FL_MODELS_MAX)
+    if (last->is_placed && job->input.count == FL_MODELS_MAX)
         return cli_usage(job, field, "more than %d models cannot be shown at once", FL_MODELS_MAX);
     if (last->is_placed)
-        last = &job->models[job->model_count++];
+        last = &job->input.models[job->input.count++];
     *last = placed;
     return 0;
 }
@@ -80,18 +80,18 @@ bool cli_turn_models(struct cli_job *job)
 {
     static const float degrees[3][2][3] = {
         {{0, 0, 90}, {0, 0, -90}}, {{0, 0, 0}, {180, 0, 0}}, {{-90, 0, 0}, {90, 0, 0}}};
-    const float *up = job->key.up_world;
+    const float *up = job->camera.key.up_world;
     int axis = -1;
     for (int i = 0; i < 3; i++)
         if (up[i] != 0 && up[(i + 1) % 3] == 0 && up[(i + 2) % 3] == 0)
             axis = i;
-    if (axis < 0 || job->model_count == 0) {
+    if (axis < 0 || job->input.count == 0) {
         cli_usage(job, "--up",
                   axis < 0 ? "is no axis, and there is no --eye" : "turns model files, and none is named");
         return fl_error_remedy(&job->error, "x, y, z, -x, -y or -z, or any direction with --eye and --look-at");
     }
-    for (size_t i = 0; i < job->model_count; i++) {
-        struct fl_model *model = &job->models[i];
+    for (size_t i = 0; i < job->input.count; i++) {
+        struct fl_model *model = &job->input.models[i];
         if (model->is_placed)
             continue;
         memcpy(model->degrees, degrees[axis][up[axis] < 0], sizeof(model->degrees));
@@ -107,27 +107,27 @@ static bool is_input(const char *path)
 
 bool cli_has_input(const struct cli_job *job)
 {
-    for (size_t i = 0; i < job->model_count; i++)
-        if (is_input(job->models[i].path))
+    for (size_t i = 0; i < job->input.count; i++)
+        if (is_input(job->input.models[i].path))
             return true;
     return false;
 }
 
 bool cli_check_models(const struct cli_job *job, struct fl_error *error)
 {
-    for (size_t i = 0; i < job->model_count; i++)
-        if (!is_input(job->models[i].path) && !fl_importer_check_file(job->models[i].path, error))
+    for (size_t i = 0; i < job->input.count; i++)
+        if (!is_input(job->input.models[i].path) && !fl_importer_check_file(job->input.models[i].path, error))
             return false;
-    if (job->model_count == 0 && job->model && !fl_importer_check_file(job->model, error))
+    if (job->input.count == 0 && job->input.model && !fl_importer_check_file(job->input.model, error))
         return false;
-    return !job->environment || fl_importer_check_file(job->environment, error);
+    return !job->input.environment || fl_importer_check_file(job->input.environment, error);
 }
 
 bool cli_check_watch(struct cli_job *job)
 {
-    return !job->watch || (!job->scene && !cli_has_input(job)) ||
+    return !job->input.watch || (!job->input.scene && !cli_has_input(job)) ||
            cli_usage(job, "--watch", "%s does not change as a file does",
-                     job->scene ? "a shared scene" : "standard input") == 0;
+                     job->input.scene ? "a shared scene" : "standard input") == 0;
 }
 
 /* ---- standard input ---- */
@@ -190,5 +190,5 @@ bool cli_open_input(int *input_fd, struct fl_error *error)
 
 bool cli_read_input(struct cli_job *job, struct fl_error *error)
 {
-    return !cli_has_input(job) || job->input_fd > 0 || cli_open_input(&job->input_fd, error);
+    return !cli_has_input(job) || job->input.fd > 0 || cli_open_input(&job->input.fd, error);
 }

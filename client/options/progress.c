@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 #include "progress.h"
-#include "job.h"
 #include "talk.h"
 #include "protocol/common/clock.h"
 #include "protocol/plain_text.h"
@@ -23,11 +22,11 @@ static unsigned columns(void)
     return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : COLUMNS_UNKNOWN;
 }
 
-void cli_progress_begin(struct cli_progress *progress, const struct cli_job *job)
+void cli_progress_begin(struct cli_progress *progress, const struct cli_talk *talk)
 {
     const enum cli_progress_form usual = cli_is_terminal(STDERR_FILENO) ? CLI_PROGRESS_BAR : CLI_PROGRESS_LINES;
-    *progress = (struct cli_progress){.form = job->has_progress ? job->progress : usual,
-                                      .silent = job->quiet,
+    *progress = (struct cli_progress){.form = talk->has_progress ? talk->progress : usual,
+                                      .silent = talk->quiet,
                                       .begin_ns = monotonic_now_ns(),
                                       .slope = 0.5};
 }

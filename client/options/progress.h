@@ -11,7 +11,17 @@ enum cli_progress_form {
     CLI_PROGRESS_OPENJD /* what Open Job Description reads on standard output */
 };
 
-struct cli_job;
+enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
+
+/* What a command says while it works and of its work, as typed. */
+struct cli_talk {
+    bool quiet;
+    bool has_progress; /* else by whether there is a terminal */
+    enum cli_progress_form progress;
+    enum cli_timings_form timings;
+    const char *trace_file; /* NULL: none */
+};
+
 struct cli_progress {
     enum cli_progress_form form;
     bool silent;
@@ -23,7 +33,7 @@ struct cli_progress {
     uint64_t resident_bytes; /* the most that a line has told */
 };
 
-void cli_progress_begin(struct cli_progress *progress, const struct cli_job *job);
+void cli_progress_begin(struct cli_progress *progress, const struct cli_talk *talk);
 void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
                          const char *what);
 /* From the first call on frames are counted. */

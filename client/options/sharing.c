@@ -48,7 +48,7 @@ void cli_socket_remove(const struct cli_socket *chosen)
 
 static bool watch_scene(struct cli_sharing *sharing, struct fl_error *error)
 {
-    return !sharing->job->watch || cli_watch_scene(&sharing->watch, sharing->loading.scene, error);
+    return !sharing->job->input.watch || cli_watch_scene(&sharing->watch, sharing->loading.scene, error);
 }
 
 /* Waits until files have changed, and reads them. Those that cannot be read are reported: the scene stays. */
@@ -60,7 +60,7 @@ static bool follow(struct cli_sharing *sharing, struct fl_error *error)
     const bool is_read = cli_loading_again(loading, error);
     cli_progress_clear(&sharing->progress);
     if (is_read) {
-        cli_loading_print_sent(loading, sharing->job->model);
+        cli_loading_print_sent(loading, sharing->job->input.model);
         return watch_scene(sharing, error);
     }
     if (error->code == FL_ERROR_INTERRUPTED || cli_is_temporary(error))
@@ -73,8 +73,8 @@ static bool follow(struct cli_sharing *sharing, struct fl_error *error)
 /* Serves until it is interrupted, which is success, or the daemon is lost. */
 static bool stay(struct cli_sharing *sharing, struct fl_error *error)
 {
-    while (sharing->job->watch ? follow(sharing, error)
-                               : fl_connection_wait(sharing->loading.connection, WAIT_MS, error))
+    while (sharing->job->input.watch ? follow(sharing, error)
+                                     : fl_connection_wait(sharing->loading.connection, WAIT_MS, error))
         continue;
     if (error->code != FL_ERROR_INTERRUPTED)
         return false;
@@ -94,8 +94,8 @@ static bool come_back(struct cli_sharing *sharing, struct fl_error *error)
 {
     struct cli_loading *loading = &sharing->loading;
     struct cli_job attaching = *sharing->job;
-    attaching.scene = loading->scene_name;
-    if (sharing->job->server) {
+    attaching.input.scene = loading->scene_name;
+    if (sharing->job->daemon.server) {
         const bool attached = load_again(loading, &attaching, error);
         loading->job = sharing->job;
         if (attached || error->server_code != PROTOCOL_ERROR_UNKNOWN_ID)
@@ -111,19 +111,19 @@ static bool recover(struct cli_sharing *sharing, struct fl_error *error)
     const struct cli_job *job = sharing->job;
     unsigned failures = 0;
     loading->again = true;
-    while ((job->server || sharing->restarts) && cli_is_temporary(error)) {
+    while ((job->daemon.server || sharing->restarts) && cli_is_temporary(error)) {
         const uint32_t pause_ms = cli_retry_pause_ms(++failures, error->retry_after_ms);
         cli_progress_clear(&sharing->progress);
         cli_report(error);
         cli_loading_close(loading);
-        if (!job->quiet)
+        if (!job->talk.quiet)
             fprintf(stderr, "farlight: trying again in %.1f s\n", pause_ms * 1e-3);
         if (!cli_retry_wait(pause_ms, error))
             return false;
         if (!come_back(sharing, error) || !watch_scene(sharing, error))
             continue;
         cli_progress_clear(&sharing->progress);
-        if (!job->quiet)
+        if (!job->talk.quiet)
             fputs("farlight: the scene is shared again\n", stderr);
         return true;
     }
@@ -136,11 +136,11 @@ bool cli_sharing_begin(struct cli_sharing *sharing, struct fl_error *error)
     loading->job = sharing->job;
     loading->progress = &sharing->progress;
     loading->sharing = PROTOCOL_SHARING_SHARED;
-    cli_progress_begin(&sharing->progress, sharing->job);
+    cli_progress_begin(&sharing->progress, &sharing->job->talk);
     const struct cli_job *job = sharing->job;
     const bool is_up =
-        (!job->watch ||
-         cli_watch_begin_models(&sharing->watch, job->models, job->model_count, job->environment, error)) &&
+        (!job->input.watch || cli_watch_begin_models(&sharing->watch, job->input.models, job->input.count,
+                                                     job->input.environment, error)) &&
         cli_loading_begin(loading, error) && cli_loading_end(loading, error) && watch_scene(sharing, error);
     cli_progress_end(&sharing->progress, is_up);
     return is_up;

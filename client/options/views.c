@@ -135,7 +135,7 @@ static bool complete_source(struct cli_job *job)
     const struct cli_views *views = &job->views;
     struct message_render *wanted = &job->options;
     const bool has_views = views->has_stereo || views->has_light_field || wanted->upsample > 1;
-    const bool has_lens = wanted->aperture > 0 || job->lens_changes;
+    const bool has_lens = wanted->aperture > 0 || job->clips.change_lens;
     const bool is_filtered = wanted->denoise == PROTOCOL_DENOISE_ON;
     const bool is_rendered = is_filtered || wanted->layers >> PROTOCOL_LAYER_MOTION != 0;
     if (views->has_views && !has_views)

@@ -129,7 +129,7 @@ static error_t set_scale(struct command_line *line, const char *value)
 
 static error_t set_encoding(struct command_line *line, const char *value)
 {
-    line->job.has_encoding = true;
+    line->job.given.encoding = true;
     if (protocol_encoding_parse(value, &line->job.options.encoding))
         return 0;
     return cli_usage(&line->job, "--encoding", "'%s' is not raw, h264, jpeg, predicted or zstd", value);
@@ -176,7 +176,7 @@ static error_t set_holes(struct command_line *line, const char *value)
 
 static error_t set_integrator(struct command_line *line, const char *value)
 {
-    line->job.has_integrator = true;
+    line->job.given.integrator = true;
     if (protocol_integrator_parse(value, &line->job.options.integrator))
         return 0;
     return cli_usage(&line->job, "--integrator", "unknown integrator '%s'", value);
@@ -212,10 +212,10 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case ARGP_KEY_ARG:
         return cli_set_model(&line->job, value);
     case KEY_SCENE:
-        line->job.scene = value;
+        line->job.input.scene = value;
         return 0;
     case KEY_WATCH:
-        line->job.watch = true;
+        line->job.input.watch = true;
         return 0;
     case KEY_HEADLESS:
         viewer->headless = true;
@@ -237,7 +237,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_RATE:
         return set_rate(line, value);
     case KEY_SAMPLES:
-        line->job.has_samples = true;
+        line->job.sampling.has_samples = true;
         return set_integer(&line->job, "--samples", value, 1, 65536, &line->job.options.samples);
     case KEY_PASS:
         return set_integer(&line->job, "--pass-samples", value, 1, 256, &line->job.options.pass_samples);
@@ -289,7 +289,7 @@ static bool complete(struct command_line *line)
     }
     if (!cli_check_watch(job))
         return false;
-    if (job->clip_count > 1)
+    if (job->clips.count > 1)
         return cli_usage(job, "--clip", "only one clip can be played") == 0;
     return cli_check_models(job, &job->error) && cli_job_complete_view(job);
 }
@@ -304,21 +304,21 @@ static void fill(struct command_line *line)
 {
     const struct cli_job *job = &line->job;
     struct viewer_options *viewer = &line->viewer;
-    viewer->server = job->server && job->server[0] != '\0' ? job->server : NULL;
-    viewer->key_file = cli_key_file(viewer->server, job->key_file);
-    viewer->model = job->model;
-    viewer->watch = job->watch;
-    viewer->models = job->models;
-    viewer->model_count = job->model_count;
-    viewer->input_fd = job->input_fd;
-    viewer->environment = job->environment;
-    viewer->environment_degrees = job->environment_degrees;
-    viewer->without_studio = job->without_studio;
-    viewer->variant = job->variant;
-    viewer->edits = job->edits;
-    viewer->edit_count = job->edit_count;
-    viewer->point_size = job->point_size;
-    viewer->scene_name = job->scene;
+    viewer->server = job->daemon.server && job->daemon.server[0] != '\0' ? job->daemon.server : NULL;
+    viewer->key_file = cli_key_file(viewer->server, job->daemon.key_file);
+    viewer->model = job->input.model;
+    viewer->watch = job->input.watch;
+    viewer->models = job->input.models;
+    viewer->model_count = job->input.count;
+    viewer->input_fd = job->input.fd;
+    viewer->environment = job->input.environment;
+    viewer->environment_degrees = job->input.environment_degrees;
+    viewer->without_studio = job->input.without_studio;
+    viewer->variant = job->input.variant;
+    viewer->edits = job->input.edits;
+    viewer->edit_count = job->input.edit_count;
+    viewer->point_size = job->input.point_size;
+    viewer->scene_name = job->input.scene;
     viewer->view.render = job->options;
     viewer->view.render.views_across = viewer->view.render.views_down = 1;
     viewer->view.render.eyes_over = 0;
@@ -330,20 +330,20 @@ static void fill(struct command_line *line)
     viewer->views = job->views.has_stereo ? job->options.view_source : PROTOCOL_VIEW_SOURCE_LAYERS;
     if (!line->has_moving_rate)
         viewer->view.moving_rate = viewer->view.never_adapt ? 0.0f : MOVING_RATE_DEFAULT;
-    viewer->view.has_encoding = job->has_encoding;
-    viewer->view.has_primary = job->has_primary;
+    viewer->view.has_encoding = job->given.encoding;
+    viewer->view.has_primary = job->given.primary;
     viewer->view.jumps = viewer->replay != NULL;
-    viewer->camera = job->camera;
-    viewer->framed = job->framed;
-    viewer->has_framing = job->has_framing;
-    viewer->clip = job->clip_count > 0 ? job->clips[0].which : NULL;
-    viewer->speed = job->clip_count > 0 ? job->clips[0].speed : 1;
-    viewer->has_retry_for = job->retries.has_duration;
-    viewer->retry_for_s = job->retries.for_s;
-    viewer->lost_after_ms = job->retries.lost_after_ms;
+    viewer->camera = job->camera.name;
+    viewer->framed = job->camera.framed;
+    viewer->has_framing = job->camera.has_framing;
+    viewer->clip = job->clips.count > 0 ? job->clips.list[0].which : NULL;
+    viewer->speed = job->clips.count > 0 ? job->clips.list[0].speed : 1;
+    viewer->has_retry_for = job->daemon.retries.has_duration;
+    viewer->retry_for_s = job->daemon.retries.for_s;
+    viewer->lost_after_ms = job->daemon.retries.lost_after_ms;
     viewer->interrupt_fd = cli_interrupt_fd();
     viewer->interrupt_signal = cli_interrupt_signal;
-    viewer->note = job->quiet ? NULL : on_note;
+    viewer->note = job->talk.quiet ? NULL : on_note;
 }
 
 /* What is remembered stands for the defaults: variables and options count for more. */

@@ -124,7 +124,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         state->child_inputs[0] = job;
         return 0;
     case KEY_SCENE:
-        job->scene = value;
+        job->input.scene = value;
         return 0;
     case KEY_LISTEN:
         return add_listen(line, value);
@@ -134,7 +134,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         line->insecure = true;
         return 0;
     case KEY_WATCH:
-        job->watch = true;
+        job->input.watch = true;
         return 0;
     case KEY_ALLOW_EDIT:
         line->gateway.allow_edit = true;
@@ -144,7 +144,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_SAMPLES:
         return set_number(line, "--samples", value, 65536, &job->options.samples);
     case KEY_INTEGRATOR:
-        job->has_integrator = true;
+        job->given.integrator = true;
         return protocol_integrator_parse(value, &job->options.integrator)
                    ? 0
                    : cli_usage(job, "--integrator", "unknown integrator '%s'", value);
@@ -198,34 +198,35 @@ static const char *named(const char *text)
 static bool complete(struct command_line *line, struct fl_error *error)
 {
     struct cli_job *job = &line->job;
-    job->server = named(job->server);
+    job->daemon.server = named(job->daemon.server);
     if (line->gateway.listen_count == 0)
         add_listen(line, LISTEN_DEFAULT);
-    if (!job->scene && !job->model) {
+    if (!job->input.scene && !job->input.model) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "MODEL", "no model and no --scene is given");
-        return fl_error_remedy(error, job->server ? "'farlight scenes' lists the daemon's scenes"
-                                                  : "farlight-web model.glb");
+        return fl_error_remedy(error, job->daemon.server ? "'farlight scenes' lists the daemon's scenes"
+                                                         : "farlight-web model.glb");
     }
-    if (job->watch &&
-        !cli_watch_can_edit_again(job->edits, job->edit_count)) /* its scene keeps its name, and stays */
+    if (job->input.watch && !cli_watch_can_edit_again(
+                                job->input.edits, job->input.edit_count)) /* its scene keeps its name, and stays */
         cli_usage(job, "--watch", "an --edit that adds or multiplies would do so each time: assign a value");
     if (job->error.code != FL_ERROR_NONE || !cli_check_watch(job) || !cli_job_complete_view(job) ||
         !cli_check_models(job, &job->error)) {
         *error = job->error;
         return false;
     }
-    if (line->word_count > 0 && (job->scene || job->server))
+    if (line->word_count > 0 && (job->input.scene || job->daemon.server))
         return fl_error_set(error, FL_ERROR_ARGUMENT, line->words[0],
                             "the daemon at --server already has its options; leave this out");
-    if (!check_listens(line, error) || (!job->server && !name_daemon(line, error)))
+    if (!check_listens(line, error) || (!job->daemon.server && !name_daemon(line, error)))
         return false;
-    const char *server = job->server ? job->server : line->socket.address;
-    line->gateway.seat = (struct seat_options){.job = job,
-                                               .server = server,
-                                               .key_file = cli_key_file(server, job->key_file),
-                                               .scene = job->scene ? job->scene : cli_base_name(job->model),
-                                               /* Of a model's daemon the thread tells that shares it. */
-                                               .outage = job->model ? NULL : &line->outage};
+    const char *server = job->daemon.server ? job->daemon.server : line->socket.address;
+    line->gateway.seat =
+        (struct seat_options){.job = job,
+                              .server = server,
+                              .key_file = cli_key_file(server, job->daemon.key_file),
+                              .scene = job->input.scene ? job->input.scene : cli_base_name(job->input.model),
+                              /* Of a model's daemon the thread tells that shares it. */
+                              .outage = job->input.model ? NULL : &line->outage};
     line->gateway.interrupt_signal = cli_interrupt_signal;
     return true;
 }
@@ -243,8 +244,8 @@ static bool check_scene(const struct seat_options *seat, struct fl_error *error)
     struct message_render render = job->options;
     struct fl_connection *connection = fl_connect(&connect, error);
     struct fl_scene *scene = connection ? fl_scene_attach(connection, seat->scene, error) : NULL;
-    const bool is_there =
-        scene && cli_find_camera(&render, job->camera, job->framed, job->has_framing, scene, error);
+    const bool is_there = scene && cli_find_camera(&render, job->camera.name, job->camera.framed,
+                                                   job->camera.has_framing, scene, error);
     fl_scene_destroy(scene);
     fl_connection_destroy(connection);
     return is_there;
@@ -309,7 +310,7 @@ static bool show_model(struct command_line *line, struct gateway *gateway, struc
 static void serve(struct command_line *line, struct fl_error *error)
 {
     struct gateway *gateway = gateway_create(&line->gateway, error);
-    if (gateway && line->job.model)
+    if (gateway && line->job.input.model)
         show_model(line, gateway, error);
     else if (gateway && check_scene(&line->gateway.seat, error))
         gateway_run(gateway, error);

@@ -108,7 +108,8 @@ static bool fill_render(struct seat *seat, const struct web_show *show, struct f
         render->clips = &seat->clip;
         render->clips_count = 1;
     }
-    return cli_find_camera(render, job->camera, job->framed, job->has_framing, seat->scene, error);
+    return cli_find_camera(render, job->camera.name, job->camera.framed, job->camera.has_framing, seat->scene,
+                           error);
 }
 
 /* What is as it was told is not told again. */
@@ -299,7 +300,7 @@ static void tell_outage(const struct seat *seat, const struct fl_error *error)
 
 static void tell_return(const struct seat *seat)
 {
-    if (seat->options.outage && web_outage_ends(seat->options.outage) && !seat->options.job->quiet)
+    if (seat->options.outage && web_outage_ends(seat->options.outage) && !seat->options.job->talk.quiet)
         fprintf(stderr, "farlight: %s: the daemon is back\n", seat->options.server);
 }
 
@@ -312,7 +313,7 @@ static bool come_to_scene(struct seat *seat, struct fl_error *error)
                                                .name = "farlight-web",
                                                .can_h264 = true,
                                                .interrupt_fd = seat->end_fd,
-                                               .lost_after_ms = seat->options.job->retries.lost_after_ms};
+                                               .lost_after_ms = seat->options.job->daemon.retries.lost_after_ms};
     seat->connection = fl_connect(&connect, error);
     if (seat->connection)
         seat->scene = fl_scene_attach(seat->connection, seat->options.scene, error);

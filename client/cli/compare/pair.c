@@ -50,7 +50,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     error_t status = 0;
     switch (key) {
     case KEY_TIME:
-        return fl_text_real(value, -1e6, 1e6, &job->time_s, &job->error) ? 0 : name_field(job, "--time");
+        return fl_text_real(value, -1e6, 1e6, &job->clips.time_s, &job->error) ? 0 : name_field(job, "--time");
     case KEY_THRESHOLD:
         status = set_error(job, "--threshold", value, &pair->images.threshold);
         if (!(pair->images.threshold > 0))
@@ -85,13 +85,13 @@ error_t cli_pair_set_limit(struct cli_pair *pair, const char *name, const char *
 bool cli_pair_complete(struct cli_pair *pair, bool is_series)
 {
     struct cli_job *job = &pair->job;
-    if (job->time_s != 0 && (is_series || job->clip_count == 0)) {
+    if (job->clips.time_s != 0 && (is_series || job->clips.count == 0)) {
         cli_usage(job, "--time", is_series ? "every frame has a time of its own" : "no clip is played");
         return fl_error_remedy(&job->error, "%s", is_series ? "use --clip-start" : "add --clip NAME");
     }
-    job->output = "picture";
-    job->image = pair->image;
-    job->float_pixels = pair->image == CLI_IMAGE_EXR;
+    job->output.path = "picture";
+    job->output.image = pair->image;
+    job->output.float_pixels = pair->image == CLI_IMAGE_EXR;
     return is_series ? cli_series_complete(job) : cli_job_complete(job, false);
 }
 
@@ -112,7 +112,7 @@ bool cli_pair_begin(struct cli_pair *pair, bool is_series, struct fl_error *erro
         return false;
     memcpy(pair->folder, folder, sizeof(folder));
     const struct fl_exporter_options export = {.folder = pair->folder,
-                                               .model = cli_base_name(job->model),
+                                               .model = cli_base_name(job->input.model),
                                                .interrupt_fd = cli_interrupt_fd(),
                                                .format = cli_image_name(pair->image)};
     if (!cli_read_input(job, error) || !cli_loading_begin(&pair->loading, error))

@@ -102,7 +102,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
 static bool complete(struct tracer_comparison *comparison)
 {
     struct cli_job *job = &comparison->pair.job;
-    const char *const inputs[] = {job->model, job->environment};
+    const char *const inputs[] = {job->input.model, job->input.environment};
     if (!comparison->has_tracers)
         return cli_usage(job, "--tracers", "a pair of tracers is needed, for example bvh,reference") == 0;
     if (!cli_pair_complete(&comparison->pair, false) ||
@@ -177,7 +177,7 @@ static void print_text(const struct tracer_comparison *comparison)
     const char *tracer = protocol_tracer_text(comparison->tracer);
     const char *reference = protocol_tracer_text(comparison->reference);
     printf("%s against %s: ", tracer, reference);
-    cli_print_name(comparison->pair.job.model);
+    cli_print_name(comparison->pair.job.input.model);
     printf(", %ux%u, %u sample%s a pixel, %s\n", frame->width, frame->height, frame->samples,
            frame->samples == 1 ? "" : "s", protocol_integrator_text(frame->integrator));
     print_structure(frame);
@@ -202,7 +202,7 @@ static void print_json(const struct tracer_comparison *comparison)
         "waves", cli_waves_json(frame), "all", cli_wave_total_json(frame), "image",
         cli_comparison_json(&comparison->figures, &comparison->pair.limits), "within",
         is_within(comparison) ? 1 : 0);
-    fl_text_utf8(comparison->pair.job.model, model, sizeof(model));
+    fl_text_utf8(comparison->pair.job.input.model, model, sizeof(model));
     json_object_set_new(object, "model", json_string(model));
     json_object_set_new(object, "picture", picture ? json_string(picture) : json_null());
     cli_structure_set_json(object, frame);
@@ -231,7 +231,7 @@ int cli_compare_tracers(int argc, char **argv)
         return cli_trouble(&comparison.pair.job.error);
     if (!cli_interrupt_begin(&error))
         return cli_trouble(&error);
-    cli_progress_begin(&comparison.pair.progress, &comparison.pair.job);
+    cli_progress_begin(&comparison.pair.progress, &comparison.pair.job.talk);
     const bool done = run(&comparison, &error);
     cli_progress_end(&comparison.pair.progress, done);
     if (done && comparison.pair.json)

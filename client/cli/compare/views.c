@@ -78,7 +78,7 @@ static bool check_picture(struct views_comparison *comparison)
 {
     const struct cli_pair *pair = &comparison->pair;
     struct fl_error *error = &comparison->pair.job.error;
-    const char *const inputs[] = {pair->job.model, pair->job.environment};
+    const char *const inputs[] = {pair->job.input.model, pair->job.input.environment};
     const char *picture = pair->images.picture;
     char path[4096];
     if (!picture || !comparison->is_series)
@@ -97,11 +97,11 @@ static bool complete(struct views_comparison *comparison)
     struct cli_pair *pair = &comparison->pair;
     struct cli_job *job = &pair->job;
     comparison->is_series = job->options.upsample > 1;
-    if (!comparison->is_series && (job->series.has_range || job->is_orbit || job->keys_file)) {
+    if (!comparison->is_series && (job->series.has_range || job->camera.is_orbit || job->camera.keys_file)) {
         cli_usage(job,
-                  job->series.has_range ? "--frames"
-                  : job->is_orbit       ? "--orbit"
-                                        : "--keys",
+                  job->series.has_range  ? "--frames"
+                  : job->camera.is_orbit ? "--orbit"
+                                         : "--keys",
                   "a single picture is compared");
         return fl_error_remedy(&job->error, "leave it out, or add --upsample 4");
     }
@@ -238,7 +238,7 @@ static void print_text(const struct views_comparison *comparison)
 {
     const struct message_render *wanted = &comparison->pair.job.options;
     const struct total total = total_of(comparison);
-    cli_print_name(comparison->pair.job.model);
+    cli_print_name(comparison->pair.job.input.model);
     if (wanted->views_across * wanted->views_down > 1)
         printf(", %ux%u views of", wanted->views_across, wanted->views_down);
     else
@@ -269,7 +269,7 @@ static void print_json(const struct views_comparison *comparison)
     json_t *frames = json_array();
     for (uint32_t i = 0; i < comparison->frame_count; i++)
         json_array_append_new(frames, frame_json(comparison, &comparison->frames[i]));
-    fl_text_utf8(comparison->pair.job.model, model, sizeof(model));
+    fl_text_utf8(comparison->pair.job.input.model, model, sizeof(model));
     json_t *object = json_pack(
         "{s:s, s:i, s:i, s:i, s:i, s:i, s:s, s:o, s:f, s:o, s:b}", "model", model, "width", (int)wanted->width,
         "height", (int)wanted->height, "views_across", (int)wanted->views_across, "views_down",
@@ -318,7 +318,7 @@ int cli_compare_views(int argc, char **argv)
     }
     if (!cli_interrupt_begin(&error))
         return cli_trouble(&error);
-    cli_progress_begin(&comparison.pair.progress, &comparison.pair.job);
+    cli_progress_begin(&comparison.pair.progress, &comparison.pair.job.talk);
     const bool done = run(&comparison, &error);
     cli_progress_end(&comparison.pair.progress, done);
     if (done && comparison.pair.json)

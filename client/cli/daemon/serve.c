@@ -90,29 +90,29 @@ static error_t parse(int key, char *value, struct argp_state *state)
         serving->listens[serving->listen_count++] = value;
         return 0;
     case 's':
-        job->server = value;
+        job->daemon.server = value;
         return 0;
     case KEY_KEY:
-        job->key_file = value;
+        job->daemon.key_file = value;
         return 0;
     case KEY_NAME:
         serving->name = value;
         return 0;
     case KEY_ENVIRONMENT:
-        job->environment = value;
+        job->input.environment = value;
         return 0;
     case KEY_ENVIRONMENT_ROTATION:
         return cli_set_environment_rotation(job, "--environment-rotation", value);
     case KEY_AT:
         return cli_set_place(job, "--at", value);
     case KEY_VARIANT:
-        job->variant = value;
+        job->input.variant = value;
         return 0;
     case KEY_WATCH:
-        job->watch = true;
+        job->input.watch = true;
         return 0;
     case 'q':
-        job->quiet = true;
+        job->talk.quiet = true;
         return 0;
     case ARGP_KEY_ARG:
         return take_argument(serving, value, state);
@@ -144,8 +144,8 @@ static bool complete_daemon(struct serving *serving)
         return false;
     for (size_t i = 0; i < serving->listen_count && status == 0; i++)
         status = add_word(serving, "--listen") != 0 ? EINVAL : add_word(serving, serving->listens[i]);
-    if (serving->job.key_file && status == 0)
-        status = add_word(serving, "--key-file") != 0 ? EINVAL : add_word(serving, serving->job.key_file);
+    if (serving->job.daemon.key_file && status == 0)
+        status = add_word(serving, "--key-file") != 0 ? EINVAL : add_word(serving, serving->job.daemon.key_file);
     /* Its output goes to us, and its last line is shown if it fails. */
     if (status == 0)
         status = add_word(serving, "--log-level") != 0 ? EINVAL : add_word(serving, "error");
@@ -157,13 +157,13 @@ static bool complete_daemon(struct serving *serving)
 static bool complete(struct serving *serving)
 {
     struct cli_job *job = &serving->job;
-    if (!job->model)
+    if (!job->input.model)
         return cli_usage(job, "MODEL", "a model file is needed") == 0;
     if (!cli_check_watch(job))
         return false;
     if (serving->name && serving->name[0] == '\0')
         return cli_usage(job, "--name", "the name is empty, but other clients need it to attach") == 0;
-    if (!job->server)
+    if (!job->daemon.server)
         return complete_daemon(serving);
     if (serving->listen_count > 0)
         return cli_usage(job, "--listen",
@@ -216,9 +216,9 @@ static void print_line(const struct serving *serving, const char *name, const ch
     print_word(name);
     fputs(" --server ", stdout);
     print_address(address);
-    if (serving->job.key_file && strncmp(address, "tcp:", 4) == 0) {
+    if (serving->job.daemon.key_file && strncmp(address, "tcp:", 4) == 0) {
         fputs(" --key ", stdout);
-        print_word(serving->job.key_file);
+        print_word(serving->job.daemon.key_file);
     }
     putchar('\n');
 }
@@ -234,8 +234,8 @@ static bool announce(const struct serving *serving, const struct cli_loading *lo
     cli_print_name(name);
     printf("\", %llu triangles and %llu spheres; view it with\n", (unsigned long long)bounds.triangles,
            (unsigned long long)bounds.spheres);
-    if (serving->job.server)
-        print_line(serving, name, serving->job.server);
+    if (serving->job.daemon.server)
+        print_line(serving, name, serving->job.daemon.server);
     for (size_t i = 0; fl_connection_listens_at(loading->connection, i, address, sizeof(address)); i++)
         print_line(serving, name, address);
     if (fflush(stdout) != 0)
@@ -252,7 +252,7 @@ static int serve(struct serving *serving)
         return cli_report(&error);
     struct cli_sharing sharing = {
         .job = &serving->job,
-        .loading = {.scene_name = serving->name ? serving->name : cli_base_name(serving->job.model),
+        .loading = {.scene_name = serving->name ? serving->name : cli_base_name(serving->job.input.model),
                     .daemon_arguments = serving->words}};
     const bool done = cli_read_input(&serving->job, &error) && cli_sharing_begin(&sharing, &error) &&
                       announce(serving, &sharing.loading, &error) && cli_sharing_stay(&sharing, &error);

@@ -84,7 +84,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         job->series.digests = true;
         return 0;
     case KEY_LOSSLESS:
-        job->lossless = true;
+        job->output.lossless = true;
         return 0;
     case KEY_SCRIPT:
         animation->script_path = value;
@@ -93,7 +93,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         animation->dry_run = true;
         return 0;
     case KEY_SCENE:
-        job->scene = value;
+        job->input.scene = value;
         return 0;
     case ARGP_KEY_ARG:
         return cli_set_model(job, value);
@@ -111,7 +111,7 @@ static error_t set_series(void *user, const char *name, const char *value)
         return set_part(job, value, false);
     if (strcmp(name, "lossless") != 0)
         return cli_series_set(job, name, value);
-    job->lossless = true;
+    job->output.lossless = true;
     return 0;
 }
 
@@ -119,14 +119,15 @@ static error_t set_series(void *user, const char *name, const char *value)
 static bool apply_script(struct animation *animation, const struct animation *typed)
 {
     const struct cli_job *job = &typed->job;
-    const struct cli_shot_given given = {.camera = job->camera || job->has_eye || job->has_look_at ||
-                                                   job->is_orbit || job->keys_file,
-                                         .clips = job->clip_count > 0,
-                                         .output = job->output != NULL,
-                                         .aperture = job->has_aperture,
-                                         .focus = job->has_focus,
-                                         .up = job->has_up,
-                                         .fov = job->has_fov};
+    const struct cli_shot_given given = {.camera = job->camera.name || job->camera.has_eye ||
+                                                   job->camera.has_look_at || job->camera.is_orbit ||
+                                                   job->camera.keys_file,
+                                         .clips = job->clips.count > 0,
+                                         .output = job->output.path != NULL,
+                                         .aperture = job->camera.has_aperture,
+                                         .focus = job->camera.has_focus,
+                                         .up = job->camera.has_up,
+                                         .fov = job->camera.has_fov};
     return cli_shot_load(&animation->shot, typed->script_path, &animation->job.error) &&
            cli_shot_apply(&animation->shot, &animation->job, &given, set_series, animation);
 }
@@ -158,15 +159,16 @@ static bool read_all(struct animation *animation, int argc, char **argv)
     /* The command line again, over the script. */
     good = cli_job_begin(&animation->job, fl_render_defaults()) && apply_script(animation, &typed);
     struct cli_job *job = &animation->job;
-    const bool is_kept = !typed.job.scene && !typed.job.model; /* the script's models, which these replace */
-    const char *model = is_kept ? job->model : NULL;
-    const size_t model_count = is_kept ? job->model_count : 0;
-    job->model = NULL;
-    job->model_count = 0;
+    const bool is_kept =
+        !typed.job.input.scene && !typed.job.input.model; /* the script's models, which these replace */
+    const char *model = is_kept ? job->input.model : NULL;
+    const size_t model_count = is_kept ? job->input.count : 0;
+    job->input.model = NULL;
+    job->input.count = 0;
     good = good && cli_parse(&argp, argc, argv, ARGP_IN_ORDER, animation) == 0;
     if (is_kept) {
-        job->model = model;
-        job->model_count = model_count;
+        job->input.model = model;
+        job->input.count = model_count;
     }
     return good;
 }
@@ -183,10 +185,10 @@ static int animate(int argc, char **argv, bool is_turntable)
 {
     struct animation animation = {0};
     bool good = read_all(&animation, argc, argv);
-    animation.job.is_orbit |= is_turntable;
-    animation.job.filters = true;
-    if (is_turntable && animation.job.usual_samples == 0)
-        animation.job.usual_samples = TURNTABLE_SAMPLES;
+    animation.job.camera.is_orbit |= is_turntable;
+    animation.job.sampling.filters = true;
+    if (is_turntable && animation.job.sampling.usual == 0)
+        animation.job.sampling.usual = TURNTABLE_SAMPLES;
     good = good && cli_series_complete(&animation.job);
     const int status = good ? run(&animation) : cli_report(&animation.job.error);
     cli_series_finish(&animation.job);

@@ -26,19 +26,19 @@ static const char *find_conflict(const struct cli_job *job, const char **why)
         bool is_given;
         const char *option, *why;
     } conflicts[] = {
-        {job->scene, "--scene", "whose contents may change between two parts"},
+        {job->input.scene, "--scene", "whose contents may change between two parts"},
         {cli_has_input(job), "a model from standard input", "which no other part can read"},
         {wanted->crop_width > 0, "--crop", "which is a part already"},
-        {job->auto_samples, "--samples auto", "which looks at pixels around"},
+        {job->sampling.is_auto, "--samples auto", "which looks at pixels around"},
         {wanted->noise > 0.0f, "--noise", "which looks at pixels around"},
         {wanted->denoise != PROTOCOL_DENOISE_OFF, "--denoise", "which looks at pixels around"},
         {job->views.has_stereo, "--stereo", "whose picture is of several views"},
         {job->views.has_light_field, "--light-field", "whose picture is of several views"},
         {wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS, "--lens quadtree", "which looks at pixels around"},
-        {job->progressive, "--progressive", "which shows the whole picture"},
-        {job->watch, "--watch", "which shows the whole picture"},
-        {job->dwaa, "--exr-compression dwaa", "which loses something of each part"},
-        {job->full_metadata, "--metadata full", "whose times differ from part to part"},
+        {job->sampling.progressive, "--progressive", "which shows the whole picture"},
+        {job->input.watch, "--watch", "which shows the whole picture"},
+        {job->output.dwaa, "--exr-compression dwaa", "which loses something of each part"},
+        {job->output.full_metadata, "--metadata full", "whose times differ from part to part"},
     };
     for (size_t i = 0; i < sizeof(conflicts) / sizeof(conflicts[0]); i++) {
         *why = conflicts[i].why;
@@ -51,27 +51,27 @@ static const char *find_conflict(const struct cli_job *job, const char **why)
 bool cli_picture_part_complete(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
-    const char *why = NULL, *other = job->parts > 0 ? find_conflict(job, &why) : NULL;
-    if (job->parts == 0 && job->series.resume) {
+    const char *why = NULL, *other = job->part.count > 0 ? find_conflict(job, &why) : NULL;
+    if (job->part.count == 0 && job->series.resume) {
         cli_usage(job, "--resume", "only a part of a picture is left out where it exists");
         return fl_error_remedy(&job->error, "add --part K/N");
     }
-    if (job->parts == 0)
+    if (job->part.count == 0)
         return true;
-    if (job->outputs[0].image != CLI_IMAGE_EXR) {
+    if (job->output.list[0].image != CLI_IMAGE_EXR) {
         cli_usage(job, "--part", "a part of a picture is an EXR file, and no %s file",
-                  cli_image_name(job->outputs[0].image));
+                  cli_image_name(job->output.list[0].image));
         return fl_error_remedy(&job->error, "-o part.exr; 'farlight merge' joins all parts");
     }
     if (other) {
         cli_usage(job, "--part", "cannot go with %s, %s", other, why);
         return fl_error_remedy(&job->error, "leave out one of them");
     }
-    const struct squares squares = squares_of(wanted->width, wanted->height, job->parts);
+    const struct squares squares = squares_of(wanted->width, wanted->height, job->part.count);
     const uint32_t most = squares.count < SQUARES_PARTS_MAX ? squares.count : SQUARES_PARTS_MAX;
-    if (job->parts > most) {
-        cli_usage(job, "--part", "%u parts are more than a picture of %ux%u can have", job->parts, wanted->width,
-                  wanted->height);
+    if (job->part.count > most) {
+        cli_usage(job, "--part", "%u parts are more than a picture of %ux%u can have", job->part.count,
+                  wanted->width, wanted->height);
         return fl_error_remedy(&job->error, "divide it into at most %u", most);
     }
     /* Auto chooses by the device, and a rasteriser would draw the whole picture for each square. */
@@ -103,9 +103,9 @@ static bool add_job(XXH3_state_t *state, const struct cli_job *job, struct fl_er
     if (!message_encode(&writer, &message))
         return fl_error_set(error, FL_ERROR_ARGUMENT, writer.error.field, "%s", writer.error.text);
     XXH3_64bits_update(state, bytes, writer.used_bytes);
-    for (size_t i = 0; i < job->edit_count; i++) {
+    for (size_t i = 0; i < job->input.edit_count; i++) {
         char text[512];
-        add_text(state, fl_assignment_print(&job->edits[i], text, sizeof(text)));
+        add_text(state, fl_assignment_print(&job->input.edits[i], text, sizeof(text)));
     }
     return true;
 }
@@ -114,10 +114,10 @@ static bool add_job(XXH3_state_t *state, const struct cli_job *job, struct fl_er
 static void add_file(XXH3_state_t *state, const struct cli_job *job)
 {
     add_text(state, FARLIGHT_VERSION);
-    add_text(state, job->float_pixels ? "float" : "half");
-    add_text(state, job->colour_space ? job->colour_space : "");
-    for (size_t i = 0; i < job->light_group_count; i++)
-        add_text(state, job->light_groups[i]);
+    add_text(state, job->output.float_pixels ? "float" : "half");
+    add_text(state, job->output.colour_space ? job->output.colour_space : "");
+    for (size_t i = 0; i < job->light_groups.count; i++)
+        add_text(state, job->light_groups.names[i]);
 }
 
 static bool digest_of(const struct cli_job *job, const struct fl_scene *scene, uint64_t *digest,
@@ -146,16 +146,16 @@ bool cli_picture_part_begin(struct cli_picture_part *part, struct cli_job *job, 
     char name[sizeof(part->name)];
     if (!fl_stats(connection, &stats, error) || !digest_of(job, scene, &digest, error))
         return false;
-    snprintf(name, sizeof(name), "%u/%u %016" PRIx64 " %s, %s", job->part, job->parts, digest, stats->device,
-             stats->driver);
+    snprintf(name, sizeof(name), "%u/%u %016" PRIx64 " %s, %s", job->part.number, job->part.count, digest,
+             stats->device, stats->driver);
     if (strcmp(name, part->name) == 0)
         return true;
     cli_picture_part_finish(part);
-    part->squares = squares_of(job->options.width, job->options.height, job->parts);
-    part->first = part->next = squares_first(&part->squares, job->part - 1, job->parts);
-    part->end = squares_first(&part->squares, job->part, job->parts);
+    part->squares = squares_of(job->options.width, job->options.height, job->part.count);
+    part->first = part->next = squares_first(&part->squares, job->part.number - 1, job->part.count);
+    part->end = squares_first(&part->squares, job->part.number, job->part.count);
     memcpy(part->name, name, sizeof(part->name));
-    job->part_name = part->name;
+    job->part.name = part->name;
     return true;
 }
 

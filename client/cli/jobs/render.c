@@ -48,24 +48,24 @@ static error_t parse(int key, char *value, struct argp_state *state)
         state->child_inputs[0] = job;
         return 0;
     case KEY_TIME:
-        good = fl_text_real(value, -1e6, 1e6, &job->time_s, &job->error);
+        good = fl_text_real(value, -1e6, 1e6, &job->clips.time_s, &job->error);
         break;
     case KEY_PROGRESSIVE:
-        job->progressive = true;
+        job->sampling.progressive = true;
         good = !value || fl_text_integer(value, 1, 65536, &number, &job->error);
-        job->pass_samples = (uint32_t)number;
+        job->sampling.pass_samples = (uint32_t)number;
         break;
     case KEY_PART:
-        good = fl_text_shard(value, &job->part, &job->parts, &job->error);
+        good = fl_text_shard(value, &job->part.number, &job->part.count, &job->error);
         break;
     case KEY_SCENE:
-        job->scene = value;
+        job->input.scene = value;
         return 0;
     case KEY_RESUME:
         job->series.resume = true;
         return 0;
     case KEY_WATCH:
-        job->watch = true;
+        job->input.watch = true;
         return 0;
     case ARGP_KEY_ARG:
         return cli_set_model(job, value);
@@ -84,9 +84,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
 /* Only files change, and only a file can be written again. */
 static bool complete_watch(struct cli_job *job)
 {
-    if (!job->watch || !cli_check_watch(job))
-        return !job->watch;
-    if (job->endless) {
+    if (!job->input.watch || !cli_check_watch(job))
+        return !job->input.watch;
+    if (job->sampling.endless) {
         cli_usage(job, "--watch", "a picture that is refined without an end waits for nothing");
         return fl_error_remedy(&job->error, "say how far by --samples");
     }
@@ -98,15 +98,15 @@ static bool complete_watch(struct cli_job *job)
 
 static bool complete(struct cli_job *job)
 {
-    job->usual_samples = STILL_SAMPLES;
-    job->filters = true;
+    job->sampling.usual = STILL_SAMPLES;
+    job->sampling.filters = true;
     if (!cli_job_complete(job, false) || !cli_picture_part_complete(job) || !complete_watch(job))
         return false;
-    if (job->progressive && cli_writes_to_stdout(job)) {
+    if (job->sampling.progressive && cli_writes_to_stdout(job)) {
         cli_usage(job, "--progressive", "standard output can be written only once");
         return fl_error_remedy(&job->error, "name a file: it is replaced after each pass");
     }
-    if (job->time_s != 0 && job->clip_count == 0) {
+    if (job->clips.time_s != 0 && job->clips.count == 0) {
         cli_usage(job, "--time", "no clip is played");
         return fl_error_remedy(&job->error, "add --clip NAME");
     }

@@ -42,11 +42,11 @@ static error_t set_option(struct cli_job *job, int key, const char *value)
         job->options.frames_per_second = (float)real;
         break;
     case KEY_ORBIT:
-        job->is_orbit = true;
+        job->camera.is_orbit = true;
         good = !value || fl_text_real(value, -1e6, 1e6, &series->orbit_degrees, &job->error);
         break;
     case KEY_KEYS:
-        job->keys_file = value;
+        job->camera.keys_file = value;
         break;
     case KEY_UPSAMPLE:
         good = fl_text_integer(value, 1, 64, &whole, &job->error);
@@ -85,7 +85,7 @@ error_t cli_series_set(struct cli_job *job, const char *name, const char *value)
 static bool load_keys(struct cli_job *job)
 {
     size_t count = 0;
-    if (!fl_camera_keys_load(job->keys_file, &job->series.keys, &count, &job->error))
+    if (!fl_camera_keys_load(job->camera.keys_file, &job->series.keys, &count, &job->error))
         return false;
     job->options.camera_path = PROTOCOL_CAMERA_KEYS;
     job->options.keys = job->series.keys;
@@ -95,22 +95,22 @@ static bool load_keys(struct cli_job *job)
 
 bool cli_series_complete(struct cli_job *job)
 {
-    if (!job->series.has_range && job->clip_count == 0 && !job->script && !job->is_orbit) {
+    if (!job->series.has_range && job->clips.count == 0 && !job->script && !job->camera.is_orbit) {
         cli_usage(job, "--frames", "no range of frames is given");
         return fl_error_remedy(&job->error, "for example --frames 1-120; an orbit, a clip or a script needs none");
     }
     if (!cli_job_complete(job, true))
         return false;
-    if (job->keys_file && (job->is_orbit || job->camera || job->has_eye))
+    if (job->camera.keys_file && (job->camera.is_orbit || job->camera.name || job->camera.has_eye))
         return cli_usage(job, "--keys", "cannot be combined with --orbit, --camera or --eye") == 0;
-    if (job->is_orbit && job->camera)
+    if (job->camera.is_orbit && job->camera.name)
         return cli_usage(job, "--orbit",
                          "cannot be combined with --camera; it can begin at --eye and --look-at") == 0;
-    if (job->keys_file)
+    if (job->camera.keys_file)
         return load_keys(job);
     /* All frames would be alike if neither the camera nor anything else moves. */
-    job->is_orbit = job->is_orbit || (!job->camera && !job->script && job->clip_count == 0);
-    if (job->is_orbit)
+    job->camera.is_orbit = job->camera.is_orbit || (!job->camera.name && !job->script && job->clips.count == 0);
+    if (job->camera.is_orbit)
         job->options.camera_path = PROTOCOL_CAMERA_ORBIT;
     return true;
 }

@@ -26,19 +26,19 @@
 
 /* ---- beginning ---- */
 
-static bool begin_trace(struct session *session, struct fl_error *error)
+static bool begin_trace(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
-    const char *const others[] = {job->model, job->environment, job->keys_file};
-    if (!job->trace_file)
+    const char *const others[] = {job->input.model, job->input.environment, job->camera.keys_file};
+    if (!job->talk.trace_file)
         return true;
-    if (!cli_check_not_input(job->trace_file, "--trace-file", others, 3, error))
+    if (!cli_check_not_input(job->talk.trace_file, "--trace-file", others, 3, error))
         return false;
-    session->trace = cli_trace_file_create(job->trace_file, error);
+    session->trace = cli_trace_file_create(job->talk.trace_file, error);
     return session->trace != NULL;
 }
 
-static bool start_sinks(struct session *session, struct fl_error *error)
+static bool start_sinks(struct cli_session *session, struct fl_error *error)
 {
     if (session->sinks_started)
         return true;
@@ -48,36 +48,36 @@ static bool start_sinks(struct session *session, struct fl_error *error)
 }
 
 /* Of a scene that has been loaded. */
-static bool settle(struct session *session, struct fl_error *error)
+static bool settle(struct cli_session *session, struct fl_error *error)
 {
     struct fl_scene *scene = session->loading.scene;
     session->job->options = session->typed;
-    return (!session->job->watch || cli_watch_scene(&session->watch, scene, error)) &&
+    return (!session->job->input.watch || cli_watch_scene(&session->watch, scene, error)) &&
            cli_choose_camera(session->job, scene, error) &&
            cli_settle(session->job, scene, session->is_series, error) &&
            cli_sinks_names(&session->sinks, scene, error);
 }
 
 /* Without a number of attempts a duration is the limit. */
-static double seconds_left(const struct session *session)
+static double seconds_left(const struct cli_session *session)
 {
-    const struct cli_retries *retries = &session->job->retries;
+    const struct cli_retries *retries = &session->job->daemon.retries;
     const double for_s = retries->has_duration ? retries->for_s : retries->has_count ? INFINITY : DEFAULT_RETRY_S;
     return for_s - (double)(monotonic_now_ns() - session->lost_ns) * 1e-9;
 }
 
 /* A daemon that does not answer takes no longer than it is to be tried; one of our own has its time to start. */
-static unsigned connect_timeout_ms(const struct session *session)
+static unsigned connect_timeout_ms(const struct cli_session *session)
 {
     const struct cli_job *job = session->job;
-    if (!job->server || (session->failures == 0 && !job->retries.has_duration))
+    if (!job->daemon.server || (session->failures == 0 && !job->daemon.retries.has_duration))
         return 0;
-    return cli_connect_timeout_ms(session->failures > 0 ? seconds_left(session) : job->retries.for_s);
+    return cli_connect_timeout_ms(session->failures > 0 ? seconds_left(session) : job->daemon.retries.for_s);
 }
 
 /* The importer loads its libraries while the daemon starts, and the exporter while the importer runs: once the
  * scene is loaded the daemon uses all processors. */
-static bool load_scene(struct session *session, struct fl_error *error)
+static bool load_scene(struct cli_session *session, struct fl_error *error)
 {
     struct cli_loading *loading = &session->loading;
     *loading = (struct cli_loading){.job = session->job,
@@ -91,7 +91,7 @@ static bool load_scene(struct session *session, struct fl_error *error)
                    fl_connection_start_ns(loading->connection));
     if (!start_sinks(session, error) || !cli_loading_end(loading, error))
         return false;
-    if (!session->job->scene)
+    if (!session->job->input.scene)
         cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns,
                          monotonic_now_ns());
     session->was_loaded = true;
@@ -102,11 +102,11 @@ static bool load_scene(struct session *session, struct fl_error *error)
 
 static bool is_there(void *user, uint32_t frame)
 {
-    struct session *session = user;
+    struct cli_session *session = user;
     return cli_sinks_have(&session->sinks, frame);
 }
 
-static bool choose_frames(struct session *session, struct fl_error *error)
+static bool choose_frames(struct cli_session *session, struct fl_error *error)
 {
     struct cli_job *job = session->job;
     const struct cli_series *series = &job->series;
@@ -117,7 +117,7 @@ static bool choose_frames(struct session *session, struct fl_error *error)
     if (session->is_series && series->shard_parts > 0 &&
         !(series->is_chunk ? fl_frame_run_chunk : fl_frame_run_shard)(&series->range, series->shard_part,
                                                                       series->shard_parts, &wanted)) {
-        if (!job->quiet)
+        if (!job->talk.quiet)
             fprintf(stderr, "farlight: there are fewer frames than parts: part %u has none\n", series->shard_part);
         return true;
     }
@@ -126,14 +126,14 @@ static bool choose_frames(struct session *session, struct fl_error *error)
     if (!fl_frame_set_missing(&wanted, series->resume ? is_there : NULL, session, &session->set, error))
         return false;
     const uint32_t there = fl_frame_run_count(&wanted) - session->set.frame_count;
-    if (series->resume && !job->quiet && there > 0)
+    if (series->resume && !job->talk.quiet && there > 0)
         fprintf(stderr, "farlight: %u of %u frames exist already\n", there, fl_frame_run_count(&wanted));
     return true;
 }
 
 /* ---- lost daemons ---- */
 
-static void close_connection(struct session *session)
+static void close_connection(struct cli_session *session)
 {
     /* After an interruption the daemon still gets a proper end. */
     if (session->loading.connection)
@@ -144,24 +144,24 @@ static void close_connection(struct session *session)
 }
 
 /* Where no daemon has answered yet, the address may be misspelt: the command waits only if that was asked for. */
-static bool may_be_retried(const struct session *session, const struct fl_error *error)
+static bool may_be_retried(const struct cli_session *session, const struct fl_error *error)
 {
     const struct cli_job *job = session->job;
     return !session->sink_failed && cli_is_temporary(error) &&
-           (session->was_reached || error->retryable || job->retries.has_duration);
+           (session->was_reached || error->retryable || job->daemon.retries.has_duration);
 }
 
 /* Longer each time, and no longer than is left. False: interrupted. */
-static bool pause_before_retry(const struct session *session, uint32_t min_ms, struct fl_error *error)
+static bool pause_before_retry(const struct cli_session *session, uint32_t min_ms, struct fl_error *error)
 {
     const double left_s = fmax(seconds_left(session), 0); /* closing the connection may have taken the rest */
     uint32_t pause_ms = cli_retry_pause_ms(session->failures, min_ms);
     if (pause_ms * 1e-3 > left_s)
         pause_ms = (uint32_t)(left_s * 1e3) + 1;
-    if (!session->job->quiet) {
+    if (!session->job->talk.quiet) {
         fprintf(stderr, "farlight: trying again in %.1f s", pause_ms * 1e-3);
-        if (session->job->retries.has_count)
-            fprintf(stderr, " (%u of %u)", session->failures, session->job->retries.count);
+        if (session->job->daemon.retries.has_count)
+            fprintf(stderr, " (%u of %u)", session->failures, session->job->daemon.retries.count);
         if (isfinite(left_s))
             fprintf(stderr, ", for at most %.0f s more", left_s);
         if (session->is_series && session->has_set)
@@ -172,15 +172,15 @@ static bool pause_before_retry(const struct session *session, uint32_t min_ms, s
 }
 
 /* Reports the error; true: the session continues after it. */
-static bool recover(struct session *session, struct fl_error *error)
+static bool recover(struct cli_session *session, struct fl_error *error)
 {
-    const struct cli_retries *retries = &session->job->retries;
+    const struct cli_retries *retries = &session->job->daemon.retries;
     if (!may_be_retried(session, error))
         return false;
     if (session->failures == 0) /* a daemon that does not answer is lost from the beginning of the attempt */
         session->lost_ns = session->loading.connection ? monotonic_now_ns() : session->loading.connect_begin_ns;
     if ((retries->has_count && session->failures >= retries->count) || seconds_left(session) <= 0) {
-        if (session->failures > 0 && !session->job->quiet)
+        if (session->failures > 0 && !session->job->talk.quiet)
             fprintf(stderr, "farlight: given up after %u attempt%s in %.0f s\n", session->failures,
                     session->failures == 1 ? "" : "s", (double)(monotonic_now_ns() - session->lost_ns) * 1e-9);
         return false;
@@ -189,32 +189,32 @@ static bool recover(struct session *session, struct fl_error *error)
     cli_progress_clear(&session->progress);
     cli_report(error);
     close_connection(session);
-    if (session->job->progressive)
+    if (session->job->sampling.progressive)
         session->begun = false; /* its samples are lost with the daemon */
     return pause_before_retry(session, error->retry_after_ms, error);
 }
 
-static bool load_and_render(struct session *session, struct fl_error *error)
+static bool load_and_render(struct cli_session *session, struct fl_error *error)
 {
     while (!load_scene(session, error) || !choose_frames(session, error) || !session_render(session, error))
         if (!recover(session, error))
             return false;
     /* What a private daemon takes to end it takes while the last file is written. */
-    if (!session->job->server && !session->job->watch)
+    if (!session->job->daemon.server && !session->job->input.watch)
         fl_connection_end(session->loading.connection);
     return session_finish_sinks(session, error);
 }
 
 /* ---- changed files ---- */
 
-static bool begin_watch(struct session *session, struct fl_error *error)
+static bool begin_watch(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
-    return !job->watch ||
-           cli_watch_begin_models(&session->watch, job->models, job->model_count, job->environment, error);
+    return !job->input.watch || cli_watch_begin_models(&session->watch, job->input.models, job->input.count,
+                                                       job->input.environment, error);
 }
 
-static bool render_again(struct session *session, struct fl_error *error)
+static bool render_again(struct cli_session *session, struct fl_error *error)
 {
     session->begun = false;
     session->run = 0;
@@ -225,14 +225,14 @@ static bool render_again(struct session *session, struct fl_error *error)
 
 /* Until it is interrupted, which is its end. A model that cannot be read is reported, and its last picture stays.
  */
-static bool follow(struct session *session, struct fl_error *error)
+static bool follow(struct cli_session *session, struct fl_error *error)
 {
-    if (!session->job->quiet)
+    if (!session->job->talk.quiet)
         fprintf(stderr, "farlight: watching %zu files; Ctrl-C ends it\n", session->watch.count);
     while (cli_watch_wait(&session->watch, session->loading.connection, error)) {
         if (render_again(session, error)) {
             cli_progress_clear(&session->progress);
-            cli_loading_print_sent(&session->loading, session->job->outputs[0].path);
+            cli_loading_print_sent(&session->loading, session->job->output.list[0].path);
             continue;
         }
         if (error->code == FL_ERROR_INTERRUPTED || session->sink_failed ||
@@ -250,7 +250,7 @@ static bool follow(struct session *session, struct fl_error *error)
     return error->code == FL_ERROR_NONE;
 }
 
-static bool run(struct session *session, struct fl_error *error)
+static bool run(struct cli_session *session, struct fl_error *error)
 {
     if (!cli_sinks_prepare(&session->sinks, session->job, session->is_series, error))
         return false;
@@ -262,12 +262,12 @@ static bool run(struct session *session, struct fl_error *error)
     if (!begin_watch(session, error) || !load_and_render(session, error))
         return false;
     session_show_progress(session);
-    return !session->job->watch || follow(session, error);
+    return !session->job->input.watch || follow(session, error);
 }
 
 /* ---- end ---- */
 
-static void print_timings(struct session *session)
+static void print_timings(struct cli_session *session)
 {
     const struct cli_client_times times = {.total_ns = monotonic_now_ns() - session->begin_ns,
                                            .start_ns = fl_connection_start_ns(session->loading.connection),
@@ -276,7 +276,7 @@ static void print_timings(struct session *session)
     cli_timings_end(session->timings, &times);
 }
 
-static void close_session(struct session *session)
+static void close_session(struct cli_session *session)
 {
     close_connection(session);
     cli_watch_end(&session->watch);
@@ -288,14 +288,14 @@ static void close_session(struct session *session)
 
 int cli_run_job(struct cli_job *job, bool is_series)
 {
-    struct session session = {
+    struct cli_session session = {
         .job = job, .is_series = is_series, .typed = job->options, .begin_ns = monotonic_now_ns()};
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    cli_progress_begin(&session.progress, job);
-    if (job->timings != CLI_TIMINGS_NONE)
-        session.timings = cli_timings_create(job->timings, cli_writes_to_stdout(job));
+    cli_progress_begin(&session.progress, &job->talk);
+    if (job->talk.timings != CLI_TIMINGS_NONE)
+        session.timings = cli_timings_create(job->talk.timings, cli_writes_to_stdout(job));
     bool done = cli_read_input(job, &error) && begin_trace(&session, &error) && run(&session, &error);
     cli_progress_end(&session.progress, done);
     if (done && session.was_loaded)
@@ -311,7 +311,7 @@ int cli_run_job(struct cli_job *job, bool is_series)
 
 int cli_dry_run(struct cli_job *job)
 {
-    struct session session = {.job = job, .is_series = true};
+    struct cli_session session = {.job = job, .is_series = true};
     struct fl_error error = {0};
     const bool done = cli_check_models(job, &error) && cli_sinks_prepare(&session.sinks, job, true, &error) &&
                       (!job->series.has_range || choose_frames(&session, &error));

@@ -17,7 +17,7 @@ int cli_run_job(struct cli_job *job, bool is_series);
 /* Checks what can be checked of an animation without a daemon. */
 int cli_dry_run(struct cli_job *job);
 
-struct session {
+struct cli_session {
     struct cli_job *job;
     bool is_series;
     struct cli_sinks sinks;
@@ -51,9 +51,9 @@ struct session {
 };
 
 /* Renders the frames of the set that have not been written, and passes them to the sinks. */
-bool session_render(struct session *session, struct fl_error *error);
+bool session_render(struct cli_session *session, struct fl_error *error);
 /* Waits until the last file is complete. */
-bool session_finish_sinks(struct session *session, struct fl_error *error);
-void session_show_progress(struct session *session); /* of a series */
+bool session_finish_sinks(struct cli_session *session, struct fl_error *error);
+void session_show_progress(struct cli_session *session); /* of a series */
 
 #endif

@@ -18,34 +18,35 @@
 #define LONG_PASS_NS 1000000000u
 #define PASS_SAMPLES_MAX 65536u /* of one request, in the protocol */
 
-static void add_export(struct session *session, int64_t frame, uint64_t begin_ns)
+static void add_export(struct cli_session *session, int64_t frame, uint64_t begin_ns)
 {
     const uint64_t duration_ns = monotonic_now_ns() - begin_ns;
     session->export_ns += duration_ns;
     cli_trace_span(session->trace, CLI_TRACE_CLIENT, "export", frame, begin_ns, duration_ns);
 }
 
-static bool is_enough(const struct session *session, float noise, uint32_t samples)
+static bool is_enough(const struct cli_session *session, float noise, uint32_t samples)
 {
     const struct message_render *options = &session->job->options;
     return noise <= options->noise || samples >= options->samples;
 }
 
 /* Whether it is more than a step on the way to a picture. */
-static bool is_wanted(const struct session *session, const struct fl_frame *frame)
+static bool is_wanted(const struct cli_session *session, const struct fl_frame *frame)
 {
     const struct cli_job *job = session->job;
-    return job->progressive || !job->by_error || is_enough(session, frame->noise, frame->samples);
+    return job->sampling.progressive || !job->sampling.by_error ||
+           is_enough(session, frame->noise, frame->samples);
 }
 
-static void report_frame(struct session *session, const struct fl_frame *frame)
+static void report_frame(struct cli_session *session, const struct fl_frame *frame)
 {
     cli_trace_frame(session->trace, frame, monotonic_now_ns());
     cli_timings_frame(session->timings, frame);
     cli_structure_warn(frame, &session->warned, &session->progress);
 }
 
-static bool write_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
+static bool write_frame(struct cli_session *session, const struct fl_frame *frame, struct fl_error *error)
 {
     const uint64_t begin_ns = monotonic_now_ns();
     const bool written = !is_wanted(session, frame) || cli_sinks_write(&session->sinks, frame, error);
@@ -55,7 +56,7 @@ static bool write_frame(struct session *session, const struct fl_frame *frame, s
 }
 
 /* The picture that was being written is complete: another one is, or the sinks are finished. */
-static void log_frame(struct session *session)
+static void log_frame(struct cli_session *session)
 {
     if (session->is_being_written)
         cli_progress_frame(&session->progress, session->written_frame, session->written_seconds,
@@ -63,7 +64,7 @@ static void log_frame(struct session *session)
     session->is_being_written = false;
 }
 
-static void note_frame(struct session *session, const struct fl_frame *frame)
+static void note_frame(struct cli_session *session, const struct fl_frame *frame)
 {
     const uint64_t now_ns = monotonic_now_ns();
     log_frame(session);
@@ -75,7 +76,7 @@ static void note_frame(struct session *session, const struct fl_frame *frame)
     cli_sinks_path(&session->sinks, session->written_path, sizeof(session->written_path));
 }
 
-bool session_finish_sinks(struct session *session, struct fl_error *error)
+bool session_finish_sinks(struct cli_session *session, struct fl_error *error)
 {
     const uint64_t begin_ns = monotonic_now_ns();
     session->sink_failed = !cli_sinks_finish(&session->sinks, error);
@@ -85,13 +86,13 @@ bool session_finish_sinks(struct session *session, struct fl_error *error)
     return !session->sink_failed;
 }
 
-void session_show_progress(struct session *session)
+void session_show_progress(struct cli_session *session)
 {
     if (session->is_series)
         cli_progress_frames(&session->progress, session->done, session->set.frame_count);
 }
 
-static bool take_frames(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
+static bool take_frames(struct cli_session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct fl_frame *frame = NULL;
     while ((frame = fl_render_next(session->rendering, error))) {
@@ -124,9 +125,10 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
 static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t total, uint32_t last,
                              uint64_t last_ns)
 {
-    const uint32_t first = job->by_error && !job->progressive ? ERROR_PASS_SAMPLES : 1;
-    uint32_t samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : first;
-    if ((job->endless || job->by_error) && job->pass_samples == 0 && last_ns > LONG_PASS_NS)
+    const uint32_t first = job->sampling.by_error && !job->sampling.progressive ? ERROR_PASS_SAMPLES : 1;
+    uint32_t samples = job->sampling.pass_samples > 0 ? job->sampling.pass_samples : held > 0 ? held : first;
+    if ((job->sampling.endless || job->sampling.by_error) && job->sampling.pass_samples == 0 &&
+        last_ns > LONG_PASS_NS)
         samples = last;
     samples = samples < PASS_SAMPLES_MAX ? samples : PASS_SAMPLES_MAX;
     return samples < total - held ? samples : total - held;
@@ -140,31 +142,31 @@ static void print_held(const char *path, uint32_t held)
 }
 
 /* After an interruption: completes the file that is being written. False: the interruption is an error. */
-static bool end_passes(struct session *session, struct fl_error *error)
+static bool end_passes(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
     struct fl_error failure = {0};
-    if (error->code != FL_ERROR_INTERRUPTED || session->written_samples == 0 || !job->progressive)
+    if (error->code != FL_ERROR_INTERRUPTED || session->written_samples == 0 || !job->sampling.progressive)
         return false;
     if (!session_finish_sinks(session, &failure)) {
         *error = failure;
         return false;
     }
     cli_progress_clear(&session->progress);
-    if (!job->quiet)
-        print_held(job->outputs[0].path, session->written_samples);
-    if (job->endless)
+    if (!job->talk.quiet)
+        print_held(job->output.list[0].path, session->written_samples);
+    if (job->sampling.endless)
         *error = (struct fl_error){0};
-    return job->endless;
+    return job->sampling.endless;
 }
 
 /* A progressive picture, or one that is sampled by its error: one job per pass, whose samples the daemon adds to
  * the previous ones. */
-static bool render_passes(struct session *session, struct fl_error *error)
+static bool render_passes(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
     struct message_render options = job->options;
-    const uint32_t total = job->endless ? UINT32_MAX : options.samples;
+    const uint32_t total = job->sampling.endless ? UINT32_MAX : options.samples;
     const struct fl_frame_run still = {.step = 1};
     uint64_t pass_ns = 0;
     options.accumulate = PROTOCOL_ACCUMULATION_ON;
@@ -177,8 +179,8 @@ static bool render_passes(struct session *session, struct fl_error *error)
         fl_render_destroy(session->rendering);
         session->rendering = NULL;
         pass_ns = monotonic_now_ns() - begin_ns;
-        if (!job->by_error) {
-            cli_progress_samples(&session->progress, held + options.samples, job->endless ? 0 : total);
+        if (!job->sampling.by_error) {
+            cli_progress_samples(&session->progress, held + options.samples, job->sampling.endless ? 0 : total);
             continue;
         }
         cli_progress_noise(&session->progress, &(struct cli_noise){.error = session->noise,
@@ -192,7 +194,7 @@ static bool render_passes(struct session *session, struct fl_error *error)
 }
 
 /* The squares of a part of a picture that have not come yet, one job each; its file is written once, with all. */
-static bool render_part(struct session *session, struct fl_error *error)
+static bool render_part(struct cli_session *session, struct fl_error *error)
 {
     struct cli_job *job = session->job;
     struct cli_picture_part *part = &session->part;
@@ -201,8 +203,8 @@ static bool render_part(struct session *session, struct fl_error *error)
     if (!cli_picture_part_begin(part, job, session->loading.connection, session->loading.scene, error))
         return false;
     if (job->series.resume && cli_picture_part_is_there(part, session->sinks.items[0].path)) {
-        if (!job->quiet)
-            fprintf(stderr, "farlight: part %u of %u exists already\n", job->part, job->parts);
+        if (!job->talk.quiet)
+            fprintf(stderr, "farlight: part %u of %u exists already\n", job->part.number, job->part.count);
         return true;
     }
     while (cli_picture_part_next(part, &options)) {
@@ -226,12 +228,12 @@ static bool render_part(struct session *session, struct fl_error *error)
 }
 
 /* Renders the rest of one run, as one job. */
-static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
+static bool render_run(struct cli_session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct message_render options = session->job->options;
-    if (session->job->parts > 0)
+    if (session->job->part.count > 0)
         return render_part(session, error);
-    if (session->job->progressive || session->job->by_error)
+    if (session->job->sampling.progressive || session->job->sampling.by_error)
         return render_passes(session, error);
     options.first_frame = session->begun ? (uint32_t)session->next : run->first;
     options.last_frame = run->last;
@@ -245,7 +247,7 @@ static bool render_run(struct session *session, const struct fl_frame_run *run, 
     return done;
 }
 
-bool session_render(struct session *session, struct fl_error *error)
+bool session_render(struct cli_session *session, struct fl_error *error)
 {
     const struct fl_frame_set *set = &session->set;
     session_show_progress(session);

@@ -35,14 +35,14 @@ static bool in_script_at(const struct cli_job *job, const struct fl_json_place *
 /* *longest_s: the maximum duration of one pass at their speeds. */
 static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *longest_s, struct fl_error *error)
 {
-    for (size_t i = 0; i < job->clip_count; i++) {
-        const struct cli_clip *clip = &job->clips[i];
-        struct record_clip_use *use = &job->clip_uses[i];
+    for (size_t i = 0; i < job->clips.count; i++) {
+        const struct cli_clip *clip = &job->clips.list[i];
+        struct record_clip_use *use = &job->clips.uses[i];
         const struct fl_clip_info *info = NULL;
         if (!fl_scene_find_clip(scene, clip->which, &use->clip, &info, error))
             return clip->line > 0 ? in_script(job, clip->line, "clips", error) : false;
         /* The first rendered frame is at time 0. */
-        use->start_s = (float)((double)clip->start_s - job->time_s);
+        use->start_s = (float)((double)clip->start_s - job->clips.time_s);
         use->speed = clip->speed;
         use->loop = clip->loop ? 1 : 0;
         *longest_s = fmax(*longest_s, (double)info->duration_s / (double)clip->speed);
@@ -69,19 +69,19 @@ static bool settle_target(const struct cli_channel *given, struct fl_scene *scen
 /* The script's values, as an own clip that is played last. */
 static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
-    struct record_clip_use *use = &job->clip_uses[job->clip_count];
-    struct fl_channel *channels = calloc(job->channel_count + 1, sizeof(*channels));
+    struct record_clip_use *use = &job->clips.uses[job->clips.count];
+    struct fl_channel *channels = calloc(job->clips.channel_count + 1, sizeof(*channels));
     if (!channels)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     bool good = true;
-    for (size_t i = 0; i < job->channel_count && good; i++) {
-        const struct cli_channel *given = &job->channels[i];
+    for (size_t i = 0; i < job->clips.channel_count && good; i++) {
+        const struct cli_channel *given = &job->clips.channels[i];
         channels[i] = given->channel;
         if (!settle_target(given, scene, &channels[i].object, error))
             good = in_script_at(job, given->place, error);
     }
     *use = (struct record_clip_use){.speed = 1};
-    good = good && fl_scene_add_clip(scene, "script", channels, job->channel_count, &use->clip, error);
+    good = good && fl_scene_add_clip(scene, "script", channels, job->clips.channel_count, &use->clip, error);
     free(channels);
     return good;
 }
@@ -91,8 +91,8 @@ static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct 
 static double last_key_s(const struct cli_job *job)
 {
     double last_s = 0;
-    for (size_t i = 0; i < job->channel_count; i++) {
-        const struct fl_channel *channel = &job->channels[i].channel;
+    for (size_t i = 0; i < job->clips.channel_count; i++) {
+        const struct fl_channel *channel = &job->clips.channels[i].channel;
         if (channel->times != job->series.dolly_times)
             last_s = fmax(last_s, (double)channel->times[channel->key_count - 1]);
     }
@@ -106,10 +106,10 @@ static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *e
     struct cli_series *series = &job->series;
     const double fps = (double)job->options.frames_per_second, keys_s = last_key_s(job);
     const double orbit_s = series->orbit_seconds > 0 ? series->orbit_seconds : ORBIT_SECONDS;
-    const bool by_clips = clips_s > 0, by_orbit = !by_clips && keys_s <= 0 && job->is_orbit;
+    const bool by_clips = clips_s > 0, by_orbit = !by_clips && keys_s <= 0 && job->camera.is_orbit;
     bool loops = by_orbit;
-    for (size_t i = 0; i < job->clip_count; i++)
-        loops = loops || job->clips[i].loop;
+    for (size_t i = 0; i < job->clips.count; i++)
+        loops = loops || job->clips.list[i].loop;
     const double seconds = by_clips ? clips_s : by_orbit ? orbit_s : keys_s;
     const double frames = floor(seconds * fps + 0.5) + ((by_clips || by_orbit) && loops ? 0 : 1);
     if (series->has_range)
@@ -139,7 +139,7 @@ static void settle_camera(struct cli_job *job)
     const double step_s = (double)series->range.step / (double)wanted->frames_per_second;
     const uint32_t frames = fl_frame_run_count(&series->range);
     wanted->time_origin_frame = series->range.first;
-    if (job->is_orbit) {
+    if (job->camera.is_orbit) {
         wanted->orbit_turn = (float)(series->orbit_degrees * RADIANS_PER_DEGREE);
         wanted->orbit_seconds = (float)(series->orbit_seconds > 0 ? series->orbit_seconds : frames * step_s);
     }
@@ -159,9 +159,9 @@ bool cli_settle(struct cli_job *job, struct fl_scene *scene, bool is_series, str
             return false;
         settle_camera(job);
     }
-    if (job->channel_count > 0 && !settle_channels(job, scene, error))
+    if (job->clips.channel_count > 0 && !settle_channels(job, scene, error))
         return false;
-    job->options.clips = job->clip_uses;
-    job->options.clips_count = (uint32_t)job->clip_count + (job->channel_count > 0 ? 1 : 0);
+    job->options.clips = job->clips.uses;
+    job->options.clips_count = (uint32_t)job->clips.count + (job->clips.channel_count > 0 ? 1 : 0);
     return true;
 }

@@ -64,7 +64,7 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     }
     if (!sink->is_series || cli_image_is_video(sink->output.image))
         return cli_check_output(path, sink->folder, sizeof(sink->folder), error) &&
-               cli_check_folder(path, sink->folder, sink->job->parents, error) &&
+               cli_check_folder(path, sink->folder, sink->job->output.parents, error) &&
                snprintf(sink->path, sizeof(sink->path), "%s", path) > 0;
     if (!fl_pattern_parse(path, &sink->pattern, error)) {
         snprintf(error->field, sizeof(error->field), "--output");
@@ -74,7 +74,7 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     if (!fl_pattern_path(&sink->pattern, 10000000, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "the path of a frame is too long");
     if (cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error) &&
-        cli_check_folder(path, sink->folder, sink->job->parents, error))
+        cli_check_folder(path, sink->folder, sink->job->output.parents, error))
         return true;
     /* No frame of that number may be wanted. */
     fl_text_utf8(path, error->field, sizeof(error->field));
@@ -100,14 +100,15 @@ static bool name_part(struct cli_sink *sink, struct fl_error *error)
 bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error)
 {
     const bool are_parts = cli_views_are_files(job);
-    sinks->items = calloc(job->output_count * (are_parts ? 2 : 1), sizeof(*sinks->items));
+    sinks->items = calloc(job->output.count * (are_parts ? 2 : 1), sizeof(*sinks->items));
     if (!sinks->items)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    for (size_t i = 0; i < job->output_count; i++) {
+    for (size_t i = 0; i < job->output.count; i++) {
         const enum cli_part last = are_parts ? CLI_PART_RIGHT : CLI_PART_ALL;
         for (enum cli_part part = are_parts ? CLI_PART_LEFT : CLI_PART_ALL; part <= last; part++) {
             struct cli_sink *sink = &sinks->items[sinks->count++];
-            *sink = (struct cli_sink){.job = job, .output = job->outputs[i], .is_series = is_series, .part = part};
+            *sink =
+                (struct cli_sink){.job = job, .output = job->output.list[i], .is_series = is_series, .part = part};
             if (!name_part(sink, error) || !prepare(sink, error))
                 return false;
         }
@@ -131,8 +132,8 @@ static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
 /* A path tells where the file lay, which differs from host to host. */
 static const char *model_name(const struct cli_job *job)
 {
-    const char *model = job->model ? job->model : job->scene;
-    return strcmp(model, "-") == 0 ? "standard input" : job->full_metadata ? model : cli_base_name(model);
+    const char *model = job->input.model ? job->input.model : job->input.scene;
+    return strcmp(model, "-") == 0 ? "standard input" : job->output.full_metadata ? model : cli_base_name(model);
 }
 
 /* A GIF file is shown at the nearest rate that it can have. */
@@ -141,7 +142,8 @@ static void note_rate(const struct cli_sink *sink)
     char text[160];
     const double wanted = (double)sink->job->options.frames_per_second;
     const double shown = 100.0 / fl_rate_gif_delay(sink->job->options.frames_per_second);
-    if (sink->output.image != CLI_IMAGE_MOVING_GIF || sink->job->quiet || fabs(shown - wanted) < 1e-3 * wanted)
+    if (sink->output.image != CLI_IMAGE_MOVING_GIF || sink->job->talk.quiet ||
+        fabs(shown - wanted) < 1e-3 * wanted)
         return;
     snprintf(text, sizeof(text), "GIF files count hundredths of a second: %g frames per second become %.4g",
              wanted, shown);
@@ -167,8 +169,8 @@ static bool start_video(struct cli_sink *sink, struct fl_error *error)
                                              .format = cli_image_name(sink->output.image),
                                              .model = model_name(job),
                                              .frames_per_second = job->options.frames_per_second,
-                                             .quality = job->file_quality,
-                                             .lossless = job->lossless,
+                                             .quality = job->output.quality,
+                                             .lossless = job->output.lossless,
                                              .interrupt_fd = cli_interrupt_fd()};
     sink->video = fl_video_start(&options, error);
     return sink->video != NULL;
@@ -183,21 +185,21 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     const struct cli_job *job = sink->job;
     const struct message_render *wanted = &job->options;
     char names[CLI_LIGHT_GROUPS * CLI_LIGHT_GROUP_NAME] = "";
-    for (size_t i = 0, used = 0; i < job->light_group_count; i++)
-        used +=
-            (size_t)snprintf(names + used, sizeof(names) - used, "%s%s", i > 0 ? "," : "", job->light_groups[i]);
+    for (size_t i = 0, used = 0; i < job->light_groups.count; i++)
+        used += (size_t)snprintf(names + used, sizeof(names) - used, "%s%s", i > 0 ? "," : "",
+                                 job->light_groups.names[i]);
     /* An interruption is the normal end of progressive pictures: a file that has begun is finished. */
     const struct fl_exporter_options options = {
         .folder = sink->folder,
         .model = model_name(job),
-        .full_metadata = job->full_metadata,
+        .full_metadata = job->output.full_metadata,
         .light_groups = names[0] != '\0' ? names : NULL,
-        .dwaa = job->dwaa,
-        .colour_space = job->colour_space,
-        .display_view = job->display_view,
-        .ocio = job->ocio,
+        .dwaa = job->output.dwaa,
+        .colour_space = job->output.colour_space,
+        .display_view = job->output.display_view,
+        .ocio = job->output.ocio,
         .frames_per_second = sink->is_series ? job->options.frames_per_second : 0,
-        .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd(),
+        .interrupt_fd = job->sampling.progressive ? 0 : cli_interrupt_fd(),
         .format = cli_image_name(sink->output.image),
         .window = {wanted->crop_x, wanted->crop_y, wanted->crop_width > 0 ? wanted->width : 0, wanted->height}};
     sink->exporter = fl_exporter_start(&options, error);
@@ -272,11 +274,12 @@ static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, str
     const struct fl_export_options options = {
         .path = sink->path,
         .format = cli_image_name(sink->output.image),
-        .half = !job->float_pixels && sink->output.image == CLI_IMAGE_EXR,
-        .part = job->part_name,
-        .origin = {job->origin[0], job->origin[1], job->origin[2]},
-        .quality =
-            sink->output.image == CLI_IMAGE_JPEG || sink->output.image == CLI_IMAGE_WEBP ? job->file_quality : 0};
+        .half = !job->output.float_pixels && sink->output.image == CLI_IMAGE_EXR,
+        .part = job->part.name,
+        .origin = {job->camera.origin[0], job->camera.origin[1], job->camera.origin[2]},
+        .quality = sink->output.image == CLI_IMAGE_JPEG || sink->output.image == CLI_IMAGE_WEBP
+                       ? job->output.quality
+                       : 0};
     if (!fl_exporter_write(sink->exporter, frame, &options, error) || !write_digest(sink, error))
         return false;
     if (job->series.digests)

@@ -94,15 +94,16 @@ static bool complete(struct thumbnails *wanted)
         return fl_error_remedy(&job->error, "-o sheet.png, or -o FOLDER/ for a file for each model");
     }
     wanted->to_folder = is_folder(wanted->output);
-    if (!job->has_samples && !job->has_integrator) {
+    if (!job->sampling.has_samples && !job->given.integrator) {
         job->options.samples = SAMPLES;
-        job->has_samples = true;
+        job->sampling.has_samples = true;
     }
-    job->filters = true;
-    job->model = wanted->models.entries[0].path;
-    if (job->has_up && !job->has_eye)
-        job->models[job->model_count++] = (struct fl_model){.path = job->model}; /* which is turned, as all are */
-    job->output = wanted->to_folder ? "model.png" : wanted->output;
+    job->sampling.filters = true;
+    job->input.model = wanted->models.entries[0].path;
+    if (job->camera.has_up && !job->camera.has_eye)
+        job->input.models[job->input.count++] =
+            (struct fl_model){.path = job->input.model}; /* which is turned, as all are */
+    job->output.path = wanted->to_folder ? "model.png" : wanted->output;
     if (!cli_job_complete(job, false))
         return false;
     if (job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8)
@@ -151,10 +152,10 @@ static bool write_file(struct thumbnails *wanted, const char *name, const struct
 
 static bool write_sheet(struct thumbnails *wanted, const char *path, struct fl_error *error)
 {
-    const enum cli_image image = wanted->job.outputs[0].image;
+    const enum cli_image image = wanted->job.output.list[0].image;
     const struct fl_export_options options = {.path = path,
                                               .format = cli_image_name(image),
-                                              .quality = wanted->job.file_quality,
+                                              .quality = wanted->job.output.quality,
                                               .texts = wanted->sheet.texts,
                                               .text_count = wanted->sheet.text_count};
     return fl_exporter_write(wanted->exporter, &wanted->sheet.frame, &options, error) &&
@@ -166,27 +167,27 @@ static bool write_sheet(struct thumbnails *wanted, const char *path, struct fl_e
 static struct fl_load_options load_options(struct thumbnails *wanted, size_t index)
 {
     struct fl_model *placed = &wanted->placed[index % 2];
-    if (wanted->job.model_count > 0) {
-        *placed = wanted->job.models[0];
+    if (wanted->job.input.count > 0) {
+        *placed = wanted->job.input.models[0];
         placed->path = wanted->models.entries[index].path;
     }
     return (struct fl_load_options){.model = wanted->models.entries[index].path,
                                     .models = placed,
-                                    .model_count = wanted->job.model_count,
-                                    .environment = wanted->job.environment,
-                                    .environment_degrees = wanted->job.environment_degrees,
-                                    .without_studio = wanted->job.without_studio,
-                                    .point_size = wanted->job.point_size};
+                                    .model_count = wanted->job.input.count,
+                                    .environment = wanted->job.input.environment,
+                                    .environment_degrees = wanted->job.input.environment_degrees,
+                                    .without_studio = wanted->job.input.without_studio,
+                                    .point_size = wanted->job.input.point_size};
 }
 
 static bool connect_to(struct thumbnails *wanted, struct fl_error *error)
 {
     const struct cli_job *job = &wanted->job;
-    const struct fl_connect_options connect = {.server = job->server,
-                                               .key_file = cli_key_file(job->server, job->key_file),
+    const struct fl_connect_options connect = {.server = job->daemon.server,
+                                               .key_file = cli_key_file(job->daemon.server, job->daemon.key_file),
                                                .name = "farlight",
                                                .interrupt_fd = cli_interrupt_fd(),
-                                               .lost_after_ms = job->retries.lost_after_ms};
+                                               .lost_after_ms = job->daemon.retries.lost_after_ms};
     wanted->connection = fl_connect(&connect, error);
     return wanted->connection != NULL;
 }
@@ -194,7 +195,7 @@ static bool connect_to(struct thumbnails *wanted, struct fl_error *error)
 static struct fl_frame *render(const struct thumbnails *wanted, struct fl_scene *scene, struct fl_error *error)
 {
     struct message_render options = wanted->job.options;
-    if (!cli_find_camera(&options, wanted->job.camera, NULL, wanted->job.has_framing, scene, error))
+    if (!cli_find_camera(&options, wanted->job.camera.name, NULL, wanted->job.camera.has_framing, scene, error))
         return NULL;
     cli_choose_ground(&wanted->job, &options, scene);
     struct fl_job *job = fl_render_start(scene, &options, error);
@@ -288,7 +289,7 @@ static bool make_all(struct thumbnails *wanted, struct fl_error *error)
 static bool finish(struct thumbnails *wanted, const struct cli_job *sheet_job, struct fl_error *error)
 {
     char folder[4097], path[4200];
-    const struct cli_output *output = &sheet_job->outputs[0];
+    const struct cli_output *output = &sheet_job->output.list[0];
     const bool to_stdout = strcmp(output->path, "-") == 0;
     if (wanted->to_folder)
         return fl_exporter_wait(wanted->exporter, error);
@@ -313,8 +314,8 @@ static bool run(struct thumbnails *wanted, struct fl_error *error)
     if (to_stdout && !cli_check_stdout("a sheet", error))
         return false;
     return (wanted->to_folder || to_stdout ||
-            (cli_check_output(wanted->job.outputs[0].path, folder, sizeof(folder), error) &&
-             cli_check_folder(wanted->job.outputs[0].path, folder, wanted->job.parents, error))) &&
+            (cli_check_output(wanted->job.output.list[0].path, folder, sizeof(folder), error) &&
+             cli_check_folder(wanted->job.output.list[0].path, folder, wanted->job.output.parents, error))) &&
            (wanted->to_folder ? prepare_folder(wanted, error) : prepare_sheet(wanted, error)) &&
            connect_to(wanted, error) && make_all(wanted, error) && finish(wanted, &wanted->job, error);
 }
@@ -334,13 +335,13 @@ static int thumbnails(struct thumbnails *wanted)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    cli_progress_begin(&wanted->progress, &wanted->job);
+    cli_progress_begin(&wanted->progress, &wanted->job.talk);
     const bool done = run(wanted, &error);
     cli_progress_end(&wanted->progress, done);
     close_all(wanted);
     if (!done)
         return cli_report(&error);
-    if (wanted->failed > 0 && !wanted->job.quiet)
+    if (wanted->failed > 0 && !wanted->job.talk.quiet)
         fprintf(stderr, "farlight: %u of %zu models could not be shown\n", wanted->failed, wanted->models.count);
     return wanted->failed > 0 ? CLI_FAILED : CLI_DONE;
 }

@@ -46,7 +46,7 @@ static bool read_orbit(const struct shot_reader *reader, const struct shot_value
     static const char *const known[] = {"degrees", "seconds", NULL};
     struct cli_series *series = &reader->job->series;
     const struct shot_value degrees = shot_member(at, "degrees"), seconds = shot_member(at, "seconds");
-    reader->job->is_orbit = !json_is_false(at->value);
+    reader->job->camera.is_orbit = !json_is_false(at->value);
     if (json_is_boolean(at->value))
         return true;
     if (json_is_number(at->value))
@@ -62,7 +62,7 @@ static bool read_orbit(const struct shot_reader *reader, const struct shot_value
 /* The end of a dolly: a point, or a share of the distance to the target. */
 static bool dolly_end(const struct shot_reader *reader, const struct shot_value *at, float to[3])
 {
-    const struct record_camera_key *key = &reader->job->key;
+    const struct record_camera_key *key = &reader->job->camera.key;
     const struct shot_value place = shot_member(at, "to"), by = shot_member(at, "by");
     double metres = 0, length2 = 0;
     if (!place.value == !by.value)
@@ -114,7 +114,7 @@ static bool read_dolly(const struct shot_reader *reader, const struct shot_value
     const size_t parts =
         eases ? 3 : 1; /* a Bezier key: before, itself, after, all equal: the velocity is zero there */
     for (size_t i = 0; i < parts; i++) {
-        memcpy(values[i], reader->job->key.eye_world, sizeof(*values));
+        memcpy(values[i], reader->job->camera.key.eye_world, sizeof(*values));
         memcpy(values[parts + i], to, sizeof(*values));
     }
     const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_VIEW_EYE,
@@ -162,17 +162,17 @@ static bool read_place(const struct shot_reader *reader, const struct shot_value
                             dolly = shot_member(at, "dolly");
     if (!check_place(reader, at, view))
         return false;
-    if (name.value && !shot_name(reader, &name, &job->camera))
+    if (name.value && !shot_name(reader, &name, &job->camera.name))
         return false;
     if (view[EYE].value) {
-        job->has_eye = job->has_look_at = true;
-        if (!read_view(reader, &view[EYE], EYE, job->key.eye_world) ||
-            !read_view(reader, &view[LOOK_AT], LOOK_AT, job->key.look_at_world))
+        job->camera.has_eye = job->camera.has_look_at = true;
+        if (!read_view(reader, &view[EYE], EYE, job->camera.key.eye_world) ||
+            !read_view(reader, &view[LOOK_AT], LOOK_AT, job->camera.key.look_at_world))
             return false;
     }
-    if (view[UP].value && !read_view(reader, &view[UP], UP, job->key.up_world))
+    if (view[UP].value && !read_view(reader, &view[UP], UP, job->camera.key.up_world))
         return false;
-    if (view[FOV].value && !read_view(reader, &view[FOV], FOV, &job->key.fov_y))
+    if (view[FOV].value && !read_view(reader, &view[FOV], FOV, &job->camera.key.fov_y))
         return false;
     return (!orbit.value || read_orbit(reader, &orbit)) && (!dolly.value || read_dolly(reader, &dolly));
 }
@@ -184,15 +184,15 @@ static void override(const struct shot_reader *reader, const struct cli_job *bef
     const struct cli_shot_given *given = reader->given;
     size_t kept = 0;
     if (given->camera) {
-        job->camera = before->camera;
-        job->key = before->key;
-        job->has_eye = before->has_eye;
-        job->has_look_at = before->has_look_at;
-        job->is_orbit = before->is_orbit;
+        job->camera.name = before->camera.name;
+        job->camera.key = before->camera.key;
+        job->camera.has_eye = before->camera.has_eye;
+        job->camera.has_look_at = before->camera.has_look_at;
+        job->camera.is_orbit = before->camera.is_orbit;
         job->series = before->series;
     }
-    for (size_t i = 0; i < job->channel_count; i++) {
-        const enum protocol_channel_path path = job->channels[i].channel.path;
+    for (size_t i = 0; i < job->clips.channel_count; i++) {
+        const enum protocol_channel_path path = job->clips.channels[i].channel.path;
         const bool is_place = path == PROTOCOL_CHANNEL_VIEW_EYE || path == PROTOCOL_CHANNEL_VIEW_LOOK_AT ||
                               path == PROTOCOL_CHANNEL_VIEW_UP || path == PROTOCOL_CHANNEL_VIEW_FOV_Y;
         const bool is_dropped = (is_place && given->camera) || (path == PROTOCOL_CHANNEL_VIEW_UP && given->up) ||
@@ -200,11 +200,11 @@ static void override(const struct shot_reader *reader, const struct cli_job *bef
                                 (path == PROTOCOL_CHANNEL_VIEW_APERTURE && given->aperture) ||
                                 (path == PROTOCOL_CHANNEL_VIEW_FOCUS && given->focus);
         if (!is_dropped)
-            job->channels[kept++] = job->channels[i];
+            job->clips.channels[kept++] = job->clips.channels[i];
         else if (path == PROTOCOL_CHANNEL_VIEW_APERTURE)
-            job->lens_changes = false;
+            job->clips.change_lens = false;
     }
-    job->channel_count = kept;
+    job->clips.channel_count = kept;
 }
 
 bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
@@ -218,7 +218,7 @@ bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
     if (json_is_string(at->value) || json_is_number(at->value)) {
         const char *name = NULL;
         const bool read = shot_name(reader, at, &name);
-        job->camera = reader->given->camera ? job->camera : name;
+        job->camera.name = reader->given->camera ? job->camera.name : name;
         return read;
     }
     if (!shot_is_object(reader, at, known))
@@ -230,7 +230,7 @@ bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
         (view[FOCUS].value && !read_view(reader, &view[FOCUS], FOCUS, &job->options.focus)) ||
         (view[EXPOSURE].value && !read_view(reader, &view[EXPOSURE], EXPOSURE, &exposure)))
         return false;
-    job->lens_changes = shot_is_keyed(&view[APERTURE]);
+    job->clips.change_lens = shot_is_keyed(&view[APERTURE]);
     override(reader, &before);
     return true;
 }

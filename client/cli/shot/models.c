@@ -51,7 +51,7 @@ static bool apply_model(const struct shot_reader *reader, const struct shot_valu
         return false;
     if (cli_set_model(job, path) != 0)
         return shot_wrong(reader, &written, "leave it out", "%s", job->error.text);
-    return !is_object || read_place(reader, at, &job->models[job->model_count - 1]);
+    return !is_object || read_place(reader, at, &job->input.models[job->input.count - 1]);
 }
 
 bool shot_models(const struct shot_reader *reader, const struct shot_value *at)

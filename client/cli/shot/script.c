@@ -119,7 +119,7 @@ static bool apply_clips(const struct shot_reader *reader, const struct shot_valu
         return false;
     for (size_t i = 0; i < json_array_size(at->value); i++) {
         const struct shot_value clip = shot_element(at, i);
-        if (!apply_clip(reader, &clip, &job->clips[job->clip_count++]))
+        if (!apply_clip(reader, &clip, &job->clips.list[job->clips.count++]))
             return false;
     }
     return true;
@@ -147,7 +147,7 @@ static bool join_pattern(const struct shot_reader *reader, const char *pattern, 
 static bool apply_output(const struct shot_reader *reader, const struct shot_value *at)
 {
     struct cli_job *job = reader->job;
-    struct cli_output *output = &job->outputs[job->output_count];
+    struct cli_output *output = &job->output.list[job->output.count];
     const char *written = json_string_value(at->value);
     struct fl_pattern pattern;
     struct fl_error why = {0};
@@ -155,7 +155,7 @@ static bool apply_output(const struct shot_reader *reader, const struct shot_val
         return false;
     output->image = cli_image_by_path(written);
     if (output->image == CLI_IMAGE_UNKNOWN)
-        output->image = job->image;
+        output->image = job->output.image;
     const bool to_stdout = strcmp(written, "-") == 0;
     if (output->image == CLI_IMAGE_UNKNOWN && !to_stdout)
         return shot_wrong(
@@ -169,10 +169,10 @@ static bool apply_output(const struct shot_reader *reader, const struct shot_val
         if (!join_pattern(reader, written, &output->path))
             return false;
     }
-    for (size_t i = 0; i < job->output_count; i++)
-        if (strcmp(job->outputs[i].path, output->path) == 0)
+    for (size_t i = 0; i < job->output.count; i++)
+        if (strcmp(job->output.list[i].path, output->path) == 0)
             return shot_wrong(reader, at, "leave one of them out", "occurs twice");
-    job->output_count++;
+    job->output.count++;
     return true;
 }
 
@@ -200,8 +200,8 @@ static bool apply_background(const struct shot_reader *reader, const struct shot
 
 static bool apply_variant(const struct shot_reader *reader, const struct shot_value *at)
 {
-    reader->job->variant = json_string_value(at->value);
-    return reader->job->variant || shot_wrong(reader, at, "use the name of a variant", "must be a string");
+    reader->job->input.variant = json_string_value(at->value);
+    return reader->job->input.variant || shot_wrong(reader, at, "use the name of a variant", "must be a string");
 }
 
 /* ---- all of it ---- */
@@ -224,13 +224,13 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
             return shot_wrong(reader, texts[i], "leave it out", "must be a string");
     if (model.value && models.value)
         return shot_wrong(reader, &model, "leave one of them out", "\"model\" and \"models\" cannot be combined");
-    if ((model.value && !shot_path(reader, &model, &job->model)) ||
+    if ((model.value && !shot_path(reader, &model, &job->input.model)) ||
         (models.value && !shot_models(reader, &models)) ||
-        (environment.value && !shot_path(reader, &environment, &job->environment)) ||
+        (environment.value && !shot_path(reader, &environment, &job->input.environment)) ||
         (background.value && !apply_background(reader, &background)) ||
-        (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->environment_degrees)) ||
+        (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->input.environment_degrees)) ||
         (variant.value && !apply_variant(reader, &variant)) ||
-        (points.value && !shot_number(reader, &points, 1e-6, 1e6, &job->point_size)) ||
+        (points.value && !shot_number(reader, &points, 1e-6, 1e6, &job->input.point_size)) ||
         (camera.value && !shot_camera(reader, &camera)) || (clips.value && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
@@ -245,10 +245,10 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
         return false;
     /* All of the file has been read, so that every mistake in it is reported. */
     if (given->output) {
-        job->output_count = 0;
-        job->image = CLI_IMAGE_UNKNOWN; /* of the file's outputs */
+        job->output.count = 0;
+        job->output.image = CLI_IMAGE_UNKNOWN; /* of the file's outputs */
     }
-    job->clip_count = given->clips ? 0 : job->clip_count;
+    job->clips.count = given->clips ? 0 : job->clips.count;
     return true;
 }
 

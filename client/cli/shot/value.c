@@ -355,14 +355,14 @@ bool shot_add_channel(const struct shot_reader *reader, const struct shot_value 
                       const struct fl_channel *channel, enum protocol_object_kind kind, const char *target)
 {
     struct cli_job *job = reader->job;
-    if (!job->channels)
-        job->channels = shot_allocate(reader, CHANNELS_MAX, sizeof(*job->channels));
-    if (!job->channels)
+    if (!job->clips.channels)
+        job->clips.channels = shot_allocate(reader, CHANNELS_MAX, sizeof(*job->clips.channels));
+    if (!job->clips.channels)
         return false;
-    if (job->channel_count == CHANNELS_MAX)
+    if (job->clips.channel_count == CHANNELS_MAX)
         return shot_wrong(reader, at, "leave some out", "exceeds the maximum of %u values that change",
                           CHANNELS_MAX);
-    struct cli_channel *added = &job->channels[job->channel_count++];
+    struct cli_channel *added = &job->clips.channels[job->clips.channel_count++];
     *added = (struct cli_channel){
         .channel = *channel, .kind = kind, .target = target, .place = keep_place(reader, &at->place)};
     return added->place != NULL;
