@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_VIEWER_STATE_H
 #define FARLIGHT_VIEWER_STATE_H
 
-#include "viewer.h"
+#include "options.h"
 #include "viewer/edit/editor.h"
 #include "viewer/input/replay.h"
 

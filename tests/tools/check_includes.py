@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: MIT
 """Which room may include which: the architecture's rules as a table, checked against the sources.
 
-Usage: check_includes.py [--write]. Run from the root of the project. One line for each fault, and exit status 1:
-an include that no rule allows, a permission that no file uses, a table in server/README.md that is out of date
-(--write brings it up to date).
+Usage: check_includes.py [--write], check_includes.py --matrix FOLDER... Run from the root of the project. One line for
+each fault, and exit status 1: an include that no rule allows, a permission that no file uses, a table in server/README.md
+that is out of date (--write brings it up to date). --matrix counts what is in a folder instead, each room or file without
+its ending as one: arrows (who includes whom), floors, and the circles.
 """
 import pathlib
 import re
@@ -279,7 +280,40 @@ def check_matrix(checker, write):
         checker.faults.append(f"{README}: the matrix is out of date: run {sys.argv[0]} --write")
 
 
+def print_arrows(folder):
+    def named(path):
+        part = path.relative_to(folder).parts
+        return f"{part[0]}/" if len(part) > 1 else part[0].split(".")[0]
+    reached = {}
+    for path in sources():
+        if folder not in path.parents:
+            continue
+        ahead = reached.setdefault(named(path), set())
+        quoted = (match[1] for match in map(INCLUDE.match, path.read_text().splitlines()) if match and match[1])
+        targets = filter(None, (resolve(path, name) for name in quoted))
+        ahead.update(named(target) for target in targets if folder in target.parents)
+        ahead.discard(named(path))
+    arrows = [(room, other) for room in reached for other in reached[room]]
+    for middle in reached:
+        for ahead in reached.values():
+            if middle in ahead:
+                ahead |= reached[middle]
+    circles = {frozenset(other for other in ahead if room in reached[other]) for room, ahead in reached.items() if room in ahead}
+    floors = {}
+    for room in sorted(reached, key=lambda room: len(reached[room] - {room})):  # from the lowest floor on
+        floors[room] = max((floors[other] + 1 for other in reached[room] if room not in reached[other]), default=0)
+    inside = sum(room in reached[other] for room, other in arrows)
+    print(f"{folder}: {len(reached)} rooms, {len(arrows)} arrows, {max(floors.values(), default=0) + 1} floors, "
+          f"{inside} arrows in {len(circles)} circles")
+    for circle in circles:
+        print(f"  circle: {' '.join(sorted(circle))}")
+
+
 def main():
+    if sys.argv[1:2] == ["--matrix"]:
+        for folder in sys.argv[2:]:
+            print_arrows(pathlib.Path(folder))
+        return 0
     checker = Checker()
     for path in sources():
         checker.check(path)

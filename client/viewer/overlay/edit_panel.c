@@ -129,14 +129,12 @@ static void draw_row(struct hud_layout *layout, const struct hud_edit *edit, con
                     row->value);
 }
 
-void hud_draw_edit(struct hud_layout *layout)
+void hud_draw_edit(struct hud_layout *layout, const struct hud_edit *edit, double width, double height)
 {
-    const struct hud_state *state = layout->state;
-    const struct hud_edit *edit = state->edit;
     if (!edit || !edit->shown)
         return;
     const double s = layout->scale, inner = HUD_PADDING * s;
-    const struct edit_place frame = place(edit, state->width, state->height, s);
+    const struct edit_place frame = place(edit, width, height, s);
     char hint[HUD_TEXT_MAX];
     snprintf(hint, sizeof(hint), "%s", edit->hint);
     hud_fit(layout, HUD_PLAIN, hint, frame.width - 2 * inner);

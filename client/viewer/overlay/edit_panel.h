@@ -48,6 +48,9 @@ void hud_edit_find(const struct hud_edit *edit, double width, double height, dou
                    struct hud_edit_hit *hit);
 /* The share that a place is on the slider of any row: a drag goes on beyond it. */
 double hud_edit_share(double width, double scale, double x);
+/* Draws it, if it is shown; NULL: there is none. */
+struct hud_layout;
+void hud_draw_edit(struct hud_layout *layout, const struct hud_edit *edit, double width, double height);
 /* What it takes of the window's width, with its margin. */
 double hud_edit_width(const struct hud_edit *edit, double width, double scale);
 

@@ -441,7 +441,7 @@ void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *mea
     }
     if (overlay != OVERLAY_NONE)
         bottom = draw_legend(&layout, bottom);
-    hud_draw_edit(&layout);
+    hud_draw_edit(&layout, state->edit, state->width, state->height);
     if (state->settings->panel)
         draw_panel(&layout, top);
     if (state->notice[0] != '\0')

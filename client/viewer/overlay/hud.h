@@ -6,34 +6,13 @@
 
 #include "heat.h"
 #include "edit_panel.h"
+#include "mark.h"
 #include "metrics.h"
 #include "viewer/input/settings.h"
 #include "viewer/input/tour.h"
 
-#define HUD_MARKS_MAX 2048u
-#define HUD_TEXT_MAX 128u
 #define HUD_STRUCTURE_MAX 4u /* parts */
 #define HUD_STRUCTURE_TEXT_MAX 256u
-
-struct hud_colour {
-    uint8_t r, g, b, a; /* straight */
-};
-
-enum hud_font { HUD_PLAIN, HUD_BOLD, HUD_MONO, HUD_FONT_COUNT };
-
-/* A filled box, or a text in it: from its left, or to its right edge where `is_right`. */
-struct hud_mark {
-    double x, y, width, height; /* pixels; of a text: height of the line */
-    struct hud_colour colour;
-    enum hud_font font;
-    bool is_right;
-    char text[HUD_TEXT_MAX]; /* empty: a box */
-};
-
-struct hud {
-    struct hud_mark marks[HUD_MARKS_MAX]; /* in the order in which they are drawn */
-    size_t count;
-};
 
 enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST, HUD_REFUSED };
 
@@ -75,9 +54,6 @@ struct hud_state {
     struct heat_figures heat_figures;
     double heat_top;
 };
-
-/* How wide a text is, pixels, at that height of its line. */
-typedef double hud_measure(void *user, enum hud_font font, double height, const char *text);
 
 void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *measure, void *user);
 

@@ -3,7 +3,35 @@
 #ifndef FARLIGHT_VIEWER_OVERLAY_MARK_H
 #define FARLIGHT_VIEWER_OVERLAY_MARK_H
 
-#include "hud.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define HUD_MARKS_MAX 2048u
+#define HUD_TEXT_MAX 128u
+
+struct hud_colour {
+    uint8_t r, g, b, a; /* straight */
+};
+
+enum hud_font { HUD_PLAIN, HUD_BOLD, HUD_MONO, HUD_FONT_COUNT };
+
+/* A filled box, or a text in it: from its left, or to its right edge where `is_right`. */
+struct hud_mark {
+    double x, y, width, height; /* pixels; of a text: height of the line */
+    struct hud_colour colour;
+    enum hud_font font;
+    bool is_right;
+    char text[HUD_TEXT_MAX]; /* empty: a box */
+};
+
+struct hud {
+    struct hud_mark marks[HUD_MARKS_MAX]; /* in the order in which they are drawn */
+    size_t count;
+};
+
+/* How wide a text is, pixels, at that height of its line. */
+typedef double hud_measure(void *user, enum hud_font font, double height, const char *text);
 
 /* Pixels of the desktop. */
 #define HUD_LINE 17.0 /* height of a line of text */
@@ -12,6 +40,7 @@
 
 extern const struct hud_colour hud_panel, hud_ink, hud_faint, hud_accent, hud_alarm, hud_calm, hud_rule;
 
+struct hud_state;
 struct hud_layout {
     struct hud *hud;
     const struct hud_state *state;
@@ -34,7 +63,5 @@ void hud_text_to(struct hud_layout *layout, double x, double y, enum hud_font fo
 
 /* At the bottom of the window; not drawn where it would come above `top_min`. */
 void hud_draw_timeline(struct hud_layout *layout, double top_min);
-/* At the right of the window, if it is shown. */
-void hud_draw_edit(struct hud_layout *layout);
 
 #endif

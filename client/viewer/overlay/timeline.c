@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The stages of the last frames on one axis of time, at the bottom of the window. */
+#include "hud.h"
 #include "mark.h"
 
 #include <math.h>

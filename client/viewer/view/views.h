@@ -10,20 +10,6 @@
 
 struct views;
 
-/* What views are made from. */
-struct views_key {
-    struct pixmap picture; /* a margin included */
-    float *depth;          /* malloc'ed, as many, metres along the view; 0: nothing is there */
-    uint8_t *sticking;     /* malloc'ed, as of struct fl_frame; NULL: nothing is known of it */
-    struct fl_warp_camera camera;
-    float depth_step; /* as of struct fl_frame */
-    float radius;     /* metres round its eye */
-    bool is_smeared;  /* as of struct fl_warp_key */
-    bool is_moving;   /* of motion: smaller, with fewer samples */
-    bool is_final;    /* nothing better of this camera will come */
-    uint64_t came_ns; /* when it had arrived */
-};
-
 /* What is wanted. */
 struct views_wish {
     uint32_t width, height; /* of the picture, all eyes; it comes smaller where its key shows no more */

@@ -2,6 +2,7 @@
 #include "warped_key.h"
 
 #include "layer.h"
+#include "plan.h"
 
 #include <stdlib.h>
 

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_VIEWER_VIEW_WARPED_KEY_H
 #define FARLIGHT_VIEWER_VIEW_WARPED_KEY_H
 
-#include "views.h"
+#include "layer.h"
 
 struct warped_key {
     struct fl_warp *warp;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The thread that makes views: which ones come out, from which picture and of which camera. */
+#include "viewer/view/views.h"
 #include "viewer/view/warped_key.h"
 #include "tests/harness/test.h"
 #include "protocol/common/clock.h"
