@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_CHECK_FRAMES_H
 #define FARLIGHT_CHECK_FRAMES_H
 
-#include "render/frame.h"
+#include "render/frame/frame.h"
 
 /* All-zero is the valid empty one. */
 struct check_frames {

@@ -4,7 +4,7 @@
 #define FARLIGHT_ENGINE_BACKEND_H
 
 #include "gpu/device.h"
-#include "render/frame.h"
+#include "render/frame/frame.h"
 
 /* Every function is called on the engine's thread and does as the one that gives it its name. */
 struct engine_backend {

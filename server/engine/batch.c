@@ -7,7 +7,7 @@
 #include "base/log.h"
 #include "encode/stream.h"
 #include "engine/shot.h"
-#include "render/frame_request.h"
+#include "render/context/request.h"
 
 #include <stdlib.h>
 #include <string.h>

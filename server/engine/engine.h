@@ -12,7 +12,7 @@
 #include "encode/encoder.h"
 #include "encode/parts.h"
 #include "gpu/device.h"
-#include "render/frame.h"
+#include "render/frame/frame.h"
 #include "scene/pose.h"
 #include "scene/scene.h"
 

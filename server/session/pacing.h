@@ -138,7 +138,8 @@ void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes);
  * smallest picture is late. Bounces that take time are those that are seen: of the bundled teapot, which is of
  * glass, two bounces in full size are farther from the picture than all eight in a quarter of the width; of the
  * carousel two are as good as eight, and take nearly as long. Without any bounce either looks wrong. The denoiser
- * stays (server/render/denoise/README.md); what it takes counts as the rest of a picture does, by the area. */
+ * stays (server/render/passes/denoise/README.md); what it takes counts as the rest of a picture does, by the area.
+ */
 struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wanted);
 
 #endif

@@ -4,7 +4,7 @@
  * implementation.
  *
  * Owners. The inputs of a structure (tracer_impl.depends_on) decide who owns it: the scene alone      struct
- *   tracer, shared by all viewers of a scene (render/frame_renderer.c) CHANGED_VIEW too     struct tracer, owned
+ *   tracer, shared by all viewers of a scene (render/frame/renderer.c) CHANGED_VIEW too     struct tracer, owned
  *   by the renderer of that view: it never serves another one the rays of a wave   struct trace_state, owned by
  *   the work of one frame; several frames may be in progress
  *

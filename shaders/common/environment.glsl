@@ -7,7 +7,7 @@
 #include "common/frame.glsl"
 #include "common/math.glsl"
 
-// Default sky of a scene without any light; server/render/environment.c integrates the same.
+// Default sky of a scene without any light; server/render/light/environment.c integrates the same.
 vec3 environment_sky(float up)
 {
     bool below = up < 0.0;

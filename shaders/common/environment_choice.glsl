@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Samples a direction of the environment in proportion to its radiance: per cell of a table over the directions, rows
-// from +y down, made by server/render/environment_choice.c. An environment of one colour is equally bright everywhere,
+// from +y down, made by server/render/light/environment_choice.c. An environment of one colour is equally bright everywhere,
 // and sampled by the cosine.
 //
 // The table: rows + 1 sums up to each row, then for each row columns + 1 sums up to each column, as shares of the total.

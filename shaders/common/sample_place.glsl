@@ -10,7 +10,7 @@ float filter_place(int i)
     return frame_in_block.filter_places[i >> 2][i & 3];
 }
 
-// Offset of a sample from its pixel's centre, in pixels, by server/render/pixel_filter.h.
+// Offset of a sample from its pixel's centre, in pixels, by server/render/picture/pixel_filter.h.
 float filter_offset(float number)
 {
     float side = 2.0 * number - 1.0, at = sqrt(1.0 - abs(side)) * 64.0;

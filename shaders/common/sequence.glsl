@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Random numbers of samples: Owen-scrambled Sobol points. server/render/sequence.c is the host's version.
+// Random numbers of samples: Owen-scrambled Sobol points. server/render/picture/sequence.c is the host's version.
 //
 // Each choice (a dimension: SEQUENCE_* of shared/frame.h) has one or two numbers of a sequence of its own for each
 // pixel and seed, so that choices are not correlated. The numbers of the samples 0 .. 2^k - 1, and of any aligned 2^k

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Adds a slice to the picture, unless it must be done again: the samples of each pixel in their order.
-// Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more samples (server/render/picture_noise.h).
+// Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more samples (server/render/picture/noise.h).
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Data that the passes of the denoiser share; server/render/denoise/README.md describes the passes.
+// Data that the passes of the denoiser share; server/render/passes/denoise/README.md describes the passes.
 //
 // A strip of the picture lies row by row. Each pixel has the mean guide of its samples, and two estimates of the light
 // that falls there: the means of two halves of its samples, moved so that their mean is that of all samples and half

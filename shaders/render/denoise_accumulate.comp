@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Adds a slice to the sums that the denoiser has beside the picture, unless it must be done again: the light of the
 // samples of the first half, and the guides of all samples. The picture does not have the slice yet.
-// Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more (server/render/picture_noise.h).
+// Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more (server/render/picture/noise.h).
 //          HAS_NOTED_MOTION notes say whether they count, and where surfaces were.
 
 #include "shared/denoise.h"

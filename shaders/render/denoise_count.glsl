@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Number of samples in the pixels of a band.
-// Defines: HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h).
+// Defines: HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture/noise.h).
 //          HAS_NOTED_MOTION some samples may have no guide.
 
 uniform uint sample_count;

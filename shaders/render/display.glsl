@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Mean of a pixel's samples, and its display value.
 // Defines:
-//   HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h)
+//   HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture/noise.h)
 //   PAIRS            sums are an identifier and a share, twice (shared/layers.h)
 //   PLAIN            sums are four numbers of the first sample, shown as they are
 //   DISPLAY_VALUES   sums are display values without a curve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lets the eye's rays that met nothing meet the ground (server/render/ground.h): they become hits with HIT_GROUND. The
+// Lets the eye's rays that met nothing meet the ground (server/render/passes/ground/ground.h): they become hits with HIT_GROUND. The
 // ground lies below all objects, so they hide it and never the other way round; from below it is invisible.
 
 #include "shared/hit.h"

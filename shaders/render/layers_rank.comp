@@ -3,7 +3,7 @@
 // their sums in each plane, the largest first. Each pixel is one invocation's, which adds in the order of its samples; so
 // ranks do not depend on the division into slices. An object without a free rank is dropped: the others stay true.
 // Defines: PLANES the number of planes, up to CRYPTO_PLANES; MATERIALS identifiers of materials, else of nodes;
-// HAS_TILE_SAMPLES tiles may have stopped, and get no more samples (server/render/picture_noise.h).
+// HAS_TILE_SAMPLES tiles may have stopped, and get no more samples (server/render/picture/noise.h).
 
 #include "shared/hit.h"
 #include "shared/layers.h"

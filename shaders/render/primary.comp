@@ -5,7 +5,7 @@
 //   SPREAD      each pixel places its samples by its own random numbers; otherwise all use frame.sample_places
 //   HAS_LENS    rays start on a lens and meet in the plane of focus
 //   HAS_TILES   rays through texels of a key view that no eye reads are dead (render/tiles.glsl)
-//   HAS_TILE_SAMPLES tiles may have stopped: their rays are dead (server/render/picture_noise.h)
+//   HAS_TILE_SAMPLES tiles may have stopped: their rays are dead (server/render/picture/noise.h)
 //   HAS_TIMES   something moves: rays have a time
 
 #include "shared/path.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Estimates the mean error of the pixels of each tile: server/render/picture_noise.h.
+// Estimates the mean error of the pixels of each tile: server/render/picture/noise.h.
 
 #include "shared/path.h"
 #include "common/slots.glsl"

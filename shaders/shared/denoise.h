@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bindings and constants of the denoiser (server/render/denoise/README.md). */
+/* Bindings and constants of the denoiser (server/render/passes/denoise/README.md). */
 #ifndef FARLIGHT_SHARED_DENOISE_H
 #define FARLIGHT_SHARED_DENOISE_H
 #include "shared/path.h"

@@ -25,7 +25,7 @@ struct frame_uniforms {
     vec4 lens; /* x: radius, 0: a pinhole; y: distance of the plane of focus along the view; z, w unused */
     vec4 environment_colour; /* radiance, or the image's factor; w: rotation about +y, radians */
     vec4 irradiance[9];      /* rgb: of the environment, divided by pi: harmonics of a world-space normal */
-    vec4 filter_places[17];  /* table of the pixel filter, see server/render/pixel_filter.h */
+    vec4 filter_places[17];  /* table of the pixel filter, see server/render/picture/pixel_filter.h */
     uint width, height;      /* pixels of the picture */
     uint tiles_across;
     uint sample_index;     /* first of the current samples */

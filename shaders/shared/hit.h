@@ -37,8 +37,8 @@ SHARED_SIZE(hit, 48)
 #define HIT_UNKNOWN 0x08000000u
 #define HIT_LAYER_SHIFT 28u
 #define HIT_LAYER_MASK 0x30000000u
-/* A ray of the eye that meets only the ground (server/render/ground.h); the material is the default one,
- * primitive and instance are HIT_NO_PRIMITIVE. */
+/* A ray of the eye that meets only the ground (server/render/passes/ground/ground.h); the material is the default
+ * one, primitive and instance are HIT_NO_PRIMITIVE. */
 #define HIT_GROUND 0x40000000u
 #define HIT_NO_PRIMITIVE 0xffffffffu
 

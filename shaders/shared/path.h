@@ -105,7 +105,7 @@ SHARED_SIZE(child, 80)
 #define BIND_BLOCK_OFFSETS BIND_PASS_4
 #define BIND_ACCUMULATION BIND_PASS_0 /* vec4 per pixel slot of the picture's band; sum of the samples */
 #define BIND_RESOLVED BIND_PASS_1     /* pixels of the output's format, rows from the top */
-/* Buffers of pictures whose tiles stop one by one, see server/render/picture_noise.h. */
+/* Buffers of pictures whose tiles stop one by one, see server/render/picture/noise.h. */
 #define BIND_HALVES BIND_PASS_1       /* vec4 like BIND_ACCUMULATION */
 #define BIND_TILE_ERRORS BIND_PASS_2  /* float per tile */
 #define TILE_SLOTS 64u                /* 8 x 8 pixels, consecutive in the order of slots */

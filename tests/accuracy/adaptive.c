@@ -93,7 +93,7 @@ TEST_LONG(a_tile_stops_by_its_error_and_is_that_of_a_picture_of_so_many_samples)
     frame_result_finish(&result);
 }
 
-/* As picture_noise.h defines it. */
+/* As server/render/picture/noise.h defines it. */
 static double error_of_tile(const struct frame_result *result, const struct frame_result *truth, uint32_t tile)
 {
     double squares = 0.0, light = 0.0;

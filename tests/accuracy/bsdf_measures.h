@@ -6,7 +6,7 @@
 
 #include "tests/accuracy/bsdf_probe.h"
 
-#include "render/sequence.h"
+#include "render/picture/sequence.h"
 #include "tests/fixtures/device.h"
 
 #include <math.h>

@@ -6,7 +6,7 @@
 #include "tests/fixtures/load_model.h"
 #include "tests/unit/trace/quadtree/layers.h"
 
-#include "render/frame.h"
+#include "render/frame/frame.h"
 #include "trace/quadtree/faces.h"
 #include "trace/quadtree/layers.h"
 #include "warp/warp.h"

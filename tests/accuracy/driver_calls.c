@@ -5,7 +5,7 @@
  * frame are looked at. */
 #include "protocol/tracers.h"
 #include "shared/layers.h"
-#include "render/layers.h"
+#include "render/passes/layers/layers.h"
 #include "tests/accuracy/render_fixture.h"
 #include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"

@@ -3,8 +3,8 @@
  * it does where there is too little room for what was queued. The device is taken for hardware, whatever it is. */
 #include "protocol/tracers.h"
 #include "shared/layers.h"
-#include "render/frame_state.h"
-#include "render/layers.h"
+#include "render/frame/state.h"
+#include "render/passes/layers/layers.h"
 #include "tests/accuracy/render_fixture.h"
 #include "tests/fixtures/frame_hooks.h"
 #include "tests/fixtures/structure.h"

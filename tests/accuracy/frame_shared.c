@@ -3,7 +3,7 @@
  * none begins that would change what another one in progress looks at. */
 #include "tests/accuracy/render_fixture.h"
 #include "tests/fixtures/frame_hooks.h"
-#include "render/frame_state.h"
+#include "render/frame/state.h"
 #include "tests/harness/test.h"
 
 static uint32_t build_scene(struct fixture *fixture)

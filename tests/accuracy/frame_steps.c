@@ -4,7 +4,7 @@
 #include "tests/accuracy/render_fixture.h"
 #include "tests/fixtures/frame_hooks.h"
 
-#include "render/frame_state.h"
+#include "render/frame/state.h"
 #include "trace/tracer.h"
 #include "tests/harness/test.h"
 

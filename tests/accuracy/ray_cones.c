@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Ray cones: their formulas against bundles of rays and lenses, what a hit tells of its surface, and pictures: one
  * sample a pixel shows what many samples show, and does not flicker. */
-#include "render/frame_state.h"
+#include "render/frame/state.h"
 #include "tests/accuracy/render_fixture.h"
 #include "tests/fixtures/shader_probe.h"
 #include "tests/harness/test.h"

@@ -6,8 +6,8 @@
 #include "tests/fixtures/frame_hooks.h"
 
 #include "gpu/buffer.h"
-#include "render/pixel_filter.h"
-#include "render/sequence.h"
+#include "render/picture/pixel_filter.h"
+#include "render/picture/sequence.h"
 #include "shared/bindings.h"
 #include "shared/frame.h"
 #include "tests/fixtures/shader_probe.h"

@@ -5,7 +5,7 @@
 #include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
-#include "render/frame_state.h"
+#include "render/frame/state.h"
 
 #define MARGIN 8u /* texels on each side */
 

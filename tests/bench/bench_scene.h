@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_BENCH_SCENE_H
 #define FARLIGHT_TESTS_BENCH_SCENE_H
 
-#include "render/frame.h"
+#include "render/frame/frame.h"
 #include "tests/fixtures/load_model.h"
 #include "gpu_scene/scene.h"
 

@@ -5,7 +5,7 @@
 #ifndef FARLIGHT_TESTS_PAPER_SCENE_H
 #define FARLIGHT_TESTS_PAPER_SCENE_H
 
-#include "render/frame.h"
+#include "render/frame/frame.h"
 #include "scene/pose.h"
 #include "scene/scene.h"
 

@@ -6,7 +6,7 @@
 #include "base/clock.h"
 #include "engine/backend.h"
 #include "engine/engine.h"
-#include "render/frame_request.h"
+#include "render/context/request.h"
 #include "tests/fixtures/framing.h"
 #include "tests/fixtures/stopped_clock.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The host's compaction leaves what the shaders' leaves, byte by byte. */
-#include "render/compact.h"
+#include "render/waves/compact.h"
 #include "shared/hit.h"
 #include "shared/path.h"
 

@@ -2,7 +2,7 @@
 /* The numbers that samples choose by: how evenly they are spread, and that pixels and choices do not follow each
  * other.
  */
-#include "render/sequence.h"
+#include "render/picture/sequence.h"
 #include "shared/frame.h"
 #include "tests/harness/test.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* How large the slices are that are queued on a GPU. */
-#include "render/slices_ahead.h"
+#include "render/frame/slices_ahead.h"
 #include "tests/harness/test.h"
 #include "trace/step.h"
 

@@ -5,7 +5,7 @@
 #include "tests/unit/trace/stack_scene.h"
 #include "tests/unit/trace/tracer_fixture.h"
 
-#include "render/tracer_set.h"
+#include "render/frame/tracer_set.h"
 #include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
 #include "trace/ldc/store.h"

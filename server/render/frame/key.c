@@ -1,0 +1,329 @@
+/* SPDX-License-Identifier: MIT */
+/* Frames whose eyes are made from a key view's layers (key_view.h): which of a frame's passes is in hand. First,
+ * where the kept layers are of something else, each layer is rendered, as a picture of its own by the frame's
+ * tracer and integrator; then the eyes. Each pass goes through the frame's phases from its first sample on. */
+#include "render/frame/state.h"
+
+#include "render/waves/compact.h"
+#include "render/context/request.h"
+#include "render/waves/integrator.h"
+#include "shared/layers.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define UNKNOWN_WARNED 0.5f /* share of a picture; 50 cm aside in a room, 0.2 to 0.3 are not known */
+
+bool frame_is_from_layers(const struct frame_request *request)
+{
+    return request->view_source == VIEW_SOURCE_LAYERS;
+}
+
+struct frame_camera frame_key_camera(const struct frame_request *request)
+{
+    return frame_is_from_layers(request) && request->has_key ? request->key_camera : request->camera;
+}
+
+/* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be
+ * rendered. The picture has room for the intersection of one sample a pixel; other points of a lens look at other
+ * texels. */
+static bool is_for_these_eyes(const struct frame_request *request)
+{
+    return request->samples == 1 && !request->accumulate && !request->has_key && request->aperture == 0.0f &&
+           frame_request_planes(request) == 1u << LAYER_BEAUTY;
+}
+
+static float distance_between(const struct frame_camera *a, const struct frame_camera *b)
+{
+    float squared = 0.0f;
+    for (int i = 0; i < 3; i++) {
+        const float way = a->world_from_view[4 * i + 3] - b->world_from_view[4 * i + 3];
+        squared += way * way;
+    }
+    return sqrtf(squared);
+}
+
+/* How far an eye of the picture may be from that of the key view. */
+static float farthest_eye(const struct frame_request *request)
+{
+    float eye[2];
+    frame_view_eye(request, 0, 0, eye); /* in a corner of the grid */
+    const float lens = request->aperture > 0.0f ? request->aperture / 2.0f : 0.0f;
+    const float apart = request->has_key ? distance_between(&request->camera, &request->key_camera) : 0.0f;
+    return sqrtf(eye[0] * eye[0] + eye[1] * eye[1]) + lens + apart;
+}
+
+/* The bound holds for all eyes of the picture. Doubled, so that those of the pictures that follow rarely need
+ * another structure. */
+static float radius_for(const struct frame_request *request)
+{
+    const float asked = request->tracer_options.quadtree.radius, farthest = farthest_eye(request) * 1.001f;
+    if (!(asked < farthest))
+        return asked;
+    return asked > 0.0f ? ldexpf(asked, (int)ceilf(log2f(farthest / asked))) : farthest;
+}
+
+/* One texel a pixel, of the picture's own eye. */
+static void set_hidden(const struct frame_request *request, struct tracer_options *options)
+{
+    struct quadtree_settings *settings = &options->quadtree;
+    options->quadtree_leaves = 1;
+    settings->layers = KEY_LAYERS_MAX;
+    settings->radius = request->hidden_radius;
+    settings->resolution = 0;
+    settings->margin = 0.001f; /* the least that there is */
+}
+
+static void set_layers(const struct frame_request *request, struct quadtree_settings *settings)
+{
+    settings->radius = radius_for(request);
+    if (settings->layers == 0 && !is_for_these_eyes(request))
+        settings->layers = 1; /* what little another one shows would be rendered as a whole */
+}
+
+bool frame_key_take(struct frame_renderer *renderer, struct error *error)
+{
+    const struct frame_request *request = &renderer->request;
+    const struct tracer_impl *impl = frame_find_tracer(renderer, TRACER_QUADTREE, "view_source", error);
+    struct tracer_options options = request->tracer_options;
+    options.quadtree.faces = QUADTREE_FACES_VIEW;
+    if (request->hidden_layer)
+        set_hidden(request, &options);
+    else
+        set_layers(request, &options.quadtree);
+    if (options.quadtree.hits == QUADTREE_HITS_AUTO)
+        options.quadtree.hits = QUADTREE_HITS_PLANE; /* what is thinner than a texel is there as well */
+    if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
+        return false;
+    if (!impl->texel_view || !impl->layer_hits)
+        return error_set(error, ERROR_UNSUPPORTED, "view_source", "the tracer %s has no layers to make views of",
+                         impl->name);
+    struct tracer_set *set = frame_tracers(renderer, impl);
+    renderer->key_tracer =
+        renderer->tracer->impl == impl && tracer_options_same(&request->tracer_options, &options)
+            ? tracer_set_take_again(set, renderer->tracer)
+            : tracer_set_take(set, renderer->device, impl, &options, error);
+    return renderer->key_tracer &&
+           frame_work_trace_by(renderer->work, &renderer->work->key_trace_state, renderer->key_tracer, error);
+}
+
+static bool begin_layers(struct frame_renderer *renderer, const struct trace_view *texels, uint32_t layer_count,
+                         struct error *error)
+{
+    struct key_view *key = &renderer->key;
+    key->is_made = false;
+    picture_restart(&key->sums);
+    if (!key_view_reserve(key, renderer->device, texels, layer_count, error))
+        return false; /* it may have been put off: the choice is made again */
+    key->is_marked = is_for_these_eyes(&renderer->request);
+    if (key->is_marked && !key_view_mark_anew(key, renderer->device, error))
+        return false;
+    renderer->pass = key->is_marked ? PASS_MARK : 0;
+    return true;
+}
+
+/* Frames that add to one another have layers with noise of their own each, or that of the first would stay. */
+static bool is_noise_new(const struct frame_renderer *renderer)
+{
+    return !integrator_by_number(renderer->request.integrator)->random ||
+           renderer->key.first_sample == renderer->eyes_samples_before;
+}
+
+/* Which passes the frame needs. */
+static bool choose_first(struct frame_renderer *renderer, struct error *error)
+{
+    struct key_view *key = &renderer->key;
+    struct trace_view texels;
+    uint32_t layer_count = 0;
+    if (!renderer->key_tracer->impl->texel_view(renderer->key_tracer, &texels, &layer_count))
+        return error_set(error, ERROR_INTERNAL, NULL, "%s: the structure of a view tells no layers",
+                         renderer->key_tracer->impl->name);
+    renderer->eyes_samples_before = renderer->samples_before;
+    if (!key_view_count_anew(key, renderer->device, error))
+        return false;
+    if (!key_view_is_of(key, &renderer->view, &renderer->request, renderer->shared->showing) ||
+        !is_noise_new(renderer))
+        return begin_layers(renderer, &texels, layer_count, error);
+    key->is_marked = false;
+    renderer->pass = key->layer_count;
+    return true;
+}
+
+bool frame_is_layer_pass(const struct frame_renderer *renderer)
+{
+    return frame_is_from_layers(&renderer->request) && renderer->key_tracer &&
+           renderer->pass < renderer->key.layer_count;
+}
+
+bool frame_is_mark_pass(const struct frame_renderer *renderer)
+{
+    return frame_is_from_layers(&renderer->request) && renderer->pass == PASS_MARK;
+}
+
+bool frame_is_eyes_pass(const struct frame_renderer *renderer)
+{
+    return frame_is_from_layers(&renderer->request) && !frame_is_layer_pass(renderer);
+}
+
+bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    if (renderer->request.hidden_layer) { /* its only pass */
+        context->trace_state = renderer->work->trace_state;
+        context->layer_tracer = renderer->key_tracer;
+        context->layer = renderer->request.hidden_layer;
+        return true;
+    }
+    if (renderer->pass == PASS_UNKNOWN && !choose_first(renderer, error))
+        return false;
+    const bool is_layer = frame_is_layer_pass(renderer);
+    context->request = is_layer ? key_view_layer_request(&renderer->key, &renderer->request) : renderer->request;
+    context->tracer = is_layer ? renderer->tracer : renderer->key_tracer;
+    context->trace_state = is_layer ? renderer->work->trace_state : renderer->work->key_trace_state;
+    context->layer_tracer = is_layer ? renderer->key_tracer : NULL;
+    context->layer = is_layer ? renderer->pass : 0;
+    context->marked_key = is_layer && renderer->key.is_marked ? &renderer->key : NULL;
+    renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
+    renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
+    slices_ahead_forget(&renderer->work->ahead); /* rays of another pass cost something else */
+    return true;
+}
+
+static uint32_t next_layer(const struct key_view *key, uint32_t layer)
+{
+    while (layer < key->layer_count && key->is_marked && key->tile_rows[layer] == 0)
+        layer++;
+    return layer;
+}
+
+bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error)
+{
+    if (!key_view_list_tiles(&renderer->key, renderer->device, error))
+        return false;
+    renderer->phase = PHASE_BUILD; /* the next pass gets ready */
+    renderer->pass = next_layer(&renderer->key, 0);
+    return true;
+}
+
+void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_request *request)
+{
+    if (frame_is_layer_pass(renderer) && renderer->key.is_marked)
+        request->height = renderer->key.tile_rows[renderer->pass] * 8;
+}
+
+/* All of the layer's samples are in its sums. */
+bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
+{
+    struct key_view *key = &renderer->key;
+    struct render_context *context = &renderer->work->context;
+    if (!key_view_keep_band(key, context, renderer->pass, renderer->band, error))
+        return false;
+    if (++renderer->band < key->sums.band_count)
+        return true;
+    renderer->result.primary_rays +=
+        (uint64_t)context->request.width * context->request.height * context->request.samples;
+    picture_restart(&key->sums);
+    renderer->phase = PHASE_BUILD; /* the next pass gets ready */
+    renderer->pass = next_layer(key, renderer->pass + 1);
+    if (renderer->pass < key->layer_count)
+        return true;
+    key->view = renderer->view;
+    key->request = renderer->request;
+    key->showing = renderer->shared->showing;
+    key->is_made = !key->is_marked;
+    key->first_sample = renderer->eyes_samples_before;
+    return true;
+}
+
+/* Other layers of the picture are made from the surfaces that rays hit. */
+static bool are_found(const struct frame_renderer *renderer)
+{
+    const struct render_context *context = &renderer->work->context;
+    return !(renderer->work->layers.wanted & ~LAYER_BIT_UNKNOWN) && !context->comparison &&
+           tracer_finds_eyes(context->tracer, context->scene, &context->uniforms);
+}
+
+struct key_eyes frame_key_eyes(const struct frame_renderer *renderer)
+{
+    if (frame_is_mark_pass(renderer))
+        return (struct key_eyes){KEY_GATHER_MARK, are_found(renderer)};
+    if (renderer->key.is_marked)
+        return (struct key_eyes){KEY_GATHER_KEPT, true};
+    return (struct key_eyes){KEY_GATHER, are_found(renderer)};
+}
+
+void frame_key_announce(struct frame_renderer *renderer)
+{
+    struct render_context *context = &renderer->work->context;
+    const struct key_eyes eyes = frame_key_eyes(renderer);
+    if (!eyes.are_found)
+        primary_announce(context, false);
+    else if (eyes.what != KEY_GATHER_KEPT)
+        (void)primary_find_eyes(context, NULL);
+    key_view_announce(&renderer->key, context, renderer->work->layers.wanted & LAYER_BIT_UNKNOWN, &eyes);
+}
+
+bool frame_key_begin_slice(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    if (!frame_key_eyes(renderer).are_found)
+        return primary_begin_slice(NULL, context, error);
+    primary_begin_eyes(context);
+    return true;
+}
+
+static bool intersect(struct render_context *context, const struct key_eyes *eyes, bool *done, struct error *error)
+{
+    *done = true;
+    if (eyes->what == KEY_GATHER_KEPT)
+        return true;
+    return eyes->are_found ? primary_find_eyes(context, error) : primary_intersect(context, done, error);
+}
+
+bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    struct layers *layers = &renderer->work->layers;
+    const struct key_eyes eyes = frame_key_eyes(renderer);
+    if (!intersect(context, &eyes, done, error))
+        return false;
+    if (!*done)
+        return true;
+    return key_view_gather(&renderer->key, context, layers, &renderer->picture, &eyes, error) &&
+           (!layers->noting || primary_make_surfaces(context, error));
+}
+
+/* Where most of a picture is filled from the background, what was asked for is hardly meant. */
+static void warn_of_unknown(struct structure_row *row, const struct frame_request *request)
+{
+    if (row->measure < UNKNOWN_WARNED)
+        return;
+    snprintf(
+        row->warning, sizeof(row->warning),
+        "no depth layer shows %.0f %% of the picture, whose eyes are up to %.3g m from the view that is rendered "
+        "(%s)",
+        (double)row->measure * 100.0, (double)farthest_eye(request),
+        request->has_key           ? "choose a smaller --upsample"
+        : frame_has_views(request) ? "bring the eyes nearer together, or choose --views rays"
+                                   : "choose a smaller --aperture, or --lens rays");
+}
+
+bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
+{
+    const struct frame_request *request = &renderer->request;
+    struct structure_rows *rows = &renderer->result.structure;
+    uint32_t unknown = 0;
+    if (!trace_state_tell(renderer->work->key_trace_state, rows, error))
+        return false;
+    /* A picture that had all its samples has asked for none. */
+    if (renderer->work->context.request.samples == 0)
+        return true;
+    if (!key_view_take_count(&renderer->key, renderer->device, &unknown, error))
+        return false;
+    const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->context.request.samples;
+    rows->part = 0;
+    rows->part_name = NULL;
+    warn_of_unknown(structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples), request);
+    return true;
+}

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/* From the sums of a picture to those of a denoised one; README.md says how. A strip of the picture at a time, as
+ * wide and as high as a storage block holds. */
+#ifndef FARLIGHT_RENDER_PASSES_DENOISE_FILTER_H
+#define FARLIGHT_RENDER_PASSES_DENOISE_FILTER_H
+
+#include "render/passes/denoise/history.h"
+#include "render/passes/denoise/sums.h"
+
+struct denoise_filter {
+    struct gpu_buffer notes;                   /* of the slice in hand */
+    struct gpu_buffer guides, slopes;          /* of what is seen */
+    struct gpu_buffer motions;                 /* where the sums have them */
+    struct gpu_buffer first, wider, levels[2]; /* halves of the light: at first; filtered; as it was chosen */
+    struct gpu_buffer risks;
+    /* progress */
+    uint32_t strip_row, strip_rows; /* of the strip in hand, with what its edges depend on */
+    uint32_t own_row, own_end;      /* rows of the picture that it is for */
+    uint32_t pass, row;             /* that the next step does; row: of the strip, or of the picture */
+};
+
+/* Behind the last sample of a frame. */
+void denoise_begin(struct denoise_filter *filter);
+/* A step of some milliseconds, where the device is software; *done: DENOISE_SUM_RESULT has the picture. */
+bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
+                  struct render_context *context, const struct picture *picture, bool *done, struct error *error);
+uint64_t denoise_filter_device_bytes(const struct denoise_filter *filter);
+void denoise_filter_finish(struct denoise_filter *filter, struct gpu_device *device);
+
+#endif

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/* What a view keeps of its last picture for the next one: of each pixel the light that falls there, how many
+ * samples that is worth, and the guide; and from where it was seen. The next frame finds there what it sees again
+ * (Schied et al. Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). README.md says what of it is trusted.
+ */
+#ifndef FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
+#define FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
+
+#include "render/context/context.h"
+#include "render/passes/denoise/places.h"
+#include "render/picture/picture.h"
+
+struct denoise_kept {
+    struct gpu_buffer pixels; /* uvec4 a pixel, row by row: shaders/render/denoise_reproject.comp */
+    struct frame_uniforms uniforms;
+    struct frame_request request;
+    uint64_t showing, revision; /* as in frame_scene, and of the scene */
+    struct denoise_places places;
+    bool whole; /* it has all of a picture */
+};
+
+struct denoise_history {
+    struct denoise_kept kept[2];
+    uint32_t now;    /* which of them the frame in hand is written to; the other one is of the picture before */
+    bool is_written; /* by the frame in hand */
+    bool is_used;    /* the same */
+    uint32_t moving; /* frames so far: each has noise of its own */
+    bool is_moving;  /* the frame in hand, or the last one, is one of them */
+    /* DENOISE_MOVED_TEXELS an instance, where some have moved since the picture before. */
+    struct gpu_buffer moved;
+    bool things_moved; /* it has something */
+};
+
+/* Once it is known what the frame shows. `goes_on`: it adds samples to the picture that was written last, and
+ * follows the one before that. */
+bool denoise_history_begin(struct denoise_history *history, struct render_context *context, uint64_t showing,
+                           bool goes_on, struct error *error);
+/* How things have moved since the picture before; NULL: not at all. */
+struct gpu_buffer *denoise_history_moved(struct denoise_history *history);
+/* `fits`: the picture is filtered in one strip, and the guides are those of first hits; others have no history.
+ * `has_motion`: of each pixel it is known how it has moved. False: there is no memory. */
+bool denoise_history_reserve(struct denoise_history *history, struct render_context *context, bool fits,
+                             bool has_motion, struct error *error);
+/* For the pass that reprojects, of a picture of so many samples. */
+void denoise_history_bind(struct denoise_history *history, struct render_context *context,
+                          const struct gpu_program *program, uint32_t samples);
+/* The picture in hand, behind that pass. */
+struct gpu_buffer *denoise_history_pixels(struct denoise_history *history);
+void denoise_history_end(struct denoise_history *history);
+uint64_t denoise_history_device_bytes(const struct denoise_history *history);
+void denoise_history_finish(struct denoise_history *history, struct gpu_device *device);
+
+#endif

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT */
+/* What a picture that is denoised has beside its samples' radiance: the radiance of half of them, and what their
+ * first hits are. It is noted slice by slice and reaches the sums when the slice reaches the picture. */
+#ifndef FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
+#define FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
+
+#include "render/context/context.h"
+#include "render/passes/denoise/history.h"
+#include "render/picture/picture.h"
+
+enum denoise_sum {
+    DENOISE_SUM_HALF,    /* the light of the first half: shaders/render/denoise_half.glsl */
+    DENOISE_SUM_DOUBLED, /* that of as many samples as the last power of two, which will be half of them */
+    DENOISE_SUM_ALBEDO,
+    DENOISE_SUM_NORMAL,
+    DENOISE_SUM_MOTION, /* where has_motion; else nothing */
+    DENOISE_SUM_RESULT, /* of the denoised picture, as many samples; no sum of slices */
+    DENOISE_SUM_COUNT
+};
+
+struct denoise_sums {
+    struct gpu_buffer *bands; /* owned; sum after sum, as the picture's bands; vec4 a slot */
+    uint32_t band_count;
+    /* Notes say what is seen in smooth mirrors and behind glass. Not where pictures follow one another: what each
+     * sample meets there differs from one to the next. */
+    bool follows;
+    bool has_motion; /* that, or something has moved since the picture before */
+};
+
+/* Whether the frame has noise, and is to lose it: of those that trace no rays at random, and of pictures made from
+ * others, nothing is noted and nothing changes. */
+bool denoise_is_wanted(const struct render_context *context);
+/* The same of the samples in hand: of DENOISE_AUTO those behind the last that it looks at are not noted. */
+bool denoise_notes_samples(const struct render_context *context);
+/* How much of the filtering a picture of that many samples gets, 0 to 1. */
+float denoise_strength(const struct frame_request *request, uint32_t samples);
+/* One of the programs that ask how many samples a pixel has: its tile may have stopped. `reprojected`: the light
+ * of the picture has that of pictures before in it. */
+const struct gpu_program *denoise_use(struct render_context *context, const struct denoise_sums *sums,
+                                      const char *shader, bool reprojected, struct error *error);
+/* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
+bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
+                        uint32_t samples_before, const struct denoise_history *history, struct error *error);
+/* The context has hits of a new slice: notes what they are. `moved`: see denoise_history_moved(). Inside no span.
+ */
+bool denoise_note(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
+                  struct render_context *context, struct error *error);
+/* It has those of the rays that these have sent on: of what is seen in mirrors and through glass they say more. */
+bool denoise_follow(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
+                    struct render_context *context, struct error *error);
+/* Adds the current slice, before the picture has it. Call it once the slice cannot be repeated, but on the device.
+ */
+bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
+                        const struct picture *picture, struct error *error);
+struct gpu_buffer *denoise_sums_band(const struct denoise_sums *sums, enum denoise_sum sum, uint32_t band);
+uint64_t denoise_sums_device_bytes(const struct denoise_sums *sums);
+void denoise_sums_finish(struct denoise_sums *sums, struct gpu_device *device);
+
+#endif

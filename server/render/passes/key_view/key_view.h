@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT */
+/* Pictures of the depth layers of one view, the key view, kept from frame to frame, and pictures of other eyes
+ * made from them: rays of an eye ask a structure of the key view where they hit, and take the radiance from there.
+ * Widmer, Pajak, Schulz, Pulli, Kautz, Goesele, Luebke. An Adaptive Acceleration Structure for Screen-space Ray
+ * Tracing. 2015, section 5. GL thread. */
+#ifndef FARLIGHT_RENDER_PASSES_KEY_VIEW_H
+#define FARLIGHT_RENDER_PASSES_KEY_VIEW_H
+
+#include "gpu/readback.h"
+#include "render/passes/layers/layers.h"
+#include "render/picture/picture.h"
+#include "shared/key_view.h"
+
+/* Zero is empty. Owner: a renderer. */
+struct key_view {
+    struct picture sums;                      /* of the layer in hand */
+    struct gpu_buffer layers[KEY_LAYERS_MAX]; /* shared/key_view.h */
+    struct gpu_buffer counts;                 /* uint: samples of eyes that no layer shows, of the frame in hand */
+    struct gpu_buffer marks, tiles;           /* shared/key_view.h: texels that eyes look at, of all layers */
+    struct gpu_readback copy;                 /* of them */
+    /* What the layers are of, if they are: */
+    bool is_made;
+    uint32_t first_sample;          /* of the pixels' that were the texels' */
+    struct trace_view view, texels; /* what was asked for; and the one whose pixels are texels */
+    struct frame_request request;   /* the frame's that they were rendered for */
+    uint64_t showing;               /* of the scene, see frame/state.h */
+    uint32_t layer_count;
+    bool is_marked; /* only what the eyes of the frame in hand look at is rendered: of no use to others */
+    uint32_t first_tile[KEY_LAYERS_MAX]; /* then, of each layer, in `tiles` */
+    uint32_t tile_rows[KEY_LAYERS_MAX];
+};
+
+/* A pass over the eyes. */
+struct key_eyes {
+    enum key_gather {
+        KEY_GATHER,      /* from where the slice's rays meet layers to its sums */
+        KEY_GATHER_MARK, /* keeps that as sums, and marks texels */
+        KEY_GATHER_KEPT, /* takes it from the picture, and leaves black there */
+    } what;
+    bool are_found; /* context->hits have what shared/eye_hit.h says; else there are rays and intersections */
+};
+
+/* Whether they show what that frame asks for. */
+bool key_view_is_of(const struct key_view *key, const struct trace_view *view, const struct frame_request *request,
+                    uint64_t showing);
+/* Makes room for layers of that view. */
+bool key_view_reserve(struct key_view *key, struct gpu_device *device, const struct trace_view *texels,
+                      uint32_t layer_count, struct error *error);
+/* The request of a layer's picture: through the middle of each texel, without a lens. */
+struct frame_request key_view_layer_request(const struct key_view *key, const struct frame_request *request);
+/* Keeps a band of the layer's picture, which is key->sums. */
+bool key_view_keep_band(struct key_view *key, struct render_context *context, uint32_t layer, uint32_t band,
+                        struct error *error);
+/* Nothing is looked at yet. */
+bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error);
+/* Lists the tiles; waits for the device. */
+bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error);
+/* Of the slice in hand, of that picture. LAYER_UNKNOWN is written too, if it is wanted. */
+bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
+                     const struct picture *picture, const struct key_eyes *eyes, struct error *error);
+void key_view_announce(const struct key_view *key, struct render_context *context, bool has_unknown,
+                       const struct key_eyes *eyes);
+/* The samples of the frame that no layer shows: clears their count, begins to copy it, and takes the copy. */
+bool key_view_count_anew(struct key_view *key, struct gpu_device *device, struct error *error);
+bool key_view_copy_count(struct key_view *key, struct gpu_device *device, struct error *error);
+bool key_view_take_count(struct key_view *key, struct gpu_device *device, uint32_t *unknown, struct error *error);
+uint64_t key_view_device_bytes(const struct key_view *key);
+void key_view_finish(struct key_view *key, struct gpu_device *device); /* leaves it empty */
+
+#endif

@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: MIT */
+/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB, or Y'CbCr of that; of
+ * light that is a display's values these, clamped, and for floats what a display emits for them. */
+#include "render/context/request.h"
+#include "render/passes/layers/layers.h"
+#include "render/picture/picture.h"
+
+#include "shared/layers.h"
+#include "shared/path.h"
+
+#include <epoxy/gl.h>
+#include <math.h>
+
+/* Exposed as the beauty is: itself, and its parts. */
+static bool is_exposed(enum layer layer)
+{
+    return layer == LAYER_BEAUTY || layers_are_of_light(layer);
+}
+
+/* Of the sum of a layer's samples what its pixels show. */
+static float scale_of(const struct picture *picture, const struct frame_request *request, enum layer layer)
+{
+    float mean = 1.0f / (float)picture->samples;
+    if (is_exposed(layer))
+        return exp2f(request->exposure_stops) * mean;
+    return layers_of_first_sample(layer) ? 1.0f : mean;
+}
+
+/* The define of a program that divides each tile's sums by its own number of samples; NULL: it need not. */
+static const char *counts_tiles(const struct render_context *context, enum layer layer)
+{
+    return context->tile_samples && !layers_of_first_sample(layer) ? "HAS_TILE_SAMPLES" : NULL;
+}
+
+/* Layers that are no colours stay as they are. */
+static const char *shows_display_values(const struct render_context *context, enum layer layer)
+{
+    const bool is_colour = layer == LAYER_BEAUTY || layer == LAYER_ALBEDO;
+    return context->display_values && is_colour ? "DISPLAY_VALUES" : NULL;
+}
+
+/* The define of a program for sums that are no colours with a coverage; NULL: they are. */
+static const char *form_of(enum layer layer)
+{
+    return LAYER_BITS_CRYPTO >> layer & 1 ? "PAIRS" : layer == LAYER_MOTION ? "PLAIN" : NULL;
+}
+
+/* Of a program of display.glsl; with the curve where it makes display values. */
+#define DISPLAY_DEFINES 4
+static void display_defines(const struct render_context *context, enum layer layer, bool displays,
+                            struct gpu_define defines[DISPLAY_DEFINES])
+{
+    static const char *const numbers[] = {[TONE_NEUTRAL] = "0u", [TONE_ACES] = "1u", [TONE_NONE] = "2u"};
+    const char *names[] = {shows_display_values(context, layer), counts_tiles(context, layer), form_of(layer)};
+    size_t n = 0;
+    if (displays && !names[0])
+        defines[n++] = (struct gpu_define){"TONE_MAP", numbers[context->request.tone_map]};
+    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+        if (names[i])
+            defines[n++] = (struct gpu_define){names[i], "1"};
+}
+
+static const struct gpu_program *use_pixels(struct render_context *context, enum layer layer, uint32_t pixel_count,
+                                            struct error *error)
+{
+    static const char *const numbers[] = {
+        [PIXEL_FORMAT_RGBA8] = "0",    [PIXEL_FORMAT_RGBA16F] = "1", [PIXEL_FORMAT_RGBA32F] = "2",
+        [PIXEL_FORMAT_DEPTH32F] = "3", [PIXEL_FORMAT_NORMAL8] = "4", [PIXEL_FORMAT_SHARE8] = "5"};
+    unsigned format = frame_request_plane_format(&context->request, layer);
+    struct gpu_define defines[DISPLAY_DEFINES + 2] = {{"FORMAT", numbers[format]}};
+    display_defines(context, layer, format == PIXEL_FORMAT_RGBA8, defines + 1);
+    const struct gpu_program *program = context_use_with(context, "render/resolve.comp", defines, error);
+    if (program)
+        gpu_uniform_uint(program, "pixel_count", pixel_count);
+    return program;
+}
+
+static const struct gpu_program *use_ycbcr(struct render_context *context, uint32_t row_count, struct error *error)
+{
+    struct gpu_define defines[DISPLAY_DEFINES + 1] = {0};
+    display_defines(context, LAYER_BEAUTY, true, defines);
+    const struct gpu_program *program = context_use_with(context, "render/resolve_ycbcr.comp", defines, error);
+    if (program) {
+        gpu_uniform_uint(program, "row_count", row_count);
+        gpu_uniform_uint(program, "ycbcr", context->request.ycbcr);
+    }
+    return program;
+}
+
+/* Layers beside the picture have none, but for those of what lies behind. */
+static void set_background(const struct gpu_program *program, const struct render_context *context,
+                           enum layer layer)
+{
+    const struct frame_request *request = &context->request;
+    const bool is_behind =
+        layer == LAYER_BACKGROUND || layer == LAYER_LIGHT_REST + context->layers->environment_group;
+    const bool has_colour = (layer == LAYER_BEAUTY || is_behind) && request->background == BACKGROUND_COLOUR;
+    const float *colour = request->background_colour;
+    const float background[4] = {colour[0], colour[1], colour[2], 1.0f}, none[4] = {0};
+    gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
+}
+
+static void set_tiles(const struct gpu_program *program, const struct picture *picture,
+                      struct render_context *context, enum layer layer, uint32_t band)
+{
+    uint32_t first_slot;
+    (void)picture_band_slots(picture, band, &first_slot);
+    gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+    gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
+    gpu_uniform_float(program, "exposure", is_exposed(layer) ? exp2f(context->request.exposure_stops) : 1.0f);
+}
+
+static bool is_ycbcr(const struct render_context *context, enum layer layer)
+{
+    return layer == LAYER_BEAUTY && context->request.ycbcr != YCBCR_NONE;
+}
+
+void picture_announce(const struct picture *picture, struct render_context *context)
+{
+    if (!context->sums_in_picture || picture->plane_count > 1)
+        (void)picture_accumulate_program(context, NULL);
+    if (context->tile_samples)
+        (void)context_use(context, "render/tile_error.comp", NULL);
+    for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
+        const enum layer layer = picture_plane_layer(picture, plane);
+        if (is_ycbcr(context, layer))
+            (void)use_ycbcr(context, 0, NULL);
+        else
+            (void)use_pixels(context, layer, 0, NULL);
+    }
+}
+
+bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
+                          struct error *error)
+{
+    enum layer layer = picture_plane_layer(picture, plane);
+    const struct frame_request *request = &context->request;
+    uint32_t rows = picture_band_row_count(picture, band), pixel_count = rows * picture->width;
+    const bool as_ycbcr = is_ycbcr(context, layer);
+    size_t bytes = (size_t)frame_request_plane_bytes(request, layer, rows);
+    if (!gpu_buffer_reserve(context->device, &picture->resolved, bytes, error))
+        return false;
+    context_span_begin(context, STAGE_RESOLVE);
+    context_bind(context);
+    const struct gpu_program *program =
+        as_ycbcr ? use_ycbcr(context, rows, error) : use_pixels(context, layer, pixel_count, error);
+    if (program) {
+        float coverage_scale = layers_of_first_sample(layer) ? 1.0f : 1.0f / (float)picture->samples;
+        const bool denoised = layer == LAYER_BEAUTY && picture->denoised;
+        gpu_buffer_bind_storage(denoised ? &picture->denoised[band] : picture_band(picture, plane, band),
+                                BIND_ACCUMULATION);
+        gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
+        gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
+        gpu_uniform_float(program, "coverage_scale", coverage_scale);
+        set_background(program, context, layer);
+        if (counts_tiles(context, layer))
+            set_tiles(program, picture, context, layer, band);
+        gpu_dispatch(context->device, program, as_ycbcr ? picture->tiles_across * ((rows + 1) / 2) : pixel_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "resolving", error);
+}

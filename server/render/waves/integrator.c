@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/waves/integrator.h"
+
+#include "render/light/environment_choice.h"
+
+#include "shared/bindings.h"
+#include "shared/path.h"
+
+#include <epoxy/gl.h>
+
+/* Rays that go straight on through blended surfaces do not count as bounces. */
+#define STRAIGHT_WAVES 16
+/* Likewise the layers of ray casting: what is left of the ray limits them, and where that never ends, as behind
+ * perfectly clear panes, this many beyond the depth. */
+#define LAYERS_MAX 256
+#define OPACITY_DEFAULT 0.5f
+
+/* ---- shadow rays of each hit ---- */
+
+static uint32_t no_shadow_rays(const struct render_context *context)
+{
+    (void)context;
+    return 0;
+}
+
+static uint32_t one_for_each_light(const struct render_context *context)
+{
+    return context->uniforms.light_count;
+}
+
+static uint32_t one_for_all_lights(const struct render_context *context)
+{
+    return context->uniforms.light_count > 0 || context_samples_emitters(context);
+}
+
+static uint32_t one_for_lights_and_image(const struct render_context *context)
+{
+    return one_for_all_lights(context) || context->environment->kind == ENVIRONMENT_IMAGE;
+}
+
+static uint32_t one_for_the_environment(const struct render_context *context)
+{
+    const uint32_t kind = context->environment->kind;
+    return kind != ENVIRONMENT_NONE && kind != ENVIRONMENT_BACKDROP;
+}
+
+static uint32_t one_each_for_lights_and_environment(const struct render_context *context)
+{
+    return one_for_all_lights(context) + one_for_the_environment(context);
+}
+
+/* ---- set-up ---- */
+
+static void set_ao(struct render_context *context, const struct gpu_program *program)
+{
+    gpu_uniform_float(program, "reach", context_ao_distance(context));
+    gpu_uniform_float(program, "falloff", context->request.ao_falloff);
+}
+
+static void set_raycast(struct render_context *context, const struct gpu_program *program)
+{
+    float opacity = context->request.layer_opacity;
+    gpu_uniform_float(program, "layer_opacity", opacity > 0.0f ? opacity : OPACITY_DEFAULT);
+}
+
+size_t integrator_emitter_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    size_t n = 0;
+    if (!context_samples_emitters(context))
+        return 0;
+    defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
+    if (context->tracer->impl->sampled)
+        defines[n++] = (struct gpu_define){"EMITTERS_BY_DISTANCE", "1"};
+    if (!context->scene->has_motion)
+        return n;
+    defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    defines[n++] =
+        (struct gpu_define){"NO_COLOURS", "1"}; /* not read here, and there is no sampler left for them */
+    return n;
+}
+
+static void set_environment_choice(struct render_context *context, const struct gpu_program *program)
+{
+    struct environment_choice *choice = context->environment_choice;
+    gpu_uniform_float(program, "environment_extent", choice->extent);
+    environment_choice_bind(choice, context->device, program);
+}
+
+static bool prepare_environment_choice(struct render_context *context, struct error *error)
+{
+    return environment_choice_update(context->environment_choice, context->device, context->environment,
+                                     &context->scene->scene->environment, error);
+}
+
+/* Of an image; what a mirror sees of other environments its own rays find as well. */
+static size_t distributed_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    size_t n = integrator_emitter_defines(context, defines);
+    if (context->environment->kind != ENVIRONMENT_IMAGE || context->environment_choice->rows == 0)
+        return n;
+    defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
+    defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
+    return n;
+}
+
+static void set_distributed(struct render_context *context, const struct gpu_program *program)
+{
+    if (context->environment->kind == ENVIRONMENT_IMAGE)
+        set_environment_choice(context, program);
+}
+
+static bool prepare_distributed(struct render_context *context, struct error *error)
+{
+    return context->environment->kind != ENVIRONMENT_IMAGE || prepare_environment_choice(context, error);
+}
+
+static size_t path_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    size_t n = integrator_emitter_defines(context, defines);
+    if (context->environment->kind == ENVIRONMENT_IMAGE)
+        defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
+    if (context->environment_choice->rows > 0)
+        defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
+    if (context->request.brdf == BRDF_WARD)
+        defines[n++] = (struct gpu_define){"WARD", "1"};
+    return n;
+}
+
+static void set_path(struct render_context *context, const struct gpu_program *program)
+{
+    gpu_uniform_uint(program, "asks_lights", one_for_all_lights(context));
+    gpu_uniform_uint(program, "asks_environment", one_for_the_environment(context));
+    set_environment_choice(context, program);
+}
+
+/* Of scene_features.mirrors nothing is left out, but what a tracer stores is rounded, and a grain narrows a lobe.
+ */
+static size_t whitted_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    if (context->features.mirrors || context->features.anisotropy || context->sampled_hits ||
+        context->tracer->impl->sampled)
+        return 0;
+    defines[0] = (struct gpu_define){"SENDS_NOTHING", "1"};
+    return 1;
+}
+
+/* ---- the table ---- */
+
+static const struct integrator integrators[] = {
+    /* Whitted. An Improved Illumination Model for Shaded Display. 1980: at each hit the light of every light that
+     * a shadow ray reaches, and a ray each for what is mirrored and what is refracted. */
+    [INTEGRATOR_WHITTED] =
+        {
+            .name = "whitted",
+            .shader = "render/whitted.comp",
+            .ground = "EVERY_LIGHT",
+            .children_a_hit = CHILDREN_MAX,
+            .follows_eye = true,
+            .mirrors = true,
+            .shadow_waves = 1,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = one_for_each_light,
+            .defines = whitted_defines,
+        },
+    /* Cook, Porter, Carpenter. Distributed Ray Tracing. 1984, one random choice of each kind a sample, as in
+     * section 7 of the stackless sphere tree's paper: at each hit one shadow ray and at most one ray more. */
+    [INTEGRATOR_DISTRIBUTED] =
+        {
+            .name = "distributed",
+            .shader = "render/distributed.comp",
+            .ground = "ONE_LIGHT",
+            .children_a_hit = 1,
+            .lit_by_surfaces = true,
+            .follows_eye = true,
+            .random = true,
+            .scatters = true,
+            .mirrors = true,
+            .shadow_waves = 1,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = one_for_lights_and_image,
+            .left_scene = "SHARES",
+            .defines = distributed_defines,
+            .set = set_distributed,
+            .prepare = prepare_distributed,
+        },
+    /* Ray casting through all layers: each is lit without shadows and blended over those behind it. */
+    [INTEGRATOR_RAYCAST] =
+        {
+            .name = "raycast",
+            .shader = "render/raycast.comp",
+            .children_a_hit = 1,
+            .shadow_waves = 1,
+            .straight_waves = LAYERS_MAX,
+            .shadow_rays_a_hit = no_shadow_rays,
+            .set = set_raycast,
+        },
+    /* Ambient occlusion: of each first hit the share of the directions above it in which nothing is within a
+     * distance. Some any-hit rays a sample, and no light. */
+    [INTEGRATOR_AO] =
+        {
+            .name = "ao",
+            .shader = "render/ao.comp",
+            .ground = "OPEN",
+            .children_a_hit = 1,
+            .random = true,
+            .shadow_waves = 1,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = context_ao_rays,
+            .left_scene = "OPEN",
+            .gather = "GREY",
+            .set = set_ao,
+        },
+    /* Kajiya. The Rendering Equation. 1986: paths from the eye, which ask for light at each hit. The buffers hold
+     * all its shadow rays at once, which its shader counts on. */
+    [INTEGRATOR_PATH] =
+        {
+            .name = "path",
+            .shader = "render/path.comp",
+            .ground = "ONE_LIGHT",
+            .children_a_hit = 1,
+            .lit_by_surfaces = true,
+            .follows_eye = true,
+            .random = true,
+            .scatters = true,
+            .always_bounces = true,
+            .shadow_waves = 2,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = one_each_for_lights_and_environment,
+            .left_scene = "SHARES",
+            .meets_lights = true,
+            .defines = path_defines,
+            .set = set_path,
+            .prepare = prepare_environment_choice,
+        },
+};
+
+const struct integrator *integrator_by_number(unsigned number)
+{
+    return number < sizeof(integrators) / sizeof(integrators[0]) ? &integrators[number] : NULL;
+}

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: MIT */
+/* The only place where waves of a frame are traced. */
+#ifndef FARLIGHT_RENDER_WAVES_TRACE_H
+#define FARLIGHT_RENDER_WAVES_TRACE_H
+
+#include "render/context/context.h"
+#include "render/compare/rays.h"
+
+/* Traces a wave with the frame's tracer: a short step of it, and so from step to step until *done. What is in the
+ * wave stays as it is until then. A span of its own (STAGE_PRIMARY for primary rays, else STAGE_TRACE; no span is
+ * open). Where the frame compares tracers the wave is traced whole, once more with the other, and compared
+ * (STAGE_COMPARE).
+ *
+ * The size of a step follows the clock, as the cost of a ray differs a hundredfold between tracers, scenes and
+ * machines; the results do not depend on it. */
+bool wave_trace(struct render_context *context, enum ray_kind kind, const struct wave *wave, bool *done,
+                struct error *error);
+
+/* Announces the programs that such a wave needs. */
+void wave_announce(struct render_context *context, const struct wave *wave);
+
+#endif
