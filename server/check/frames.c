@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "check/frames.h"
 
+#include "render/context/camera.h"
+
 bool check_frames_init(struct check_frames *frames, struct gpu_device *device, struct scene *scene,
                        struct error *error)
 {

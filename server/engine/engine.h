@@ -12,6 +12,7 @@
 #include "encode/encoder.h"
 #include "encode/parts.h"
 #include "gpu/device.h"
+#include "render/context/camera.h"
 #include "render/frame/frame.h"
 #include "scene/pose.h"
 #include "scene/scene.h"

@@ -4,6 +4,7 @@
 #define FARLIGHT_TESTS_RENDER_FIXTURE_H
 
 #include "base/blob.h"
+#include "render/context/camera.h"
 #include "render/frame/frame.h"
 #include "scene/scene.h"
 #include "tests/fixtures/device.h"

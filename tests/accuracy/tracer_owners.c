@@ -5,7 +5,7 @@
 #include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
-#include "render/frame/state.h"
+#include "render/frame/work.h"
 
 #define STEPS 3u /* of a wave, by the tracer that advances in a way of its own */
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/bench/paper_scene.h"
 
+#include "render/context/camera.h"
 #include "tests/accuracy/test_scenes.h"
 
 #define PI_F 3.14159265f

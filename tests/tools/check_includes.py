@@ -16,6 +16,10 @@ import sys
 # row; so a new tracer needs no row.
 BASE, GPU, SCENE, GPU_SCENE, TRACE = "server/base", "server/gpu", "server/scene", "server/gpu_scene", "server/trace"
 SHARED, COMMON = "shaders/shared", "shaders/common"
+CONTEXT, COMPARE, LIGHT = "server/render/context", "server/render/compare", "server/render/light"
+PICTURE, WAVES, FRAME = "server/render/picture", "server/render/waves", "server/render/frame"
+PASSES = PRIMARY, GROUND, WIREFRAME, DENOISE, LAYERS, KEY_VIEW = tuple(
+    f"server/render/passes/{room}" for room in ("primary", "ground", "wireframe", "denoise", "layers", "key_view"))
 MAY_INCLUDE = {
     "protocol": (),
     "protocol/sealed": ("protocol",),
@@ -42,12 +46,23 @@ MAY_INCLUDE = {
     "server/trace/*": (
         "protocol/common", BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", "server/trace/tree", SHARED, "shaders/*",
     ),
-    "server/render": (BASE, GPU, "server/host_passes", SCENE, GPU_SCENE, TRACE, "server/trace/raster", SHARED),
-    "server/check": (BASE, GPU, SCENE, "server/render"),
+    COMPARE: (BASE, GPU, TRACE, SHARED),
+    CONTEXT: (BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", SHARED),
+    LIGHT: (BASE, GPU, SCENE, GPU_SCENE, SHARED),
+    PICTURE: (BASE, GPU, SHARED, CONTEXT),
+    WAVES: (BASE, GPU, "server/host_passes", SHARED, COMPARE, CONTEXT, LIGHT),
+    PRIMARY: (BASE, GPU, TRACE, "server/trace/raster", SHARED, CONTEXT, PICTURE, WAVES),
+    LAYERS: (GPU, GPU_SCENE, SHARED, CONTEXT, LIGHT, PICTURE, WAVES),
+    KEY_VIEW: (GPU, SHARED, CONTEXT, LIGHT, PICTURE, WAVES, PRIMARY, LAYERS),
+    GROUND: (SHARED, CONTEXT, LIGHT, WAVES),
+    WIREFRAME: (SHARED, CONTEXT),
+    DENOISE: (SCENE, GPU_SCENE, SHARED, CONTEXT, PICTURE, WAVES),
+    FRAME: (BASE, GPU, "server/host_passes", SCENE, TRACE, SHARED, COMPARE, CONTEXT, LIGHT, PICTURE, WAVES, *PASSES),
+    "server/check": (BASE, GPU, SCENE, CONTEXT, FRAME),
     "server/encode": (BASE, "protocol/pixels"),
     "server/net": (BASE, "protocol", "protocol/sealed"),
     "server/front": (BASE, "server/net"),
-    "server/engine": ("protocol/common", BASE, GPU, SCENE, "server/render", "server/check", "server/encode"),
+    "server/engine": ("protocol/common", BASE, GPU, SCENE, CONTEXT, FRAME, "server/check", "server/encode"),
     "server/store": (BASE, "protocol"),
     "server/session": (BASE, SCENE, "server/encode", "server/net", "server/store", "server/engine", "protocol", "protocol/common"),
     "server": (BASE, GPU, "server/check", "server/net", "server/front", "server/store", "server/engine", "server/session", "protocol/common"),
@@ -100,7 +115,7 @@ UNIT_ALSO = {
     "gpu_scene": ("server/trace",),  # where rays meet what moved
     "net": ("server/session",),  # the blobs of a connection
     "session": ("server",),  # the limits of the configuration
-    "trace/ldc": ("server/render",),  # cubes of tracers that are switched
+    "trace/ldc": (FRAME,),  # cubes of tracers that are switched
 }
 # System headers that only some rooms, and the folders below them, may use.
 RESTRICTED = {

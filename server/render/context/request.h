@@ -1,17 +1,129 @@
 /* SPDX-License-Identifier: MIT */
-/* Validation and comparison of frame requests. */
+/* What is asked of a frame: the request, and what follows from it alone. */
 #ifndef FARLIGHT_RENDER_CONTEXT_REQUEST_H
 #define FARLIGHT_RENDER_CONTEXT_REQUEST_H
 
-#include "render/frame/frame.h"
+#include "base/error.h"
+#include "base/words.h"
+#include "base/ycbcr.h"
+#include "trace/tracer.h"
 
-/* Checks what the session's checks of a client's request do not cover. Tracers are left out.
- */
-bool frame_request_check(const struct frame_request *request, struct error *error);
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Formats of attachments alone, which follow those of the wire. */
+enum { PIXEL_FORMAT_DEPTH32F = PIXEL_FORMAT_COUNT, PIXEL_FORMAT_NORMAL8, PIXEL_FORMAT_SHARE8 };
+
+struct frame_camera {
+    float world_from_view[12]; /* rigid; looks along -z, y up */
+    float fov_y;               /* radians, of the whole picture's height; 0: orthographic */
+    float ortho_height;
+    float near; /* metres; 0: chosen from the scene */
+};
+
+/* Of a view, whose frames follow each other (render/passes/denoise/history.h). */
+enum frame_history {
+    HISTORY_NONE,  /* the frame stands alone, and so does the next one */
+    HISTORY_KEPT,  /* it stands alone, and the next one may follow it */
+    HISTORY_USED,  /* it follows the one before */
+    HISTORY_MOVING /* and has other noise than that, whatever the seed; no samples are added to its own */
+};
+
+/* A part of a picture, pixels; width 0: all of it. */
+struct frame_crop {
+    uint32_t x, y, width, height;
+};
+
+/* A shadow catcher: a disc that shows what lies behind it, times the share of light that reaches it, where a ray
+ * of the eye from above it meets nothing else. Nothing else sees it, and it throws no shadow;
+ * shaders/render/ground.comp has the share. Not with VIEW_SOURCE_LAYERS; the integrator raycast, which has no
+ * shadows, shows none, and neither does a hidden_layer. */
+struct frame_ground {
+    float centre_world[3], normal_world[3]; /* unit */
+    float radius;                           /* 0: there is none */
+};
+
+struct frame_request {
+    uint32_t width, height; /* of the whole picture */
+    /* Only the tiles of 8 x 8 pixels that this part touches get samples, and the result is the part. Not with
+     * `noise` and `denoise`, which look at pixels around, attachments and VIEW_SOURCE_LAYERS. */
+    struct frame_crop crop;
+    /* Views in it, of the same size, row by row; 0: 1. Each is that of an eye of its own, see frame_view_eye(). */
+    uint32_t views_across, views_down;
+    float baseline; /* metres between neighbouring eyes */
+    bool eyes_over; /* views one below the other are those of eyes side by side */
+    enum view_source view_source;
+    /* What is rendered is seen by another camera than the picture's; only with VIEW_SOURCE_LAYERS. */
+    bool has_key;
+    struct frame_camera key_camera;
+    /* 0: what is seen. 1, 2: of the surfaces that it hides, the first and the second at each pixel that an eye
+     * within hidden_radius sees past what hides them; elsewhere there is nothing. */
+    uint32_t hidden_layer;
+    float hidden_radius; /* metres; of that */
+    uint32_t samples, depth;
+    /* Tiles stop one by one when their error is below that (picture/noise.h); `samples` is the most that one gets.
+     * 0: each gets all. Not with `compare` and VIEW_SOURCE_LAYERS. */
+    float noise;
+    uint64_t seed;
+    struct frame_camera camera;
+    /* The camera a frame earlier and a frame later, for LAYER_MOTION; without them it stands still. */
+    bool has_neighbours;
+    struct frame_camera camera_earlier, camera_later;
+    double clips_time_s; /* when that is; 0: nothing plays */
+    unsigned tracer;     /* protocol's number */
+    struct tracer_options tracer_options;
+    enum integrator_kind integrator;
+    enum primary_kind primary;
+    enum tone_map tone_map;
+    enum pixel_format format;
+    float exposure_stops;
+    enum background background;
+    float background_colour[3]; /* linear, 0 .. 1; BACKGROUND_COLOUR */
+    float aperture;             /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
+    float focus; /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
+    enum pixel_filter filter;
+    enum brdf brdf;    /* of rough surfaces; integrator path */
+    float clamp;       /* times 2^-exposure_stops: see shaders/render/fireflies.glsl; 0: nothing is limited */
+    float ao_distance; /* metres; 0: a tenth of the scene's diagonal */
+    float ao_falloff;  /* as a power of 1 - distance / ao_distance; 0: all counts the same */
+    uint32_t ao_rays;  /* a sample; 0: 8 */
+    float wireframe;   /* pixels: width of lines along the edges of triangles; 0: none */
+    struct frame_ground ground;
+    float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
+    uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
+    uint32_t attachments; /* bits; beside the picture alone, in any format of it */
+    /* RGBA8 of the picture alone: it comes as these planes, which are less to read back, and which its encoder
+     * need not make of it. */
+    enum ycbcr ycbcr;
+    /* The frame goes on where the one before it ended, if that showed the same and was to be gone on from: scene,
+     * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
+     * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
+    bool accumulate;
+    bool starts_anew; /* with `accumulate`: this frame does not go on; those after it may go on from this one */
+    /* With `accumulate`: the limit of accumulated samples; of `samples` only those up to it are added. 0: no
+     * limit. */
+    uint32_t samples_max;
+    /* Random noise is filtered out of the picture that is handed out, not out of the sums
+     * (render/passes/denoise/); what integrators without any show stays as it is, and so does a picture made from
+     * layers. */
+    enum denoise denoise;
+    /* With that: whether the picture, but not its sums, has what those before it have of the same places. */
+    enum frame_history history;
+    /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
+     * and the result has what came of it. The picture is that of `tracer`. */
+    bool compare;
+    unsigned compare_with;   /* protocol's number; with the same options */
+    float compare_far_share; /* 0: WAVE_FAR_SHARE, see render/compare/rays.h */
+};
+
 /* As bits, with that of the beauty where the request names none. */
 uint32_t frame_request_layers(const struct frame_request *request);
 /* The plane that an attachment alone is made of: a layer after all others. */
 #define LAYER_STICKING ((enum layer)31)
+/* Whether a layer holds the first sample of each pixel, in place of the mean of all; whether it is a part of the
+ * light. */
+bool frame_request_is_first_sample(enum layer layer);
+bool frame_request_is_light(enum layer layer);
 /* All that there is a plane for in the picture: layers and those that attachments are made of. */
 uint32_t frame_request_planes(const struct frame_request *request);
 /* Of a plane's pixels on the host, that of the beauty where the request attaches what it is. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/frame/choices.h"
 
+#include "render/context/camera.h"
 #include "shared/hit.h"
 #include "shared/path.h"
 #include "shared/ray.h"
@@ -39,20 +40,19 @@ static uint64_t primitives_shown(const struct gpu_scene *scene)
 }
 
 /* Where it is left to us. A tracer that samples would show its cells. */
-static bool traces_first_hits(const struct render_context *context)
+static bool traces_first_hits(const struct render_frame *frame)
 {
-    const struct tracer_impl *impl = context->tracer->impl;
-    const uint64_t pixels = (uint64_t)context->request.width * context->request.height;
+    const struct tracer_impl *impl = frame->tracer->impl;
+    const uint64_t pixels = (uint64_t)frame->request.width * frame->request.height;
     return impl->traces_on_host ||
-           (impl->finds_first_hits && gpu_measured_traces(&context->device->measured, context->spread,
-                                                          primitives_shown(context->scene), pixels));
+           (impl->finds_first_hits && gpu_measured_traces(&frame->device->gpu->measured, frame->spread,
+                                                          primitives_shown(frame->scene), pixels));
 }
 
-bool choices_rasterise(const struct render_context *context)
+bool choices_rasterise(const struct render_frame *frame)
 {
-    const struct frame_request *request = &context->request;
-    const bool flat = !(request->aperture > 0.0f) && !context->scene->has_motion && !frame_has_views(request);
+    const struct frame_request *request = &frame->request;
+    const bool flat = !(request->aperture > 0.0f) && !frame->scene->has_motion && !frame_has_views(request);
     return flat && !request->compare &&
-           (request->primary == PRIMARY_RASTER ||
-            (request->primary == PRIMARY_AUTO && !traces_first_hits(context)));
+           (request->primary == PRIMARY_RASTER || (request->primary == PRIMARY_AUTO && !traces_first_hits(frame)));
 }

@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_RENDER_FRAME_CHOICES_H
 #define FARLIGHT_RENDER_FRAME_CHOICES_H
 
-#include "render/context/context.h"
+#include "render/context/wave.h"
 
 /* How many times as many rays as a slice its waves have room for at most: mirrors and glass rarely fill it. */
 #define CHOICES_WAVE_PER_SLICE 2
@@ -12,6 +12,6 @@
 /* Rays of a slice at most. */
 uint32_t choices_slice_rays(const struct gpu_device *device, bool compared);
 /* Whether first hits are rasterised, once the scene and the tracer of the context are those of its request. */
-bool choices_rasterise(const struct render_context *context);
+bool choices_rasterise(const struct render_frame *frame);
 
 #endif

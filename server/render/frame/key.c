@@ -2,8 +2,12 @@
 /* Frames whose eyes are made from a key view's layers (key_view.h): which of a frame's passes is in hand. First,
  * where the kept layers are of something else, each layer is rendered, as a picture of its own by the frame's
  * tracer and integrator; then the eyes. Each pass goes through the frame's phases from its first sample on. */
-#include "render/frame/state.h"
+#include "render/frame/key.h"
 
+#include "render/context/camera.h"
+#include "render/frame/check.h"
+#include "render/frame/renderer.h"
+#include "render/frame/work.h"
 #include "render/waves/compact.h"
 #include "render/context/request.h"
 #include "render/waves/integrator.h"
@@ -166,27 +170,49 @@ bool frame_is_eyes_pass(const struct frame_renderer *renderer)
     return frame_is_from_layers(&renderer->request) && !frame_is_layer_pass(renderer);
 }
 
+/* Where only tiles of a layer are rendered. */
+static struct frame_tiles tiles_of(struct key_view *key, uint32_t layer)
+{
+    if (!key->is_marked)
+        return (struct frame_tiles){0};
+    return (struct frame_tiles){
+        .list = &key->tiles,
+        .marks = &key->marks,
+        .first_tile = key->first_tile[layer],
+        .first_mark = layer * key->texels.width * key->texels.height,
+    };
+}
+
 bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->work->context;
+    struct frame_work *work = renderer->work;
     if (renderer->request.hidden_layer) { /* its only pass */
-        context->trace_state = renderer->work->trace_state;
-        context->layer_tracer = renderer->key_tracer;
-        context->layer = renderer->request.hidden_layer;
+        work->frame.trace_state = work->trace_state;
+        work->frame.layer_tracer = renderer->key_tracer;
+        work->frame.layer = renderer->request.hidden_layer;
         return true;
     }
     if (renderer->pass == PASS_UNKNOWN && !choose_first(renderer, error))
         return false;
     const bool is_layer = frame_is_layer_pass(renderer);
-    context->request = is_layer ? key_view_layer_request(&renderer->key, &renderer->request) : renderer->request;
-    context->tracer = is_layer ? renderer->tracer : renderer->key_tracer;
-    context->trace_state = is_layer ? renderer->work->trace_state : renderer->work->key_trace_state;
-    context->layer_tracer = is_layer ? renderer->key_tracer : NULL;
-    context->layer = is_layer ? renderer->pass : 0;
-    context->marked_key = is_layer && renderer->key.is_marked ? &renderer->key : NULL;
+    work->frame.request =
+        is_layer ? key_view_layer_request(&renderer->key, &renderer->request) : renderer->request;
+    work->frame.tracer = is_layer ? renderer->tracer : renderer->key_tracer;
+    work->frame.trace_state = is_layer ? work->trace_state : work->key_trace_state;
+    work->frame.layer_tracer = is_layer ? renderer->key_tracer : NULL;
+    work->frame.layer = is_layer ? renderer->pass : 0;
+    work->frame.tiles = is_layer ? tiles_of(&renderer->key, renderer->pass) : (struct frame_tiles){0};
+    work->eyes = (struct key_eyes){
+        .key = &renderer->key,
+        .layers = &work->layers,
+        .picture = &renderer->picture,
+        .what = frame_is_mark_pass(renderer) ? KEY_GATHER_MARK
+                : renderer->key.is_marked    ? KEY_GATHER_KEPT
+                                             : KEY_GATHER,
+    };
     renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
     renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
-    slices_ahead_forget(&renderer->work->ahead); /* rays of another pass cost something else */
+    slices_ahead_forget(&work->ahead); /* rays of another pass cost something else */
     return true;
 }
 
@@ -201,7 +227,6 @@ bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error)
 {
     if (!key_view_list_tiles(&renderer->key, renderer->device, error))
         return false;
-    renderer->phase = PHASE_BUILD; /* the next pass gets ready */
     renderer->pass = next_layer(&renderer->key, 0);
     return true;
 }
@@ -213,86 +238,40 @@ void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_re
 }
 
 /* All of the layer's samples are in its sums. */
-bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
+static enum pass_progress keep(struct frame_renderer *renderer, struct error *error)
 {
     struct key_view *key = &renderer->key;
-    struct render_context *context = &renderer->work->context;
-    if (!key_view_keep_band(key, context, renderer->pass, renderer->band, error))
-        return false;
+    struct frame_work *work = renderer->work;
+    if (!key_view_keep_band(key, &work->frame, renderer->pass, renderer->band, error))
+        return PASS_FAILED;
     if (++renderer->band < key->sums.band_count)
-        return true;
+        return PASS_MORE;
     renderer->result.primary_rays +=
-        (uint64_t)context->request.width * context->request.height * context->request.samples;
+        (uint64_t)work->frame.request.width * work->frame.request.height * work->frame.request.samples;
     picture_restart(&key->sums);
-    renderer->phase = PHASE_BUILD; /* the next pass gets ready */
     renderer->pass = next_layer(key, renderer->pass + 1);
     if (renderer->pass < key->layer_count)
-        return true;
+        return PASS_REPEAT;
     key->view = renderer->view;
     key->request = renderer->request;
     key->showing = renderer->shared->showing;
     key->is_made = !key->is_marked;
     key->first_sample = renderer->eyes_samples_before;
-    return true;
+    return PASS_REPEAT;
 }
 
-/* Other layers of the picture are made from the surfaces that rays hit. */
-static bool are_found(const struct frame_renderer *renderer)
+static bool wants_keep(const void *self, const struct render_wave *wave)
 {
-    const struct render_context *context = &renderer->work->context;
-    return !(renderer->work->layers.wanted & ~LAYER_BIT_UNKNOWN) && !context->comparison &&
-           tracer_finds_eyes(context->tracer, context->scene, &context->uniforms);
+    return frame_is_layer_pass(self) && wave->frame->request.samples > 0;
 }
 
-struct key_eyes frame_key_eyes(const struct frame_renderer *renderer)
+static enum pass_progress run_keep(void *self, struct render_wave *wave, struct error *error)
 {
-    if (frame_is_mark_pass(renderer))
-        return (struct key_eyes){KEY_GATHER_MARK, are_found(renderer)};
-    if (renderer->key.is_marked)
-        return (struct key_eyes){KEY_GATHER_KEPT, true};
-    return (struct key_eyes){KEY_GATHER, are_found(renderer)};
+    (void)wave;
+    return keep(self, error);
 }
 
-void frame_key_announce(struct frame_renderer *renderer)
-{
-    struct render_context *context = &renderer->work->context;
-    const struct key_eyes eyes = frame_key_eyes(renderer);
-    if (!eyes.are_found)
-        primary_announce(context, false);
-    else if (eyes.what != KEY_GATHER_KEPT)
-        (void)primary_find_eyes(context, NULL);
-    key_view_announce(&renderer->key, context, renderer->work->layers.wanted & LAYER_BIT_UNKNOWN, &eyes);
-}
-
-bool frame_key_begin_slice(struct frame_renderer *renderer, struct error *error)
-{
-    struct render_context *context = &renderer->work->context;
-    if (!frame_key_eyes(renderer).are_found)
-        return primary_begin_slice(NULL, context, error);
-    primary_begin_eyes(context);
-    return true;
-}
-
-static bool intersect(struct render_context *context, const struct key_eyes *eyes, bool *done, struct error *error)
-{
-    *done = true;
-    if (eyes->what == KEY_GATHER_KEPT)
-        return true;
-    return eyes->are_found ? primary_find_eyes(context, error) : primary_intersect(context, done, error);
-}
-
-bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *error)
-{
-    struct render_context *context = &renderer->work->context;
-    struct layers *layers = &renderer->work->layers;
-    const struct key_eyes eyes = frame_key_eyes(renderer);
-    if (!intersect(context, &eyes, done, error))
-        return false;
-    if (!*done)
-        return true;
-    return key_view_gather(&renderer->key, context, layers, &renderer->picture, &eyes, error) &&
-           (!layers->noting || primary_make_surfaces(context, error));
-}
+const struct pass keep_pass = {.name = "keep", .wants = wants_keep, .run = run_keep};
 
 /* Where most of a picture is filled from the background, what was asked for is hardly meant. */
 static void warn_of_unknown(struct structure_row *row, const struct frame_request *request)
@@ -317,11 +296,11 @@ bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
     if (!trace_state_tell(renderer->work->key_trace_state, rows, error))
         return false;
     /* A picture that had all its samples has asked for none. */
-    if (renderer->work->context.request.samples == 0)
+    if (renderer->work->frame.request.samples == 0)
         return true;
     if (!key_view_take_count(&renderer->key, renderer->device, &unknown, error))
         return false;
-    const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->context.request.samples;
+    const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->frame.request.samples;
     rows->part = 0;
     rows->part_name = NULL;
     warn_of_unknown(structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples), request);

@@ -1,27 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* The resources that renderers share, a renderer's life, and its resources on the device. */
+/* The life of what renderers of a scene share, and of a renderer; their memory on the device. */
+#include "render/frame/renderer.h"
+
 #include "host_passes/host_passes.h"
-#include "render/context/request.h"
+#include "render/frame/frame.h"
 #include "render/frame/state.h"
+#include "render/frame/work.h"
+#include "render/light/environment.h"
+#include "render/light/environment_choice.h"
 
 #include <stdlib.h>
-
-void frame_result_finish(struct frame_result *result)
-{
-    free(result->pixels);
-    free(result->comparisons);
-    *result = (struct frame_result){0};
-}
-
-const uint8_t *frame_result_attachment(const struct frame_result *result, enum attachment which)
-{
-    size_t bytes = (size_t)result->width * result->height * frame_format_bytes(PIXEL_FORMAT_DEPTH32F);
-    /* As planes they come in the order of their layers. */
-    static const uint32_t before[] = {[ATTACHMENT_DEPTH] = 1u << ATTACHMENT_NORMALS,
-                                      [ATTACHMENT_STICKING] = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS};
-    return result->pixels + result->size_bytes +
-           bytes * (size_t)__builtin_popcount(result->attachments & before[which]);
-}
 
 struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error)
 {

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_RENDER_FRAME_SLICES_H
 #define FARLIGHT_RENDER_FRAME_SLICES_H
 
-#include "render/context/context.h"
+#include "render/context/wave.h"
 #include "render/picture/picture.h"
 
 #define SLICES_WAITING_MAX 32 /* halves of halves of at most 2^32 pixels */

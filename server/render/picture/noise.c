@@ -50,20 +50,20 @@ static bool reserve(struct picture *picture, struct gpu_device *device, struct e
            gpu_buffer_reserve(device, &noise->tile_samples, noise->tile_count * sizeof(uint32_t), error);
 }
 
-bool picture_noise_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
+bool picture_noise_begin(struct picture *picture, const struct render_frame *frame, uint32_t samples_before,
                          struct error *error)
 {
     struct picture_noise *noise = &picture->noise;
-    if (!(context->request.noise > 0.0f)) {
-        picture_noise_finish(noise, context->device);
+    if (!(frame->request.noise > 0.0f)) {
+        picture_noise_finish(noise, frame->device->gpu);
         return true;
     }
     if (!noise->errors) {
-        picture_noise_finish(noise, context->device);
+        picture_noise_finish(noise, frame->device->gpu);
         if (!allocate(picture, error))
             return false;
     }
-    if (!reserve(picture, context->device, error))
+    if (!reserve(picture, frame->device->gpu, error))
         return false;
     if (samples_before > 0)
         return true;
@@ -73,8 +73,8 @@ bool picture_noise_begin(struct picture *picture, struct render_context *context
         noise->samples[tile] = 0;
         noise->errors[tile] = PICTURE_NOISE_UNKNOWN;
     }
-    gpu_buffer_clear(context->device, &noise->tile_samples, 0);
-    gpu_buffer_write(context->device, &noise->tile_errors, 0, noise->errors,
+    gpu_buffer_clear(frame->device->gpu, &noise->tile_samples, 0);
+    gpu_buffer_write(frame->device->gpu, &noise->tile_errors, 0, noise->errors,
                      noise->tile_count * sizeof(*noise->errors));
     return true;
 }
@@ -120,7 +120,7 @@ static void stop_tiles(struct picture *picture, float limit, uint32_t samples)
     }
 }
 
-bool picture_noise_measure(struct picture *picture, struct render_context *context, uint32_t samples,
+bool picture_noise_measure(struct picture *picture, const struct render_frame *frame, uint32_t samples,
                            struct error *error)
 {
     struct picture_noise *noise = &picture->noise;
@@ -129,17 +129,17 @@ bool picture_noise_measure(struct picture *picture, struct render_context *conte
     uint32_t half = SAMPLES_FIRST / 2;
     while (half * 2 < samples)
         half *= 2;
-    const struct gpu_program *program = context_use(context, "render/tile_error.comp", error);
+    const struct gpu_program *program = context_use(frame->device, "render/tile_error.comp", error);
     if (!program)
         return false;
-    context_span_begin(context, STAGE_RESOLVE);
-    context_bind(context);
-    gpu_buffer_bind_texels(context->device, &noise->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+    context_span_begin(frame->device, STAGE_RESOLVE);
+    context_bind_frame(frame);
+    gpu_buffer_bind_texels(frame->device->gpu, &noise->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
     gpu_buffer_bind_storage(&noise->tile_errors, BIND_TILE_ERRORS);
     gpu_uniform_uint(program, "samples", samples);
     gpu_uniform_uint(program, "half_samples", is_first ? 0 : half);
     gpu_uniform_uint(program, "keep", is_first || samples == 2 * half);
-    gpu_uniform_float(program, "exposure", exp2f(context->request.exposure_stops));
+    gpu_uniform_float(program, "exposure", exp2f(frame->request.exposure_stops));
     for (uint32_t band = 0; band < picture->band_count; band++) {
         uint32_t first_slot;
         const uint32_t slots = picture_band_slots(picture, band, &first_slot);
@@ -147,16 +147,16 @@ bool picture_noise_measure(struct picture *picture, struct render_context *conte
         gpu_buffer_bind_storage(&noise->halves[band], BIND_HALVES);
         gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
         gpu_uniform_uint(program, "tile_count", slots / TILE_SLOTS);
-        gpu_dispatch(context->device, program, slots / TILE_SLOTS);
+        gpu_dispatch(frame->device->gpu, program, slots / TILE_SLOTS);
     }
-    context_span_end(context);
+    context_span_end(frame->device);
     if (is_first)
-        return gpu_check(context->device, "keeping half of the samples", error);
-    gpu_buffer_read(context->device, &noise->tile_errors, 0, noise->errors, bytes);
-    if (!gpu_check(context->device, "the errors of tiles", error))
+        return gpu_check(frame->device->gpu, "keeping half of the samples", error);
+    gpu_buffer_read(frame->device->gpu, &noise->tile_errors, 0, noise->errors, bytes);
+    if (!gpu_check(frame->device->gpu, "the errors of tiles", error))
         return false;
-    stop_tiles(picture, context->request.noise, samples);
-    gpu_buffer_write(context->device, &noise->tile_samples, 0, noise->samples, bytes);
+    stop_tiles(picture, frame->request.noise, samples);
+    gpu_buffer_write(frame->device->gpu, &noise->tile_samples, 0, noise->samples, bytes);
     return true;
 }
 

@@ -35,17 +35,17 @@ struct picture_noise {
 };
 
 struct picture;
-struct render_context;
+struct render_frame;
 
 /* Of the request's picture, whose bands are there: it goes on from `samples_before`, or begins. */
-bool picture_noise_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
+bool picture_noise_begin(struct picture *picture, const struct render_frame *frame, uint32_t samples_before,
                          struct error *error);
 /* The next number of samples, after that many, at which something has to be measured. */
 uint32_t picture_noise_next(uint32_t samples);
 bool picture_noise_is_due(const struct picture *picture, uint32_t samples);
 /* Each tile that goes on has that many samples, and all of them are in the picture: stops those that have enough.
  * Waits for the device. */
-bool picture_noise_measure(struct picture *picture, struct render_context *context, uint32_t samples,
+bool picture_noise_measure(struct picture *picture, const struct render_frame *frame, uint32_t samples,
                            struct error *error);
 /* Primary rays of what has been added to that many samples. */
 uint64_t picture_noise_rays(const struct picture *picture, uint32_t samples_before);

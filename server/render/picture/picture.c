@@ -147,78 +147,78 @@ void picture_restart(struct picture *picture)
     picture->cleared = 0;
 }
 
-bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
+bool picture_begin(struct picture *picture, struct render_frame *frame, uint32_t samples_before,
                    struct error *error)
 {
-    const struct frame_request *request = &context->request;
+    const struct frame_request *request = &frame->request;
     uint32_t layers = frame_request_planes(request);
     picture_drop_pixels(picture);
     if (!picture->bands || picture->width != request->width || picture->height != request->height ||
         picture->layers != layers) {
-        free_bands(picture, context->device);
+        free_bands(picture, frame->device->gpu);
         picture->layers = layers;
         picture->plane_count = (uint32_t)__builtin_popcount(layers);
         picture->width = request->width;
         picture->height = request->height;
         picture->tiles_across = (request->width + 7) / 8;
-        if (!list_bands(picture, &context->device->facts, request, error))
+        if (!list_bands(picture, &frame->device->gpu->facts, request, error))
             return false;
     }
     set_crop(picture, request);
     picture->samples = samples_before + request->samples;
-    context->tile_samples = request->noise > 0.0f ? &picture->noise.tile_samples : NULL;
+    frame->tile_samples = request->noise > 0.0f ? &picture->noise.tile_samples : NULL;
     return true;
 }
 
-bool picture_reserve(struct picture *picture, struct render_context *context, uint32_t samples_before,
+bool picture_reserve(struct picture *picture, const struct render_frame *frame, uint32_t samples_before,
                      struct error *error)
 {
-    return reserve_bands(picture, context->device, error) &&
-           (samples_before > 0 || clear_bands(picture, context->device, error)) &&
-           picture_noise_begin(picture, context, samples_before, error);
+    return reserve_bands(picture, frame->device->gpu, error) &&
+           (samples_before > 0 || clear_bands(picture, frame->device->gpu, error)) &&
+           picture_noise_begin(picture, frame, samples_before, error);
 }
 
-const struct gpu_program *picture_accumulate_program(struct render_context *context, struct error *error)
+const struct gpu_program *picture_accumulate_program(struct render_wave *wave, struct error *error)
 {
     static const struct gpu_define stopping[] = {{"HAS_TILE_SAMPLES", "1"}, {0}};
-    const struct gpu_program *program =
-        context_use_with(context, "render/accumulate.comp", context->tile_samples ? stopping : NULL, error);
-    if (program && context->tile_samples) {
-        gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
-        gpu_uniform_uint(program, "first_picture_slot", context->slice.first_slot);
+    const struct gpu_program *program = context_use_with(wave->device, "render/accumulate.comp",
+                                                         wave->frame->tile_samples ? stopping : NULL, error);
+    if (program && wave->frame->tile_samples) {
+        gpu_buffer_bind_texels(wave->device->gpu, wave->frame->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+        gpu_uniform_uint(program, "first_picture_slot", wave->slice.first_slot);
     }
     return program;
 }
 
-bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
-                        struct gpu_buffer *sums, uint32_t first_sum, struct error *error)
+bool picture_accumulate(struct picture *picture, struct render_wave *wave, uint32_t plane, struct gpu_buffer *sums,
+                        uint32_t first_sum, struct error *error)
 {
-    const struct gpu_program *program = picture_accumulate_program(context, error);
+    const struct gpu_program *program = picture_accumulate_program(wave, error);
     if (!program)
         return false;
     uint32_t first_slot;
-    const uint32_t band = picture_slice_band_number(picture, &context->slice, &first_slot);
+    const uint32_t band = picture_slice_band_number(picture, &wave->slice, &first_slot);
     gpu_buffer_bind_storage(picture_band(picture, plane, band), BIND_ACCUMULATION);
     gpu_buffer_bind_storage(sums, BIND_SLICE_SUMS);
-    gpu_buffer_bind_uniform(&context->wave_state, UNIFORM_WAVE);
+    gpu_buffer_bind_uniform(&wave->state, UNIFORM_WAVE);
     gpu_uniform_uint(program, "first_sum", first_sum);
     gpu_uniform_uint(program, "first_slot", first_slot);
-    gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
-    gpu_uniform_uint(program, "sample_shift", context->uniforms.sample_shift);
-    context_span_begin(context, STAGE_SHADE);
-    gpu_dispatch(context->device, program, context->slice.slot_count);
-    context_span_end(context);
+    gpu_uniform_uint(program, "slot_count", wave->slice.slot_count);
+    gpu_uniform_uint(program, "sample_shift", wave->frame->uniforms.sample_shift);
+    context_span_begin(wave->device, STAGE_SHADE);
+    gpu_dispatch(wave->device->gpu, program, wave->slice.slot_count);
+    context_span_end(wave->device);
     return true;
 }
 
-struct gpu_buffer_place picture_sums_place(const struct picture *picture, const struct render_context *context)
+struct gpu_buffer_place picture_sums_place(const struct picture *picture, const struct render_wave *wave)
 {
     uint32_t first_slot = 0;
-    const struct gpu_buffer *band = picture_slice_band(picture, &context->slice, &first_slot);
+    const struct gpu_buffer *band = picture_slice_band(picture, &wave->slice, &first_slot);
     const size_t offset_bytes = first_slot * sizeof(vec4);
-    return context->sums_in_picture && offset_bytes % GPU_STORAGE_ALIGNMENT == 0
+    return wave->frame->sums_in_picture && offset_bytes % GPU_STORAGE_ALIGNMENT == 0
                ? (struct gpu_buffer_place){band, offset_bytes}
-               : (struct gpu_buffer_place){&context->slice_sums, 0};
+               : (struct gpu_buffer_place){&wave->slice_sums, 0};
 }
 
 uint32_t picture_band_slots(const struct picture *picture, uint32_t band, uint32_t *first)

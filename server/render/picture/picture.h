@@ -4,7 +4,7 @@
 #define FARLIGHT_RENDER_PICTURE_H
 
 #include "gpu/readback.h"
-#include "render/context/context.h"
+#include "render/context/wave.h"
 #include "render/picture/noise.h"
 
 /* No storage block holds the largest picture everywhere, so it lies in bands of whole tile rows. */
@@ -30,10 +30,10 @@ struct picture {
 void picture_restart(struct picture *picture);
 /* Gives it the request's size; a picture of `samples_before` samples per pixel, to which the request adds, is
  * kept. */
-bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
+bool picture_begin(struct picture *picture, struct render_frame *frame, uint32_t samples_before,
                    struct error *error);
 /* Reserves and clears it, unless it is kept; may be put off (gpu_reserve_begin). */
-bool picture_reserve(struct picture *picture, struct render_context *context, uint32_t samples_before,
+bool picture_reserve(struct picture *picture, const struct render_frame *frame, uint32_t samples_before,
                      struct error *error);
 bool picture_has_tile(const struct picture *picture, uint32_t tile); /* it gets samples */
 /* The end of the slots without a gap, from `slot` on, whose tiles get samples. */
@@ -46,25 +46,25 @@ uint32_t picture_slot_count(const struct picture *picture);
 /* First slot of the band after the one that `slot` is in. */
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);
 /* That adds slices, in use. */
-const struct gpu_program *picture_accumulate_program(struct render_context *context, struct error *error);
+const struct gpu_program *picture_accumulate_program(struct render_wave *wave, struct error *error);
 /* Where the current slice is summed up (context->sums): of a picture of one sample that is the picture, but for
  * parts of a slice that begin where no storage block may. */
-struct gpu_buffer_place picture_sums_place(const struct picture *picture, const struct render_context *context);
+struct gpu_buffer_place picture_sums_place(const struct picture *picture, const struct render_wave *wave);
 /* Adds the current slice to a plane: the slice's samples in `sums` from first_sum on. */
-bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
-                        struct gpu_buffer *sums, uint32_t first_sum, struct error *error);
+bool picture_accumulate(struct picture *picture, struct render_wave *wave, uint32_t plane, struct gpu_buffer *sums,
+                        uint32_t first_sum, struct error *error);
 /* Before the first band is read; may be put off (gpu_reserve_begin). */
-bool picture_reserve_pixels(struct picture *picture, const struct render_context *context, struct error *error);
+bool picture_reserve_pixels(struct picture *picture, const struct render_frame *frame, struct error *error);
 /* Announces the programs that accumulate and resolve (gpu_program_announce). */
-void picture_announce(const struct picture *picture, struct render_context *context);
+void picture_announce(const struct picture *picture, struct render_wave *wave);
 /* resolve.c: band of a plane -> picture->resolved. */
-bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
+bool picture_resolve_band(struct picture *picture, const struct render_frame *frame, uint32_t plane, uint32_t band,
                           struct error *error);
 /* readback.c: from there to picture->pixels in two steps, between which the device may have other work: `resolved`
  * is free again after the first. */
-bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+bool picture_copy_band(struct picture *picture, const struct render_frame *frame, struct gpu_readback *copy,
                        uint32_t plane, uint32_t band, struct error *error);
-bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+bool picture_take_band(struct picture *picture, const struct render_frame *frame, struct gpu_readback *copy,
                        uint32_t plane, uint32_t band, struct error *error);
 enum layer picture_plane_layer(const struct picture *picture, uint32_t plane);
 struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band);

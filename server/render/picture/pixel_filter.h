@@ -10,7 +10,7 @@
 #ifndef FARLIGHT_RENDER_PICTURE_PIXEL_FILTER_H
 #define FARLIGHT_RENDER_PICTURE_PIXEL_FILTER_H
 
-#include "render/frame/frame.h"
+#include "render/context/request.h"
 
 #define PIXEL_FILTER_INTERVALS 64
 

@@ -5,19 +5,19 @@
 #ifndef FARLIGHT_RENDER_WAVES_COMPACT_H
 #define FARLIGHT_RENDER_WAVES_COMPACT_H
 
-#include "render/context/context.h"
+#include "render/context/wave.h"
 
 /* In the order of struct wave_state. */
 enum wave_list { WAVE_RAYS, WAVE_RAY_BLOCKS, WAVE_HITS, WAVE_HIT_BLOCKS, WAVE_SHADOW_RAYS };
 
-/* A slice begins: the state of its first wave, of context->ray_count rays. */
-void compact_begin(struct render_context *context);
+/* A slice begins: the state of its first rays, of context->ray_count rays. */
+void compact_begin(struct render_wave *wave);
 /* A slice that the device stopped is done again. */
-void compact_go_on(struct render_context *context);
+void compact_go_on(struct render_wave *wave);
 /* One invocation of the program for each item of the list. */
-void compact_dispatch(struct render_context *context, const struct gpu_program *program, enum wave_list list);
+void compact_dispatch(struct render_wave *wave, const struct gpu_program *program, enum wave_list list);
 /* Lists the hits of the current wave: context->hit_list, hit_places and hit_count. */
-bool compact_hits(struct render_context *context, struct error *error);
+bool compact_hits(struct render_wave *wave, struct error *error);
 struct compact_order {
     uint32_t children_a_hit;
     bool last_queued; /* no wave is queued behind this one, so that no child may be left */
@@ -25,17 +25,17 @@ struct compact_order {
 };
 
 /* The places of the hits' children (context->block_offsets) and their number, context->ray_count. */
-bool compact_children(struct render_context *context, const struct compact_order *order,
-                      struct gpu_buffer *child_counts, struct error *error);
+bool compact_children(struct render_wave *wave, const struct compact_order *order, struct gpu_buffer *child_counts,
+                      struct error *error);
 /* Makes the wave one of `count` shadow rays of each hit. `all_count`: they count as rays of the slice as they are;
  * else the children's scan counts those that are alive. */
-bool compact_shadow_rays(struct render_context *context, uint32_t count, bool all_count, struct wave *wave,
+bool compact_shadow_rays(struct render_wave *wave, uint32_t count, bool all_count, struct wave *rays,
                          struct error *error);
 /* Makes the wave one of the current wave's rays. */
-void compact_rays(struct render_context *context, struct wave *wave);
+void compact_rays(struct render_wave *wave, struct wave *rays);
 
 /* Announce the programs of compact_hits(), and of compact_children() and compact_shadow_rays(). */
-void compact_announce_hits(struct render_context *context);
-void compact_announce_children(struct render_context *context, bool sorts);
+void compact_announce_hits(struct render_wave *wave);
+void compact_announce_children(struct render_wave *wave, bool sorts);
 
 #endif

@@ -17,61 +17,61 @@
 
 /* ---- shadow rays of each hit ---- */
 
-static uint32_t no_shadow_rays(const struct render_context *context)
+static uint32_t no_shadow_rays(const struct render_frame *frame)
 {
-    (void)context;
+    (void)frame;
     return 0;
 }
 
-static uint32_t one_for_each_light(const struct render_context *context)
+static uint32_t one_for_each_light(const struct render_frame *frame)
 {
-    return context->uniforms.light_count;
+    return frame->uniforms.light_count;
 }
 
-static uint32_t one_for_all_lights(const struct render_context *context)
+static uint32_t one_for_all_lights(const struct render_frame *frame)
 {
-    return context->uniforms.light_count > 0 || context_samples_emitters(context);
+    return frame->uniforms.light_count > 0 || context_samples_emitters(frame);
 }
 
-static uint32_t one_for_lights_and_image(const struct render_context *context)
+static uint32_t one_for_lights_and_image(const struct render_frame *frame)
 {
-    return one_for_all_lights(context) || context->environment->kind == ENVIRONMENT_IMAGE;
+    return one_for_all_lights(frame) || frame->environment->kind == ENVIRONMENT_IMAGE;
 }
 
-static uint32_t one_for_the_environment(const struct render_context *context)
+static uint32_t one_for_the_environment(const struct render_frame *frame)
 {
-    const uint32_t kind = context->environment->kind;
+    const uint32_t kind = frame->environment->kind;
     return kind != ENVIRONMENT_NONE && kind != ENVIRONMENT_BACKDROP;
 }
 
-static uint32_t one_each_for_lights_and_environment(const struct render_context *context)
+static uint32_t one_each_for_lights_and_environment(const struct render_frame *frame)
 {
-    return one_for_all_lights(context) + one_for_the_environment(context);
+    return one_for_all_lights(frame) + one_for_the_environment(frame);
 }
 
 /* ---- set-up ---- */
 
-static void set_ao(struct render_context *context, const struct gpu_program *program)
+static void set_ao(const struct render_frame *frame, const struct gpu_program *program)
 {
-    gpu_uniform_float(program, "reach", context_ao_distance(context));
-    gpu_uniform_float(program, "falloff", context->request.ao_falloff);
+    gpu_uniform_float(program, "reach", context_ao_distance(frame));
+    gpu_uniform_float(program, "falloff", frame->request.ao_falloff);
 }
 
-static void set_raycast(struct render_context *context, const struct gpu_program *program)
+static void set_raycast(const struct render_frame *frame, const struct gpu_program *program)
 {
-    float opacity = context->request.layer_opacity;
+    float opacity = frame->request.layer_opacity;
     gpu_uniform_float(program, "layer_opacity", opacity > 0.0f ? opacity : OPACITY_DEFAULT);
 }
 
-size_t integrator_emitter_defines(const struct render_context *context, struct gpu_define *defines)
+size_t integrator_emitter_defines(const struct render_frame *frame, struct gpu_define *defines)
 {
     size_t n = 0;
-    if (!context_samples_emitters(context))
+    if (!context_samples_emitters(frame))
         return 0;
     defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
-    if (context->tracer->impl->sampled)
+    if (frame->tracer->impl->sampled)
         defines[n++] = (struct gpu_define){"EMITTERS_BY_DISTANCE", "1"};
-    if (!context->scene->has_motion)
+    if (!frame->scene->has_motion)
         return n;
     defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
     defines[n++] =
@@ -79,66 +79,66 @@ size_t integrator_emitter_defines(const struct render_context *context, struct g
     return n;
 }
 
-static void set_environment_choice(struct render_context *context, const struct gpu_program *program)
+static void set_environment_choice(const struct render_frame *frame, const struct gpu_program *program)
 {
-    struct environment_choice *choice = context->environment_choice;
+    struct environment_choice *choice = frame->environment_choice;
     gpu_uniform_float(program, "environment_extent", choice->extent);
-    environment_choice_bind(choice, context->device, program);
+    environment_choice_bind(choice, frame->device->gpu, program);
 }
 
-static bool prepare_environment_choice(struct render_context *context, struct error *error)
+static bool prepare_environment_choice(const struct render_frame *frame, struct error *error)
 {
-    return environment_choice_update(context->environment_choice, context->device, context->environment,
-                                     &context->scene->scene->environment, error);
+    return environment_choice_update(frame->environment_choice, frame->device->gpu, frame->environment,
+                                     &frame->scene->scene->environment, error);
 }
 
 /* Of an image; what a mirror sees of other environments its own rays find as well. */
-static size_t distributed_defines(const struct render_context *context, struct gpu_define *defines)
+static size_t distributed_defines(const struct render_wave *wave, struct gpu_define *defines)
 {
-    size_t n = integrator_emitter_defines(context, defines);
-    if (context->environment->kind != ENVIRONMENT_IMAGE || context->environment_choice->rows == 0)
+    size_t n = integrator_emitter_defines(wave->frame, defines);
+    if (wave->frame->environment->kind != ENVIRONMENT_IMAGE || wave->frame->environment_choice->rows == 0)
         return n;
     defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
     return n;
 }
 
-static void set_distributed(struct render_context *context, const struct gpu_program *program)
+static void set_distributed(const struct render_frame *frame, const struct gpu_program *program)
 {
-    if (context->environment->kind == ENVIRONMENT_IMAGE)
-        set_environment_choice(context, program);
+    if (frame->environment->kind == ENVIRONMENT_IMAGE)
+        set_environment_choice(frame, program);
 }
 
-static bool prepare_distributed(struct render_context *context, struct error *error)
+static bool prepare_distributed(const struct render_frame *frame, struct error *error)
 {
-    return context->environment->kind != ENVIRONMENT_IMAGE || prepare_environment_choice(context, error);
+    return frame->environment->kind != ENVIRONMENT_IMAGE || prepare_environment_choice(frame, error);
 }
 
-static size_t path_defines(const struct render_context *context, struct gpu_define *defines)
+static size_t path_defines(const struct render_wave *wave, struct gpu_define *defines)
 {
-    size_t n = integrator_emitter_defines(context, defines);
-    if (context->environment->kind == ENVIRONMENT_IMAGE)
+    size_t n = integrator_emitter_defines(wave->frame, defines);
+    if (wave->frame->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
-    if (context->environment_choice->rows > 0)
+    if (wave->frame->environment_choice->rows > 0)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
-    if (context->request.brdf == BRDF_WARD)
+    if (wave->frame->request.brdf == BRDF_WARD)
         defines[n++] = (struct gpu_define){"WARD", "1"};
     return n;
 }
 
-static void set_path(struct render_context *context, const struct gpu_program *program)
+static void set_path(const struct render_frame *frame, const struct gpu_program *program)
 {
-    gpu_uniform_uint(program, "asks_lights", one_for_all_lights(context));
-    gpu_uniform_uint(program, "asks_environment", one_for_the_environment(context));
-    set_environment_choice(context, program);
+    gpu_uniform_uint(program, "asks_lights", one_for_all_lights(frame));
+    gpu_uniform_uint(program, "asks_environment", one_for_the_environment(frame));
+    set_environment_choice(frame, program);
 }
 
 /* Of scene_features.mirrors nothing is left out, but what a tracer stores is rounded, and a grain narrows a lobe.
  */
-static size_t whitted_defines(const struct render_context *context, struct gpu_define *defines)
+static size_t whitted_defines(const struct render_wave *wave, struct gpu_define *defines)
 {
-    if (context->features.mirrors || context->features.anisotropy || context->sampled_hits ||
-        context->tracer->impl->sampled)
+    if (wave->frame->features.mirrors || wave->frame->features.anisotropy || wave->sampled_hits ||
+        wave->frame->tracer->impl->sampled)
         return 0;
     defines[0] = (struct gpu_define){"SENDS_NOTHING", "1"};
     return 1;

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_RENDER_WAVES_INTEGRATOR_H
 #define FARLIGHT_RENDER_WAVES_INTEGRATOR_H
 
-#include "render/context/context.h"
+#include "render/context/wave.h"
 
 #define INTEGRATOR_DEFINES_MAX 7
 
@@ -21,19 +21,19 @@ struct integrator {
     bool meets_lights;       /* rays hit area lights, by their weights */
     uint32_t shadow_waves;   /* how many waves of shadow rays the buffers hold; no more are traced at once */
     uint32_t straight_waves; /* waves beyond the depth that are left to rays which go straight on */
-    uint32_t (*shadow_rays_a_hit)(const struct render_context *context); /* of the current frame */
+    uint32_t (*shadow_rays_a_hit)(const struct render_frame *frame); /* of the current frame */
     /* The rest may be NULL: none. */
     const char *ground;     /* a define of render/ground.comp */
     const char *left_scene; /* a define of render/left_scene.glsl */
     const char *gather;     /* a define of render/gather.comp */
-    size_t (*defines)(const struct render_context *context, struct gpu_define *defines); /* of the shader */
-    void (*set)(struct render_context *context, const struct gpu_program *program); /* uniforms and bindings */
+    size_t (*defines)(const struct render_wave *wave, struct gpu_define *defines);    /* of the shader */
+    void (*set)(const struct render_frame *frame, const struct gpu_program *program); /* uniforms and bindings */
     /* At the start of a frame and when the capacity of its waves grows. */
-    bool (*prepare)(struct render_context *context, struct error *error);
+    bool (*prepare)(const struct render_frame *frame, struct error *error);
 };
 
 /* For programs that choose among emissive triangles: at most 4. Returns how many. */
-size_t integrator_emitter_defines(const struct render_context *context, struct gpu_define *defines);
+size_t integrator_emitter_defines(const struct render_frame *frame, struct gpu_define *defines);
 
 /* By frame_request's number; NULL: there is none. */
 const struct integrator *integrator_by_number(unsigned number);

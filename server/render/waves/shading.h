@@ -1,46 +1,52 @@
 /* SPDX-License-Identifier: MIT */
-/* The passes of a wave, by an integrator's row: what left the scene, what hits send out and ask for, shadow rays
- * traced and gathered, children made the next wave. */
+/* The passes that shade a wave, by an integrator's row: the light that hits send out and ask for, shadow rays
+ * traced and gathered, light of paths that left the scene, children made the next wave and traced. */
 #ifndef FARLIGHT_RENDER_WAVES_SHADING_H
 #define FARLIGHT_RENDER_WAVES_SHADING_H
 
+#include "render/context/pass.h"
 #include "render/waves/integrator.h"
 
-enum wave_progress {
-    WAVE_FAILED,
-    WAVE_AGAIN,    /* the current wave is not finished: call again */
-    WAVE_MORE,     /* the context holds the next wave's rays and paths, not yet traced */
-    WAVE_DONE,     /* no ray is left */
-    WAVE_OVERFLOW, /* the next wave is larger than its capacity: the slice must be done again, in parts */
+/* Surfaces that are no part of the scene, beside those that the integrator shades. */
+struct shading_extra {
+    bool (*is_shown)(const struct render_frame *frame);
+    /* Shadow rays of each hit, the integrator's included. */
+    uint32_t (*shadow_rays)(const struct render_frame *frame);
+    bool (*prepare)(const struct render_frame *frame, struct error *error); /* with the shading's buffers */
+    /* Makes hits of the wave's rays that meet such a surface, before hits are listed. Inside a span. */
+    bool (*make_hits)(struct render_wave *wave, struct error *error);
+    /* Shades these hits anew, after the integrator has shaded all; and makes dead shadow rays of other hits in the
+     * places that the integrator leaves: first .. first + count - 1 of each hit. What a shading pass reads and
+     * writes is bound, but for the program. Inside a span. */
+    bool (*shade)(struct render_wave *wave, uint32_t first, uint32_t count, struct error *error);
 };
 
-/* Its buffers. Owner: a frame's work. */
-struct wave_passes {
-    const struct integrator *integrator; /* NULL: not set up; otherwise all-zero */
+/* Buffers of the shading passes. Owner: a frame's work. */
+struct wave_shading {
+    const struct shading_extra *extra;
+    bool is_wanted;    /* the frame needs the waves' light, or what shading notes */
+    bool has_children; /* the wave holds children's rays and paths, not yet traced */
     struct gpu_buffer radiance, children, child_counts;
     struct gpu_buffer shadow_rays, shadow_times, visibility, light_samples;
 };
 
-void wave_passes_finish(struct wave_passes *passes, struct gpu_device *device); /* leaves it all-zero */
-/* Makes the buffers fit context->wave_capacity; at the start of a frame and when the capacity grows. */
-bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error);
-uint64_t wave_passes_device_bytes(const struct wave_passes *passes);
-/* Shades the wave whose hits the context holds and adds it to slice_sums. A batch of shadow rays, as many of each
- * hit as the buffers hold, is made in one call and traced in the next ones; their number goes to
- * context->shadow_rays. A call is short. */
-enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_context *context,
-                                     struct error *error);
+/* Shades the wave whose hits are listed and adds its light to the slice's sums. A batch of shadow rays, as many of
+ * each hit as the buffers hold, is made in one step and traced in the next ones; wave->shadow_rays counts them. */
+extern const struct pass shading_pass;
+/* Traces the children, as the next wave, and lists its hits. Same state. */
+extern const struct pass bounce_pass;
 
+uint64_t wave_shading_device_bytes(const struct wave_shading *shading);
 /* Whether hits are likely to send rays on. If they do all the same, slices whose waves do not fit are split. */
-bool wave_passes_expect_bounces(const struct wave_passes *passes, const struct render_context *context);
+bool wave_shading_expects_bounces(const struct render_frame *frame);
 /* Announces the programs that every frame of the integrator needs (gpu_program_announce): those of its first wave,
  * and of its bounces where there will be some. */
-void wave_passes_announce(struct wave_passes *passes, struct render_context *context);
-/* Announces those that shade its first hits and trace their shadow rays, which take longest to compile. */
-void wave_passes_announce_long(struct wave_passes *passes, struct render_context *context);
-/* Announces the one that shades hits, which is the longest of many materials. */
-void wave_passes_announce_hits(struct wave_passes *passes, struct render_context *context);
-/* Announces those of the first wave that trace nothing. */
-void wave_passes_announce_shading(struct wave_passes *passes, struct render_context *context);
+void wave_shading_announce(struct wave_shading *shading, struct render_wave *wave);
+/* Announces programs that shade first hits and trace their shadow rays, which take longest to compile. */
+void wave_shading_announce_long(struct wave_shading *shading, struct render_wave *wave);
+/* Announces the program that shades hits, the longest one in scenes of many materials. */
+void wave_shading_announce_hits(struct wave_shading *shading, struct render_wave *wave);
+/* Announces programs of the first wave that trace nothing. */
+void wave_shading_announce_shading(struct wave_shading *shading, struct render_wave *wave);
 
 #endif

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_RENDER_WAVES_TRACE_H
 #define FARLIGHT_RENDER_WAVES_TRACE_H
 
-#include "render/context/context.h"
+#include "render/context/wave.h"
 #include "render/compare/rays.h"
 
 /* Traces a wave with the frame's tracer: a short step of it, and so from step to step until *done. What is in the
@@ -13,10 +13,10 @@
  *
  * The size of a step follows the clock, as the cost of a ray differs a hundredfold between tracers, scenes and
  * machines; the results do not depend on it. */
-bool wave_trace(struct render_context *context, enum ray_kind kind, const struct wave *wave, bool *done,
+bool wave_trace(struct render_wave *wave, enum ray_kind kind, const struct wave *rays, bool *done,
                 struct error *error);
 
 /* Announces the programs that such a wave needs. */
-void wave_announce(struct render_context *context, const struct wave *wave);
+void wave_announce(struct render_wave *wave, const struct wave *rays);
 
 #endif

@@ -24,21 +24,35 @@ static void reserve(struct gpu_buffer *buffer, size_t bytes)
     gpu_buffer_clear(device, buffer, 0);
 }
 
-static void begin(struct render_context *context, uint32_t ray_count)
+/* A wave with what the compaction uses of its frame. */
+struct compacted {
+    struct render_device device;
+    struct render_frame frame;
+    struct render_wave wave;
+};
+
+static void begin(struct compacted *compacted, uint32_t ray_count)
 {
-    *context = (struct render_context){
-        .device = device, .counts_on_host = true, .ray_count = ray_count, .wave_capacity = 8 * RAYS_MAX};
-    reserve(&context->hits, RAYS_MAX * sizeof(struct hit));
-    reserve(&context->hit_list, (RAYS_MAX + 1) * sizeof(uint32_t));
-    reserve(&context->hit_places, RAYS_MAX * sizeof(uint32_t));
-    reserve(&context->block_offsets, OCTANTS * BLOCKS_MAX * sizeof(uint32_t[2]));
-    reserve(&context->wave_state, sizeof(struct wave_state));
+    *compacted = (struct compacted){
+        .device = {.gpu = device, .counts_on_host = true},
+        .frame = {.device = &compacted->device},
+        .wave = {.device = &compacted->device,
+                 .frame = &compacted->frame,
+                 .ray_count = ray_count,
+                 .capacity = 8 * RAYS_MAX},
+    };
+    struct render_wave *wave = &compacted->wave;
+    reserve(&wave->hits, RAYS_MAX * sizeof(struct hit));
+    reserve(&wave->hit_list, (RAYS_MAX + 1) * sizeof(uint32_t));
+    reserve(&wave->hit_places, RAYS_MAX * sizeof(uint32_t));
+    reserve(&wave->block_offsets, OCTANTS * BLOCKS_MAX * sizeof(uint32_t[2]));
+    reserve(&wave->state, sizeof(struct wave_state));
 }
 
-static void finish(struct render_context *context)
+static void finish(struct render_wave *wave)
 {
-    struct gpu_buffer *buffers[] = {&context->hits, &context->hit_list, &context->hit_places,
-                                    &context->block_offsets, &context->wave_state};
+    struct gpu_buffer *buffers[] = {&wave->hits, &wave->hit_list, &wave->hit_places, &wave->block_offsets,
+                                    &wave->state};
     for (size_t i = 0; i < sizeof(buffers) / sizeof(buffers[0]); i++)
         gpu_buffer_finish(device, buffers[i]);
 }
@@ -53,22 +67,22 @@ static void expect_same(const struct gpu_buffer *a, const struct gpu_buffer *b, 
     free(of_b);
 }
 
-/* Both the host's and the device's way of two contexts that hold the same. */
-static void compact_by(bool host, struct render_context *context, struct gpu_buffer *child_counts, bool sorts)
+/* Both the host's and the device's way of two waves that hold the same. */
+static void compact_by(bool host, struct render_wave *wave, struct gpu_buffer *child_counts, bool sorts)
 {
     const struct gpu_facts facts = device->facts;
     const struct compact_order order = {.children_a_hit = 4, .sorts = sorts};
     struct error error = {0};
     device->facts.shares_memory = host && facts.shares_memory;
-    compact_begin(context);
-    expect_ok(compact_hits(context, &error) && compact_children(context, &order, child_counts, &error), &error);
+    compact_begin(wave);
+    expect_ok(compact_hits(wave, &error) && compact_children(wave, &order, child_counts, &error), &error);
     device->facts = facts;
 }
 
 /* Waves are sorted by integrators whose hits have one child. */
 static void expect_same_compaction(uint32_t ray_count, float hit_share, uint32_t octants, bool sorts)
 {
-    struct render_context contexts[2];
+    struct compacted compacted[2];
     struct gpu_buffer child_counts = {0};
     struct hit *hits = calloc(RAYS_MAX, sizeof(*hits));
     uint32_t *counts = calloc(RAYS_MAX, sizeof(*counts));
@@ -82,24 +96,24 @@ static void expect_same_compaction(uint32_t ray_count, float hit_share, uint32_t
     reserve(&child_counts, RAYS_MAX * sizeof(*counts));
     gpu_buffer_write(device, &child_counts, 0, counts, RAYS_MAX * sizeof(*counts));
     for (int i = 0; i < 2; i++) {
-        begin(&contexts[i], ray_count);
-        gpu_buffer_write(device, &contexts[i].hits, 0, hits, RAYS_MAX * sizeof(*hits));
-        compact_by(i == 0, &contexts[i], &child_counts, sorts);
+        begin(&compacted[i], ray_count);
+        gpu_buffer_write(device, &compacted[i].wave.hits, 0, hits, RAYS_MAX * sizeof(*hits));
+        compact_by(i == 0, &compacted[i].wave, &child_counts, sorts);
     }
-    const struct render_context *host = &contexts[0], *shaders = &contexts[1];
+    const struct render_wave *host = &compacted[0].wave, *shaders = &compacted[1].wave;
     assert_int_equal(host->hit_count, shaders->hit_count);
     assert_int_equal(host->ray_count, shaders->ray_count);
     expect_same(&host->hit_list, &shaders->hit_list, host->hit_count, sizeof(uint32_t));
     expect_same(&host->hit_places, &shaders->hit_places, ray_count, sizeof(uint32_t));
-    expect_same(&host->wave_state, &shaders->wave_state, 1, sizeof(struct wave_state));
+    expect_same(&host->state, &shaders->state, 1, sizeof(struct wave_state));
     const uint32_t blocks = (host->hit_count + COMPACT_BLOCK - 1) / COMPACT_BLOCK;
     uint32_t offsets[2][OCTANTS * BLOCKS_MAX][2];
     for (int i = 0; i < 2; i++)
-        gpu_buffer_read(device, &contexts[i].block_offsets, 0, offsets[i], sizeof(offsets[i]));
+        gpu_buffer_read(device, &compacted[i].wave.block_offsets, 0, offsets[i], sizeof(offsets[i]));
     for (uint32_t k = 0; host->ray_count > 0 && k < blocks * (host->known_state.sorted ? OCTANTS : 1); k++)
         assert_int_equal(offsets[0][k][0], offsets[1][k][0]); /* the other number is of the scan alone */
     for (int i = 0; i < 2; i++)
-        finish(&contexts[i]);
+        finish(&compacted[i].wave);
     gpu_buffer_finish(device, &child_counts);
     free(counts);
     free(hits);

@@ -4,10 +4,14 @@
 #ifndef FARLIGHT_RENDER_PASSES_DENOISE_FILTER_H
 #define FARLIGHT_RENDER_PASSES_DENOISE_FILTER_H
 
+#include "render/context/pass.h"
 #include "render/passes/denoise/history.h"
 #include "render/passes/denoise/sums.h"
 
 struct denoise_filter {
+    struct denoise_sums *sums; /* these three are the renderer's */
+    struct denoise_history *history;
+    struct picture *picture;
     struct gpu_buffer notes;                   /* of the slice in hand */
     struct gpu_buffer guides, slopes;          /* of what is seen */
     struct gpu_buffer motions;                 /* where the sums have them */
@@ -19,12 +23,14 @@ struct denoise_filter {
     uint32_t pass, row;             /* that the next step does; row: of the strip, or of the picture */
 };
 
-/* Behind the last sample of a frame. */
-void denoise_begin(struct denoise_filter *filter);
-/* A step of some milliseconds, where the device is software; *done: DENOISE_SUM_RESULT has the picture. */
-bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
-                  struct render_context *context, const struct picture *picture, bool *done, struct error *error);
+/* Notes what the hits of a slice are, for its denoiser. */
+extern const struct pass guides_pass;
+/* Filters a picture whose samples are complete: DENOISE_SUM_RESULT has it then. Same state. */
+extern const struct pass denoise_pass;
+
+/* A picture begins. */
+void denoise_begin(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
+                   struct picture *picture);
 uint64_t denoise_filter_device_bytes(const struct denoise_filter *filter);
-void denoise_filter_finish(struct denoise_filter *filter, struct gpu_device *device);
 
 #endif

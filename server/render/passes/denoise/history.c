@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/passes/denoise/history.h"
 
+#include "render/context/camera.h"
 #include "render/passes/denoise/sums.h"
 #include "render/context/request.h"
 #include "shared/denoise.h"
@@ -9,11 +10,11 @@
 #include <stdlib.h>
 
 /* Of one eye through a pinhole: the pixels of others see what several places of another picture show. */
-static bool may_keep(const struct render_context *context)
+static bool may_keep(const struct render_frame *frame)
 {
-    const struct frame_request *request = &context->request;
-    return request->history != HISTORY_NONE && denoise_is_wanted(context) && !frame_has_views(request) &&
-           request->aperture == 0.0f && request->noise == 0.0f && !context->scene->has_motion;
+    const struct frame_request *request = &frame->request;
+    return request->history != HISTORY_NONE && denoise_is_wanted(frame) && !frame_has_views(request) &&
+           request->aperture == 0.0f && request->noise == 0.0f && !frame->scene->has_motion;
 }
 
 /* The same scene; while it moves perhaps in another pose. */
@@ -27,7 +28,7 @@ static bool is_followed(const struct denoise_kept *before, const struct denoise_
            frame_request_same_radiance(&same, &now->request);
 }
 
-static bool upload_moved(struct denoise_history *history, struct render_context *context,
+static bool upload_moved(struct denoise_history *history, const struct render_frame *frame,
                          const struct denoise_kept *before, const struct denoise_kept *now, struct error *error)
 {
     const size_t bytes = now->places.count * sizeof(float[12]);
@@ -35,37 +36,37 @@ static bool upload_moved(struct denoise_history *history, struct render_context 
     if (!moved)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for what has moved");
     denoise_places_compare(&before->places, &now->places, moved);
-    const bool uploaded = gpu_buffer_upload(context->device, &history->moved, moved, bytes, error);
+    const bool uploaded = gpu_buffer_upload(frame->device->gpu, &history->moved, moved, bytes, error);
     free(moved);
     return uploaded;
 }
 
-bool denoise_history_begin(struct denoise_history *history, struct render_context *context, uint64_t showing,
+bool denoise_history_begin(struct denoise_history *history, struct render_frame *frame, uint64_t showing,
                            bool goes_on, struct error *error)
 {
     history->is_written = history->is_used = history->is_moving = history->things_moved = false;
-    if (context->request.hidden_layer > 0) /* of the picture that was written last */
+    if (frame->request.hidden_layer > 0) /* of the picture that was written last */
         return true;
-    if (!may_keep(context)) {
-        denoise_history_finish(history, context->device);
+    if (!may_keep(frame)) {
+        denoise_history_finish(history, frame->device->gpu);
         return true;
     }
     if (!goes_on && history->kept[history->now].whole)
         history->now = 1 - history->now;
     struct denoise_kept *now = &history->kept[history->now], *before = &history->kept[1 - history->now];
-    now->request = context->request;
+    now->request = frame->request;
     now->showing = showing;
-    now->revision = context->scene->revision;
+    now->revision = frame->scene->revision;
     now->whole = false;
-    denoise_places_note(&now->places, context->scene);
+    denoise_places_note(&now->places, frame->scene);
     before->whole = is_followed(before, now);
     history->is_written = true;
-    history->is_used = before->whole && context->request.history != HISTORY_KEPT;
-    history->is_moving = context->request.history == HISTORY_MOVING;
+    history->is_used = before->whole && frame->request.history != HISTORY_KEPT;
+    history->is_moving = frame->request.history == HISTORY_MOVING;
     if (history->is_moving)
-        context->uniforms.seed ^= (history->moving + 1) * 0x9e3779b9u;
+        frame->uniforms.seed ^= (history->moving + 1) * 0x9e3779b9u;
     history->things_moved = history->is_used && before->showing != showing;
-    return !history->things_moved || upload_moved(history, context, before, now, error);
+    return !history->things_moved || upload_moved(history, frame, before, now, error);
 }
 
 struct gpu_buffer *denoise_history_moved(struct denoise_history *history)
@@ -73,19 +74,19 @@ struct gpu_buffer *denoise_history_moved(struct denoise_history *history)
     return history->things_moved ? &history->moved : NULL;
 }
 
-bool denoise_history_reserve(struct denoise_history *history, struct render_context *context, bool fits,
+bool denoise_history_reserve(struct denoise_history *history, const struct render_frame *frame, bool fits,
                              bool has_motion, struct error *error)
 {
-    const struct frame_request *request = &context->request;
+    const struct frame_request *request = &frame->request;
     struct denoise_kept *now = &history->kept[history->now];
-    now->uniforms = context->uniforms;
+    now->uniforms = frame->uniforms;
     history->is_written = history->is_written && fits;
     history->is_used = history->is_used && fits && (has_motion || !history->things_moved);
     const size_t bytes = (size_t)request->width * request->height * sizeof(uvec4);
-    return !history->is_written || gpu_buffer_reserve(context->device, &now->pixels, bytes, error);
+    return !history->is_written || gpu_buffer_reserve(frame->device->gpu, &now->pixels, bytes, error);
 }
 
-void denoise_history_bind(struct denoise_history *history, struct render_context *context,
+void denoise_history_bind(struct denoise_history *history, const struct render_frame *frame,
                           const struct gpu_program *program, uint32_t samples)
 {
     struct denoise_kept *now = &history->kept[history->now], *before = &history->kept[1 - history->now];
@@ -95,8 +96,8 @@ void denoise_history_bind(struct denoise_history *history, struct render_context
                       !history->is_used       ? 0.0f
                       : history->things_moved ? DENOISE_HISTORY_POSED_MAX
                                               : DENOISE_HISTORY_MAX);
-    gpu_buffer_bind_texels(context->device, history->is_used ? &before->pixels : &now->pixels, UNIT_DENOISE_FIRST,
-                           GL_RGBA32UI);
+    gpu_buffer_bind_texels(frame->device->gpu, history->is_used ? &before->pixels : &now->pixels,
+                           UNIT_DENOISE_FIRST, GL_RGBA32UI);
     const struct frame_uniforms *u = &before->uniforms;
     gpu_uniform_vec(program, "before_row_0", 4, u->world_from_view[0]);
     gpu_uniform_vec(program, "before_row_1", 4, u->world_from_view[1]);

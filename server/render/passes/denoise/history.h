@@ -6,7 +6,7 @@
 #ifndef FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
 #define FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
 
-#include "render/context/context.h"
+#include "render/context/wave.h"
 #include "render/passes/denoise/places.h"
 #include "render/picture/picture.h"
 
@@ -33,16 +33,16 @@ struct denoise_history {
 
 /* Once it is known what the frame shows. `goes_on`: it adds samples to the picture that was written last, and
  * follows the one before that. */
-bool denoise_history_begin(struct denoise_history *history, struct render_context *context, uint64_t showing,
+bool denoise_history_begin(struct denoise_history *history, struct render_frame *frame, uint64_t showing,
                            bool goes_on, struct error *error);
 /* How things have moved since the picture before; NULL: not at all. */
 struct gpu_buffer *denoise_history_moved(struct denoise_history *history);
 /* `fits`: the picture is filtered in one strip, and the guides are those of first hits; others have no history.
  * `has_motion`: of each pixel it is known how it has moved. False: there is no memory. */
-bool denoise_history_reserve(struct denoise_history *history, struct render_context *context, bool fits,
+bool denoise_history_reserve(struct denoise_history *history, const struct render_frame *frame, bool fits,
                              bool has_motion, struct error *error);
 /* For the pass that reprojects, of a picture of so many samples. */
-void denoise_history_bind(struct denoise_history *history, struct render_context *context,
+void denoise_history_bind(struct denoise_history *history, const struct render_frame *frame,
                           const struct gpu_program *program, uint32_t samples);
 /* The picture in hand, behind that pass. */
 struct gpu_buffer *denoise_history_pixels(struct denoise_history *history);

@@ -23,36 +23,35 @@ float denoise_strength(const struct frame_request *request, uint32_t samples)
     return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
 }
 
-bool denoise_notes_samples(const struct render_context *context)
+bool denoise_notes_samples(const struct render_frame *frame)
 {
-    return denoise_is_wanted(context) &&
-           denoise_strength(&context->request, context->uniforms.sample_index) > 0.0f;
+    return denoise_is_wanted(frame) && denoise_strength(&frame->request, frame->uniforms.sample_index) > 0.0f;
 }
 
-bool denoise_is_wanted(const struct render_context *context)
+bool denoise_is_wanted(const struct render_frame *frame)
 {
-    const struct frame_request *request = &context->request;
+    const struct frame_request *request = &frame->request;
     /* How many samples come to one that others will be added to is not known. */
     const uint32_t samples = request->accumulate ? 1 : request->samples;
-    return denoise_strength(request, samples) > 0.0f && integrator_by_number(request->integrator)->random &&
+    return denoise_strength(request, samples) > 0.0f && frame->integrator->random &&
            frame_request_planes(request) & 1u << LAYER_BEAUTY && !request->hidden_layer &&
            request->view_source != VIEW_SOURCE_LAYERS;
 }
 
-const struct gpu_program *denoise_use(struct render_context *context, const struct denoise_sums *sums,
+const struct gpu_program *denoise_use(const struct render_frame *frame, const struct denoise_sums *sums,
                                       const char *shader, bool reprojected, struct error *error)
 {
     struct gpu_define defines[4] = {0};
     size_t count = 0;
-    if (context->tile_samples)
+    if (frame->tile_samples)
         defines[count++] = (struct gpu_define){"HAS_TILE_SAMPLES", "1"};
     if (reprojected)
         defines[count++] = (struct gpu_define){"HAS_REPROJECTED", "1"};
     if (sums->has_motion)
         defines[count++] = (struct gpu_define){"HAS_NOTED_MOTION", "1"};
-    const struct gpu_program *program = context_use_with(context, shader, defines, error);
-    if (program && context->tile_samples)
-        gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+    const struct gpu_program *program = context_use_with(frame->device, shader, defines, error);
+    if (program && frame->tile_samples)
+        gpu_buffer_bind_texels(frame->device->gpu, frame->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
     return program;
 }
 
@@ -61,21 +60,21 @@ struct gpu_buffer *denoise_sums_band(const struct denoise_sums *sums, enum denoi
     return &sums->bands[(uint32_t)sum * sums->band_count + band];
 }
 
-bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
+bool denoise_sums_begin(struct denoise_sums *sums, const struct render_frame *frame, const struct picture *picture,
                         uint32_t samples_before, const struct denoise_history *history, struct error *error)
 {
-    struct gpu_device *device = context->device;
+    struct gpu_device *device = frame->device->gpu;
     const struct denoise_sums before = *sums;
-    if (sums->band_count != picture->band_count || !denoise_is_wanted(context))
+    if (sums->band_count != picture->band_count || !denoise_is_wanted(frame))
         denoise_sums_finish(sums, device);
-    if (!denoise_is_wanted(context))
+    if (!denoise_is_wanted(frame))
         return true;
     if (!sums->bands)
         sums->bands = calloc((size_t)picture->band_count * DENOISE_SUM_COUNT, sizeof(*sums->bands));
     if (!sums->bands)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the sums of a denoised picture");
     sums->band_count = picture->band_count;
-    const bool is_clear = context->features.clear && context->request.depth > 0;
+    const bool is_clear = frame->features.clear && frame->request.depth > 0;
     sums->follows = samples_before > 0 ? before.follows : is_clear && !history->is_written;
     sums->has_motion = samples_before > 0 ? before.has_motion : sums->follows || history->things_moved;
     for (uint32_t band = 0; band < sums->band_count; band++) {
@@ -94,69 +93,70 @@ bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *contex
 
 /* In use, with all that it reads. */
 static const struct gpu_program *note_program(const struct denoise_sums *sums, struct gpu_buffer *notes,
-                                              struct gpu_buffer *moved, bool follows,
-                                              struct render_context *context, struct error *error)
+                                              struct gpu_buffer *moved, bool follows, struct render_wave *wave,
+                                              struct error *error)
 {
     struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 4] = {0};
-    size_t count = context_surface_defines(context, defines);
+    size_t count = context_surface_defines(wave, defines);
     if (sums->has_motion)
         defines[count++] = (struct gpu_define){"HAS_NOTED_MOTION", "1"};
     if (sums->has_motion && moved)
         defines[count++] = (struct gpu_define){"HAS_MOVED", "1"};
     if (follows)
         defines[count++] = (struct gpu_define){"FOLLOWS", "1"};
-    const struct gpu_program *program = context_use_with(context, "render/denoise_note.comp", defines, error);
+    const struct gpu_program *program = context_use_with(wave->device, "render/denoise_note.comp", defines, error);
     if (!program)
         return NULL;
-    context_bind_hits(context);
+    context_bind_hits(wave);
     gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
     if (sums->has_motion && moved)
-        gpu_buffer_bind_texels(context->device, moved, UNIT_DENOISE_MOVED, GL_RGBA32F);
-    gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
+        gpu_buffer_bind_texels(wave->device->gpu, moved, UNIT_DENOISE_MOVED, GL_RGBA32F);
+    gpu_uniform_uint(program, "first_slot", wave->slice.first_slot);
     return program;
 }
 
 bool denoise_note(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
-                  struct render_context *context, struct error *error)
+                  struct render_wave *wave, struct error *error)
 {
-    const size_t bytes = (size_t)context->ray_count * DENOISE_NOTE_TEXELS_MAX * sizeof(vec4);
-    if (!gpu_buffer_reserve(context->device, notes, bytes, error))
+    const size_t bytes = (size_t)wave->ray_count * DENOISE_NOTE_TEXELS_MAX * sizeof(vec4);
+    if (!gpu_buffer_reserve(wave->device->gpu, notes, bytes, error))
         return false;
-    context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = note_program(sums, notes, moved, false, context, error);
+    context_span_begin(wave->device, STAGE_SHADE);
+    const struct gpu_program *program = note_program(sums, notes, moved, false, wave, error);
     if (program) {
-        gpu_uniform_uint(program, "ray_count", context->ray_count);
-        gpu_dispatch(context->device, program, context->ray_count);
+        gpu_uniform_uint(program, "ray_count", wave->ray_count);
+        gpu_dispatch(wave->device->gpu, program, wave->ray_count);
     }
-    context_span_end(context);
-    return program && gpu_check(context->device, "what guides the denoiser", error);
+    context_span_end(wave->device);
+    return program && gpu_check(wave->device->gpu, "what guides the denoiser", error);
 }
 
 bool denoise_follow(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
-                    struct render_context *context, struct error *error)
+                    struct render_wave *wave, struct error *error)
 {
-    if (!sums->follows || context->wave_number > DENOISE_WAVES_MAX)
+    if (!sums->follows || wave->number > DENOISE_WAVES_MAX)
         return true;
-    context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = note_program(sums, notes, moved, true, context, error);
+    context_span_begin(wave->device, STAGE_SHADE);
+    const struct gpu_program *program = note_program(sums, notes, moved, true, wave, error);
     if (program)
-        compact_dispatch(context, program, WAVE_RAYS);
-    context_span_end(context);
-    return program && gpu_check(context->device, "what mirrors show the denoiser", error);
+        compact_dispatch(wave, program, WAVE_RAYS);
+    context_span_end(wave->device);
+    return program && gpu_check(wave->device->gpu, "what mirrors show the denoiser", error);
 }
 
-bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
+bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_wave *wave,
                         const struct picture *picture, struct error *error)
 {
     uint32_t first_slot;
-    const struct gpu_buffer *own = picture_slice_band(picture, &context->slice, &first_slot);
+    const struct gpu_buffer *own = picture_slice_band(picture, &wave->slice, &first_slot);
     const uint32_t band = (uint32_t)(own - picture->bands);
-    const struct gpu_program *program = denoise_use(context, sums, "render/denoise_accumulate.comp", false, error);
+    const struct gpu_program *program =
+        denoise_use(wave->frame, sums, "render/denoise_accumulate.comp", false, error);
     if (!program)
         return false;
-    if (context->tile_samples)
-        gpu_uniform_uint(program, "first_picture_slot", context->slice.first_slot);
-    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    if (wave->frame->tile_samples)
+        gpu_uniform_uint(program, "first_picture_slot", wave->slice.first_slot);
+    gpu_buffer_bind_storage(&wave->slice_sums, BIND_SLICE_SUMS);
     gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
     gpu_buffer_bind_storage(picture_band(picture, 0, band), BIND_DENOISE_SUM);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_DOUBLED, band), BIND_DENOISE_DOUBLED);
@@ -165,14 +165,14 @@ bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, str
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_NORMAL, band), BIND_DENOISE_NORMAL);
     if (sums->has_motion)
         gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_MOTION, band), BIND_DENOISE_MOTION);
-    gpu_buffer_bind_uniform(&context->wave_state, UNIFORM_WAVE);
+    gpu_buffer_bind_uniform(&wave->state, UNIFORM_WAVE);
     gpu_uniform_uint(program, "first_slot", first_slot);
-    gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
-    gpu_uniform_uint(program, "sample_index", context->uniforms.sample_index);
-    gpu_uniform_uint(program, "sample_shift", context->uniforms.sample_shift);
-    context_span_begin(context, STAGE_SHADE);
-    gpu_dispatch(context->device, program, context->slice.slot_count);
-    context_span_end(context);
+    gpu_uniform_uint(program, "slot_count", wave->slice.slot_count);
+    gpu_uniform_uint(program, "sample_index", wave->frame->uniforms.sample_index);
+    gpu_uniform_uint(program, "sample_shift", wave->frame->uniforms.sample_shift);
+    context_span_begin(wave->device, STAGE_SHADE);
+    gpu_dispatch(wave->device->gpu, program, wave->slice.slot_count);
+    context_span_end(wave->device);
     return true;
 }
 

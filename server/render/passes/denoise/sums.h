@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
 #define FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
 
-#include "render/context/context.h"
+#include "render/context/wave.h"
 #include "render/passes/denoise/history.h"
 #include "render/picture/picture.h"
 
@@ -29,28 +29,28 @@ struct denoise_sums {
 
 /* Whether the frame has noise, and is to lose it: of those that trace no rays at random, and of pictures made from
  * others, nothing is noted and nothing changes. */
-bool denoise_is_wanted(const struct render_context *context);
+bool denoise_is_wanted(const struct render_frame *frame);
 /* The same of the samples in hand: of DENOISE_AUTO those behind the last that it looks at are not noted. */
-bool denoise_notes_samples(const struct render_context *context);
+bool denoise_notes_samples(const struct render_frame *frame);
 /* How much of the filtering a picture of that many samples gets, 0 to 1. */
 float denoise_strength(const struct frame_request *request, uint32_t samples);
 /* One of the programs that ask how many samples a pixel has: its tile may have stopped. `reprojected`: the light
  * of the picture has that of pictures before in it. */
-const struct gpu_program *denoise_use(struct render_context *context, const struct denoise_sums *sums,
+const struct gpu_program *denoise_use(const struct render_frame *frame, const struct denoise_sums *sums,
                                       const char *shader, bool reprojected, struct error *error);
 /* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
-bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
+bool denoise_sums_begin(struct denoise_sums *sums, const struct render_frame *frame, const struct picture *picture,
                         uint32_t samples_before, const struct denoise_history *history, struct error *error);
 /* The context has hits of a new slice: notes what they are. `moved`: see denoise_history_moved(). Inside no span.
  */
 bool denoise_note(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
-                  struct render_context *context, struct error *error);
+                  struct render_wave *wave, struct error *error);
 /* It has those of the rays that these have sent on: of what is seen in mirrors and through glass they say more. */
 bool denoise_follow(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
-                    struct render_context *context, struct error *error);
+                    struct render_wave *wave, struct error *error);
 /* Adds the current slice, before the picture has it. Call it once the slice cannot be repeated, but on the device.
  */
-bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
+bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_wave *wave,
                         const struct picture *picture, struct error *error);
 struct gpu_buffer *denoise_sums_band(const struct denoise_sums *sums, enum denoise_sum sum, uint32_t band);
 uint64_t denoise_sums_device_bytes(const struct denoise_sums *sums);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Layers of a key view: rendered one by one as pictures, all of them or only marked tiles, and kept. */
 #include "render/passes/key_view/key_view.h"
 
 #include "render/waves/compact.h"
@@ -10,11 +11,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Samples of a lens that are not traced, beside each that is: gather_views.comp. Of panels before a chequered
- * wall, by software GL, three give 4 samples a pixel the noise of 12 (41.9 dB in place of 36.3, 16 have 44.0) for
- * 14 % more time; seven 0.3 dB more for another 12 %, one 39.9 for 11 %. */
-#define LENS_MORE 3
 
 /* Samples of a pixel for each of a texel. A pixel's samples, spread by its filter, look at four texels each, so
  * that a quarter of them in a texel gives the noise of a picture that is rendered with all: of a sharp classroom
@@ -76,37 +72,37 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 
 /* ---- layers ---- */
 
-static const struct gpu_program *keep_program(struct render_context *context, struct error *error)
+static const struct gpu_program *keep_program(const struct render_frame *frame, struct error *error)
 {
-    const struct gpu_define defines[] = {{context->marked_key ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
-    return context_use_with(context, "render/keep_layer.comp", defines, error);
+    const struct gpu_define defines[] = {{frame->tiles.list ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
+    return context_use_with(frame->device, "render/keep_layer.comp", defines, error);
 }
 
-bool key_view_keep_band(struct key_view *key, struct render_context *context, uint32_t layer, uint32_t band,
+bool key_view_keep_band(struct key_view *key, const struct render_frame *frame, uint32_t layer, uint32_t band,
                         struct error *error)
 {
     struct picture *sums = &key->sums;
-    const struct gpu_program *program = keep_program(context, error);
+    const struct gpu_program *program = keep_program(frame, error);
     if (!program)
         return false;
     uint32_t first_slot = 0;
     const uint32_t slots = picture_band_slots(sums, band, &first_slot);
-    context_span_begin(context, STAGE_RESOLVE);
-    context_bind(context);
+    context_span_begin(frame->device, STAGE_RESOLVE);
+    context_bind_frame(frame);
     gpu_buffer_bind_storage(picture_band(sums, 0, band), BIND_ACCUMULATION); /* the beauty; then the depth */
     gpu_buffer_bind_storage(picture_band(sums, 1, band), BIND_KEY_DEPTHS);
     gpu_buffer_bind_storage(&key->layers[layer], BIND_KEY_LAYER);
-    context_bind_tiles(context, program);
+    context_bind_tiles(frame, program);
     gpu_uniform_uint(program, "slot_count", slots);
     gpu_uniform_uint(program, "first_slot", first_slot);
     gpu_uniform_float(program, "scale", 1.0f / (float)sums->samples);
     gpu_uniform_uint(program, "shows_environment", layer == 0);
-    gpu_dispatch(context->device, program, slots);
-    context_span_end(context);
-    return gpu_check(context->device, "keeping a layer", error);
+    gpu_dispatch(frame->device->gpu, program, slots);
+    context_span_end(frame->device);
+    return gpu_check(frame->device->gpu, "keeping a layer", error);
 }
 
-/* ---- eyes ---- */
+/* ---- marks ---- */
 
 bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error)
 {
@@ -163,115 +159,6 @@ bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct
     free(marks);
     free(tiles);
     return good;
-}
-
-static const struct gpu_program *gather_program(const struct key_view *key, struct render_context *context,
-                                                bool has_unknown, const struct key_eyes *eyes, struct error *error)
-{
-    static const char *const numbers[KEY_LAYERS_MAX + 1] = {"0", "1", "2", "3"};
-    const struct integrator *integrator = integrator_by_number(context->request.integrator);
-    struct gpu_define defines[9] = {0};
-    size_t n = 0;
-    defines[n++] = (struct gpu_define){"KEY_LAYERS", numbers[key->layer_count]};
-    if (eyes->what != KEY_GATHER)
-        defines[n++] = (struct gpu_define){eyes->what == KEY_GATHER_MARK ? "MARK" : "KEPT", "1"};
-    if (eyes->are_found && eyes->what != KEY_GATHER_KEPT)
-        defines[n++] = (struct gpu_define){"EYES", "1"};
-    if (context->spread)
-        defines[n++] = (struct gpu_define){"SPREAD", "1"};
-    if (context->environment->kind == ENVIRONMENT_IMAGE)
-        defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
-    if (integrator->left_scene && strcmp(integrator->left_scene, "OPEN") == 0)
-        defines[n++] = (struct gpu_define){"OPEN", "1"};
-    if (context->uniforms.lens[0] > 0.0f)
-        defines[n++] = (struct gpu_define){"HAS_LENS", "1"};
-    if (has_unknown)
-        defines[n++] = (struct gpu_define){"HAS_UNKNOWN", "1"};
-    return context_use_with(context, "render/gather_views.comp", defines, error);
-}
-
-/* How far inverse distances of the structure may be off: pixels / (pixels a radian * radius), as its planes keep.
- */
-static float bound_of(const struct key_view *key, const struct quadtree_settings *settings, float half_height)
-{
-    const float scale = (float)key->texels.height / (2.0f * half_height);
-    return key->texels.fov_y > 0.0f ? settings->pixels / (scale * settings->radius) : settings->pixels / scale;
-}
-
-static void set_view(const struct key_view *key, const struct quadtree_settings *settings,
-                     const struct gpu_program *program)
-{
-    static const char *const names[] = {"key_right", "key_up", "key_back", "key_eye"};
-    const struct trace_view *view = &key->texels;
-    const bool orthographic = view->fov_y == 0.0f;
-    const float half_height = orthographic ? view->ortho_height / 2.0f : tanf(view->fov_y / 2.0f);
-    const float extent[2] = {half_height * (float)view->width / (float)view->height, half_height};
-    for (int column = 0; column < 4; column++) {
-        const float *m = view->world_from_view + column, values[3] = {m[0], m[4], m[8]};
-        gpu_uniform_vec(program, names[column], 3, values);
-    }
-    gpu_uniform_vec(program, "key_extent", 2, extent);
-    gpu_uniform_uint(program, "key_orthographic", orthographic);
-    gpu_uniform_uint(program, "key_width", view->width);
-    gpu_uniform_uint(program, "key_height", view->height);
-    gpu_uniform_float(program, "key_bound", bound_of(key, settings, half_height));
-}
-
-static void bind_layers(struct key_view *key, struct gpu_device *device)
-{
-    static const unsigned units[KEY_LAYERS_MAX] = {UNIT_KEY_LAYER_0, UNIT_KEY_LAYER_1, UNIT_KEY_LAYER_2};
-    for (uint32_t i = 0; i < key->layer_count; i++)
-        gpu_buffer_bind_texels(device, &key->layers[i], units[i], GL_RGBA32F);
-}
-
-static void bind_eyes(struct key_view *key, struct render_context *context, const struct picture *picture,
-                      const struct key_eyes *eyes, const struct gpu_program *program)
-{
-    uint32_t first_slot = 0;
-    struct gpu_buffer *band = picture_slice_band(picture, &context->slice, &first_slot);
-    if (!eyes->are_found)
-        gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS,
-                           eyes->are_found ? GL_RGBA32F : GL_RGBA32UI);
-    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
-    gpu_buffer_bind_storage(&key->counts, BIND_KEY_COUNTS);
-    gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
-    if (eyes->what == KEY_GATHER_MARK)
-        gpu_buffer_bind_storage(&key->marks, BIND_KEY_MARKS);
-    if (eyes->what == KEY_GATHER_KEPT) {
-        gpu_buffer_bind_storage(band, BIND_ACCUMULATION);
-        gpu_uniform_uint(program, "first_kept", first_slot);
-    }
-}
-
-bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
-                     const struct picture *picture, const struct key_eyes *eyes, struct error *error)
-{
-    const uint32_t first_unknown = layers_take_unknown(layers);
-    const bool has_unknown = first_unknown != UINT32_MAX;
-    const struct gpu_program *program = gather_program(key, context, has_unknown, eyes, error);
-    if (!program)
-        return false;
-    context_span_begin(context, STAGE_SHADE);
-    context_bind(context);
-    bind_eyes(key, context, picture, eyes, program);
-    bind_layers(key, context->device);
-    if (has_unknown) {
-        gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
-        gpu_uniform_uint(program, "first_unknown", first_unknown);
-    }
-    if (context->uniforms.lens[0] > 0.0f)
-        gpu_uniform_uint(program, "lens_more", LENS_MORE);
-    set_view(key, &context->tracer->options.quadtree, program);
-    compact_dispatch(context, program, WAVE_RAYS);
-    context_span_end(context);
-    return gpu_check(context->device, "gathering from a key view", error);
-}
-
-void key_view_announce(const struct key_view *key, struct render_context *context, bool has_unknown,
-                       const struct key_eyes *eyes)
-{
-    (void)gather_program(key, context, has_unknown, eyes, NULL);
 }
 
 /* ---- counts ---- */

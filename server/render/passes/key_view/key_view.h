@@ -7,7 +7,6 @@
 #define FARLIGHT_RENDER_PASSES_KEY_VIEW_H
 
 #include "gpu/readback.h"
-#include "render/passes/layers/layers.h"
 #include "render/picture/picture.h"
 #include "shared/key_view.h"
 
@@ -30,16 +29,6 @@ struct key_view {
     uint32_t tile_rows[KEY_LAYERS_MAX];
 };
 
-/* A pass over the eyes. */
-struct key_eyes {
-    enum key_gather {
-        KEY_GATHER,      /* from where the slice's rays meet layers to its sums */
-        KEY_GATHER_MARK, /* keeps that as sums, and marks texels */
-        KEY_GATHER_KEPT, /* takes it from the picture, and leaves black there */
-    } what;
-    bool are_found; /* context->hits have what shared/eye_hit.h says; else there are rays and intersections */
-};
-
 /* Whether they show what that frame asks for. */
 bool key_view_is_of(const struct key_view *key, const struct trace_view *view, const struct frame_request *request,
                     uint64_t showing);
@@ -49,17 +38,12 @@ bool key_view_reserve(struct key_view *key, struct gpu_device *device, const str
 /* The request of a layer's picture: through the middle of each texel, without a lens. */
 struct frame_request key_view_layer_request(const struct key_view *key, const struct frame_request *request);
 /* Keeps a band of the layer's picture, which is key->sums. */
-bool key_view_keep_band(struct key_view *key, struct render_context *context, uint32_t layer, uint32_t band,
+bool key_view_keep_band(struct key_view *key, const struct render_frame *frame, uint32_t layer, uint32_t band,
                         struct error *error);
 /* Nothing is looked at yet. */
 bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error);
 /* Lists the tiles; waits for the device. */
 bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error);
-/* Of the slice in hand, of that picture. LAYER_UNKNOWN is written too, if it is wanted. */
-bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
-                     const struct picture *picture, const struct key_eyes *eyes, struct error *error);
-void key_view_announce(const struct key_view *key, struct render_context *context, bool has_unknown,
-                       const struct key_eyes *eyes);
 /* The samples of the frame that no layer shows: clears their count, begins to copy it, and takes the copy. */
 bool key_view_count_anew(struct key_view *key, struct gpu_device *device, struct error *error);
 bool key_view_copy_count(struct key_view *key, struct gpu_device *device, struct error *error);

@@ -2,6 +2,7 @@
 /* Poses of the frames beside the one that is rendered, worked out on the host. */
 #include "render/passes/layers/moves.h"
 
+#include "render/context/camera.h"
 #include "shared/layers.h"
 
 #include <math.h>

@@ -6,7 +6,7 @@
 #include "gpu/buffer.h"
 #include "gpu/program.h"
 #include "gpu_scene/scene.h"
-#include "render/frame/frame.h"
+#include "render/context/request.h"
 
 struct moves {                   /* all-zero: none */
     struct gpu_buffer instances; /* shared/layers.h: struct move */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
+/* Draws the visibility buffer, makes the camera's rays, and finds their hits. */
 #include "render/passes/primary/primary.h"
 
 #include "base/clock.h"
 #include "render/waves/compact.h"
-#include "render/passes/key_view/key_view.h"
 #include "render/picture/pixel_filter.h"
 #include "render/waves/trace.h"
 #include "shared/bindings.h"
@@ -26,11 +26,11 @@ static bool has_room(const struct primary *primary, uint32_t width, uint32_t row
     return primary->framebuffers[samples - 1].name && visible->width == width && visible->height == rows;
 }
 
-bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, uint32_t samples,
-                     struct error *error)
+static bool reserve_strip(struct primary *primary, const struct render_frame *frame, uint32_t rows,
+                          uint32_t samples, struct error *error)
 {
-    struct gpu_device *device = context->device;
-    uint32_t width = context->request.width;
+    struct gpu_device *device = frame->device->gpu;
+    uint32_t width = frame->request.width;
     if (has_room(primary, width, rows, samples))
         return true;
     finish_framebuffers(primary, device);
@@ -44,8 +44,9 @@ bool primary_reserve(struct primary *primary, struct render_context *context, ui
     return made;
 }
 
-void primary_finish(struct primary *primary, struct gpu_device *device)
+static void finish(void *self, struct gpu_device *device)
 {
+    struct primary *primary = self;
     finish_framebuffers(primary, device);
     gpu_texture_finish(device, &primary->visible);
     gpu_texture_finish(device, &primary->depth);
@@ -72,11 +73,11 @@ static void set_layer(struct primary *primary)
 }
 
 /* What one layer still needs, or a part of it. *whole: the layer is done. */
-static bool draw_part(struct primary *primary, struct render_context *context, bool *whole, struct error *error)
+static bool draw_part(struct primary *primary, const struct render_frame *frame, bool *whole, struct error *error)
 {
     const struct raster_view_target target = {
-        .device = context->device,
-        .scene = context->scene,
+        .device = frame->device->gpu,
+        .scene = frame->scene,
         .first_row = primary->first_row,
         .sample = primary->layer,
     };
@@ -94,218 +95,270 @@ void primary_rasterise_begin(struct primary *primary, uint32_t first_row, uint32
     begin_layer(primary, 0);
 }
 
-bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error)
+bool primary_rasterise(struct primary *primary, const struct render_frame *frame, bool *done, struct error *error)
 {
     const uint64_t start_ns = clock_now_ns();
-    context_span_begin(context, STAGE_PRIMARY);
-    gpu_push_group(context->device, "rasterise primary");
-    context_bind(context);
+    context_span_begin(frame->device, STAGE_PRIMARY);
+    gpu_push_group(frame->device->gpu, "rasterise primary");
+    context_bind_frame(frame);
     /* All of the picture, of which the framebuffer has a strip. */
-    glViewport(0, -(GLint)primary->first_row, (GLsizei)primary->visible.width, (GLsizei)context->request.height);
+    glViewport(0, -(GLint)primary->first_row, (GLsizei)primary->visible.width, (GLsizei)frame->request.height);
     glDepthMask(GL_TRUE); /* clearing heeds both */
     glDisable(GL_SCISSOR_TEST);
-    bool whole = false, drawn = draw_part(primary, context, &whole, error);
+    bool whole = false, drawn = draw_part(primary, frame, &whole, error);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     *done = primary->layer == primary->layer_count;
     if (!whole) {
-        gpu_finish(context->device); /* else all parts would be waited for at the end, at once */
+        gpu_finish(frame->device->gpu); /* else all parts would be waited for at the end, at once */
         raster_view_learn(&primary->view, clock_now_ns() - start_ns, STEP_NS);
     }
-    gpu_pop_group(context->device);
-    context_span_end(context);
-    return drawn && gpu_check(context->device, "rasterising primary hits", error);
+    gpu_pop_group(frame->device->gpu);
+    context_span_end(frame->device);
+    return drawn && gpu_check(frame->device->gpu, "rasterising primary hits", error);
 }
 
-static const struct gpu_program *rays_program(bool rasterised, struct render_context *context, struct error *error)
+static const struct gpu_program *rays_program(bool rasterised, const struct render_frame *frame,
+                                              struct error *error)
 {
     struct gpu_define defines[7] = {0};
     size_t n = 0;
-    if (context->marked_key)
+    if (frame->tiles.list)
         defines[n++] = (struct gpu_define){"HAS_TILES", "1"};
     if (rasterised)
         defines[n++] = (struct gpu_define){"VISIBILITY", "1"};
-    else if (context->spread)
+    else if (frame->spread)
         defines[n++] = (struct gpu_define){"SPREAD", "1"};
-    if (context->tile_samples)
+    if (frame->tile_samples)
         defines[n++] = (struct gpu_define){"HAS_TILE_SAMPLES", "1"};
-    if (context->uniforms.lens[0] > 0.0f)
+    if (frame->uniforms.lens[0] > 0.0f)
         defines[n++] = (struct gpu_define){"HAS_LENS", "1"};
-    if (context->scene->has_motion)
+    if (frame->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
     const struct gpu_program_source source = {.compute = "render/primary.comp", .defines = defines};
-    return gpu_program_get(context->device, &source, error);
+    return gpu_program_get(frame->device->gpu, &source, error);
 }
 
 /* Rays, paths, and what the rasteriser saw. */
-static bool make_rays(const struct primary *primary, struct render_context *context, struct error *error)
+static bool make_rays(const struct primary *primary, struct render_wave *wave, struct error *error)
 {
-    const struct gpu_program *program = rays_program(primary != NULL, context, error);
+    const struct gpu_program *program = rays_program(primary != NULL, wave->frame, error);
     if (!program)
         return false;
-    context_bind(context);
+    context_bind(wave);
     if (primary) {
         gpu_texture_bind_image(&primary->visible, IMAGE_VISIBLE);
         gpu_uniform_uint(program, "first_row", primary->first_row);
     }
-    gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
-    gpu_buffer_bind_storage(&context->hits, BIND_HITS);
-    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
-    context_bind_sums(context);
-    if (context->scene->has_motion)
-        gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
-    if (context->marked_key) {
-        gpu_buffer_bind_texels(context->device, &context->marked_key->marks, UNIT_KEY_MARKS, GL_R32UI);
-        gpu_uniform_uint(program, "first_mark",
-                         context->layer * context->uniforms.width * context->uniforms.height);
+    gpu_buffer_bind_storage(&wave->rays, BIND_RAYS);
+    gpu_buffer_bind_storage(&wave->hits, BIND_HITS);
+    gpu_buffer_bind_storage(&wave->paths, BIND_PATHS);
+    context_bind_sums(wave);
+    if (wave->frame->scene->has_motion)
+        gpu_buffer_bind_storage(&wave->ray_times, BIND_RAY_TIMES);
+    if (wave->frame->tiles.list) {
+        gpu_buffer_bind_texels(wave->device->gpu, wave->frame->tiles.marks, UNIT_KEY_MARKS, GL_R32UI);
+        gpu_uniform_uint(program, "first_mark", wave->frame->tiles.first_mark);
     }
-    context_bind_tiles(context, program);
-    if (context->tile_samples)
-        gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
-    gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
-    gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
-    gpu_dispatch(context->device, program, context->ray_count);
+    context_bind_tiles(wave->frame, program);
+    if (wave->frame->tile_samples)
+        gpu_buffer_bind_texels(wave->device->gpu, wave->frame->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+    gpu_uniform_uint(program, "first_slot", wave->slice.first_slot);
+    gpu_uniform_uint(program, "slot_count", wave->slice.slot_count);
+    gpu_dispatch(wave->device->gpu, program, wave->ray_count);
     return true;
 }
 
-static const struct gpu_program *fill_program(struct render_context *context, struct error *error)
+static const struct gpu_program *fill_program(const struct render_frame *frame, struct error *error)
 {
     struct gpu_define defines[TRACE_SURFACE_DEFINES + 2] = {0};
-    size_t n = trace_surface_defines(context->scene, defines);
-    if (context->scene->has_spheres && context->scene->has_cutout)
+    size_t n = trace_surface_defines(frame->scene, defines);
+    if (frame->scene->has_spheres && frame->scene->has_cutout)
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
     const struct gpu_program_source source = {.compute = "render/primary_fill.comp", .defines = defines};
-    return gpu_program_get(context->device, &source, error);
+    return gpu_program_get(frame->device->gpu, &source, error);
 }
 
-static bool fill_hits(struct render_context *context, struct error *error)
+static bool fill_hits(struct render_wave *wave, struct error *error)
 {
-    const struct gpu_program *program = fill_program(context, error);
+    const struct gpu_program *program = fill_program(wave->frame, error);
     if (!program)
         return false;
-    context_bind(context);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_storage(&context->hits, BIND_HITS);
-    gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
-    compact_dispatch(context, program, WAVE_HITS);
+    context_bind(wave);
+    gpu_buffer_bind_texels(wave->device->gpu, &wave->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_storage(&wave->hits, BIND_HITS);
+    gpu_buffer_bind_storage(&wave->hit_list, BIND_HIT_LIST);
+    compact_dispatch(wave, program, WAVE_HITS);
     return true;
 }
 
-static struct wave camera_wave(struct render_context *context)
+static struct wave camera_wave(struct render_wave *wave)
 {
     return (struct wave){
         .kind = WAVE_CLOSEST,
-        .rays = &context->rays,
-        .hits = &context->hits,
-        .times = context_ray_times(context),
-        .shared_origin = context->request.camera.fov_y > 0.0f && !(context->uniforms.lens[0] > 0.0f), /* an eye */
-        .origin_spread = context->request.camera.fov_y > 0.0f ? 2.0f * context->uniforms.lens[0] : 0.0f,
+        .rays = &wave->rays,
+        .hits = &wave->hits,
+        .times = context_ray_times(wave),
+        .shared_origin =
+            wave->frame->request.camera.fov_y > 0.0f && !(wave->frame->uniforms.lens[0] > 0.0f), /* an eye */
+        .origin_spread = wave->frame->request.camera.fov_y > 0.0f ? 2.0f * wave->frame->uniforms.lens[0] : 0.0f,
     };
 }
 
-static bool find_layer(struct render_context *context, struct wave *wave, bool *done, struct error *error)
+static bool find_layer(struct render_wave *wave, struct wave *rays, bool *done, struct error *error)
 {
     *done = true;
-    wave->within_reach = context->request.hidden_layer > 0;
-    context_span_begin(context, STAGE_PRIMARY);
-    context_bind(context);
-    bool found = tracer_layer_hits(context->layer_tracer, context->scene, wave, context->layer, error);
-    context_span_end(context);
+    rays->within_reach = wave->frame->request.hidden_layer > 0;
+    context_span_begin(wave->device, STAGE_PRIMARY);
+    context_bind(wave);
+    bool found = tracer_layer_hits(wave->frame->layer_tracer, wave->frame->scene, rays, wave->frame->layer, error);
+    context_span_end(wave->device);
     return found;
 }
 
-static bool trace_hits(struct render_context *context, bool *done, struct error *error)
+static bool trace_hits(struct render_wave *wave, bool *done, struct error *error)
 {
-    struct wave wave = camera_wave(context);
-    compact_rays(context, &wave);
-    if (context->layer_tracer)
-        return find_layer(context, &wave, done, error);
-    return wave_trace(context, RAY_PRIMARY, &wave, done, error);
+    struct wave rays = camera_wave(wave);
+    compact_rays(wave, &rays);
+    if (wave->frame->layer_tracer)
+        return find_layer(wave, &rays, done, error);
+    return wave_trace(wave, RAY_PRIMARY, &rays, done, error);
 }
 
-static void begin_wave(struct render_context *context, bool sampled)
+static void begin_wave(struct render_wave *wave, bool sampled)
 {
-    context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
-    context->wave_number = context->asked = context->asking = 0;
-    context->sampled_hits = sampled;
-    compact_begin(context);
+    wave->ray_count = wave->slice.slot_count << wave->frame->uniforms.sample_shift;
+    wave->asked = wave->asking = 0;
+    context_set_number(wave, 0);
+    wave->sampled_hits = sampled;
+    compact_begin(wave);
 }
 
-bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error)
+/* `primary` NULL: hits will be traced. */
+static bool begin_slice(const struct primary *primary, struct render_wave *wave, struct error *error)
 {
-    const struct tracer *tracer = context->layer_tracer ? context->layer_tracer : context->tracer;
-    begin_wave(context, !primary && tracer->impl->sampled);
-    context_span_begin(context, STAGE_PRIMARY);
-    bool made = make_rays(primary, context, error);
-    context_span_end(context);
+    const struct tracer *tracer = wave->frame->layer_tracer ? wave->frame->layer_tracer : wave->frame->tracer;
+    begin_wave(wave, !primary && tracer->impl->sampled);
+    context_span_begin(wave->device, STAGE_PRIMARY);
+    bool made = make_rays(primary, wave, error);
+    context_span_end(wave->device);
     return made;
 }
 
-void primary_begin_eyes(struct render_context *context)
+bool primary_begin_traced(struct render_wave *wave, struct error *error)
 {
-    begin_wave(context, false);
+    return begin_slice(NULL, wave, error);
 }
 
-bool primary_find_eyes(struct render_context *context, struct error *error)
+void primary_begin_eyes(struct render_wave *wave)
+{
+    begin_wave(wave, false);
+}
+
+bool primary_find_eyes(struct render_wave *wave, struct error *error)
 {
     const struct eye_rays rays = {
-        .frame = &context->uniforms,
-        .first_slot = context->slice.first_slot,
-        .slot_count = context->slice.slot_count,
-        .spread = context->spread,
-        .reach = context->spread ? (float)pixel_filter_radius(context->request.filter) : 0.0f,
-        .hits = &context->hits,
+        .frame = &wave->frame->uniforms,
+        .first_slot = wave->slice.first_slot,
+        .slot_count = wave->slice.slot_count,
+        .spread = wave->frame->spread,
+        .reach = wave->frame->spread ? (float)pixel_filter_radius(wave->frame->request.filter) : 0.0f,
+        .hits = &wave->hits,
     };
-    context_span_begin(context, STAGE_PRIMARY);
-    context_bind(context);
-    const bool found = tracer_eye_hits(context->tracer, context->scene, context->trace_state, &rays, error);
-    context_span_end(context);
+    context_span_begin(wave->device, STAGE_PRIMARY);
+    context_bind(wave);
+    const bool found =
+        tracer_eye_hits(wave->frame->tracer, wave->frame->scene, wave->frame->trace_state, &rays, error);
+    context_span_end(wave->device);
     return found;
 }
 
-bool primary_intersect(struct render_context *context, bool *done, struct error *error)
+bool primary_intersect(struct render_wave *wave, bool *done, struct error *error)
 {
-    struct wave wave = camera_wave(context);
-    wave.bare = true;
-    compact_rays(context, &wave);
-    return wave_trace(context, RAY_PRIMARY, &wave, done, error);
+    struct wave rays = camera_wave(wave);
+    rays.bare = true;
+    compact_rays(wave, &rays);
+    return wave_trace(wave, RAY_PRIMARY, &rays, done, error);
 }
 
-bool primary_make_surfaces(struct render_context *context, struct error *error)
+bool primary_make_surfaces(struct render_wave *wave, struct error *error)
 {
-    struct wave wave = camera_wave(context);
-    compact_rays(context, &wave);
-    context_span_begin(context, STAGE_PRIMARY);
-    context_bind(context);
-    bool made = tracer_surfaces(context->tracer, context->scene, &wave, error) && compact_hits(context, error);
-    context_span_end(context);
+    struct wave rays = camera_wave(wave);
+    compact_rays(wave, &rays);
+    context_span_begin(wave->device, STAGE_PRIMARY);
+    context_bind(wave);
+    bool made =
+        tracer_surfaces(wave->frame->tracer, wave->frame->scene, &rays, error) && compact_hits(wave, error);
+    context_span_end(wave->device);
     return made;
 }
 
-bool primary_find(const struct primary *primary, struct render_context *context, bool *done, struct error *error)
+static bool find(const struct primary *primary, struct render_wave *wave, bool *done, struct error *error)
 {
     *done = true;
-    if (!primary && !trace_hits(context, done, error))
+    if (!primary && !trace_hits(wave, done, error))
         return false;
     if (!*done)
         return true;
-    context_span_begin(context, STAGE_PRIMARY);
-    bool found =
-        compact_hits(context, error) && (!primary || context->hit_count == 0 || fill_hits(context, error));
-    context_span_end(context);
+    context_span_begin(wave->device, STAGE_PRIMARY);
+    bool found = compact_hits(wave, error) && (!primary || wave->hit_count == 0 || fill_hits(wave, error));
+    context_span_end(wave->device);
     return found;
 }
 
-void primary_announce(struct render_context *context, bool rasterised)
+void primary_announce(struct render_wave *wave, bool rasterised)
 {
     if (rasterised)
-        raster_view_announce(context->device, context->scene);
-    context->sampled_hits = !rasterised && context->tracer->impl->sampled;
+        raster_view_announce(wave->device->gpu, wave->frame->scene);
+    wave->sampled_hits = !rasterised && wave->frame->tracer->impl->sampled;
     if (rasterised) {
-        (void)rays_program(true, context, NULL);
-        (void)fill_program(context, NULL);
+        (void)rays_program(true, wave->frame, NULL);
+        (void)fill_program(wave->frame, NULL);
     } else { /* the wave takes longest, while this thread makes what makes the rays */
-        const struct wave wave = camera_wave(context);
-        wave_announce(context, &wave);
-        (void)rays_program(false, context, NULL);
+        const struct wave rays = camera_wave(wave);
+        wave_announce(wave, &rays);
+        (void)rays_program(false, wave->frame, NULL);
     }
 }
+
+/* ---- as a pass ---- */
+
+static bool wants(const void *self, const struct render_wave *wave)
+{
+    (void)self;
+    return wave->number == 0 && wave->frame->request.view_source != VIEW_SOURCE_LAYERS;
+}
+
+static bool reserve(void *self, struct render_wave *wave, uint32_t slice_samples, struct error *error)
+{
+    struct primary *primary = self;
+    (void)slice_samples;
+    return !primary->rasterises ||
+           reserve_strip(primary, wave->frame, primary->strip_rows, 1u << primary->sample_shift_max, error);
+}
+
+static enum pass_progress begin(const struct primary *primary, struct render_wave *wave, struct error *error)
+{
+    const bool begun =
+        begin_slice(primary, wave, error) && gpu_check_reset(wave->device->gpu, "primary rays", error);
+    wave->has_rays = true;
+    return begun ? PASS_MORE : PASS_FAILED;
+}
+
+static enum pass_progress run(void *self, struct render_wave *wave, struct error *error)
+{
+    const struct primary *rasterised = ((const struct primary *)self)->rasterises ? self : NULL;
+    bool done = false;
+    if (!wave->has_rays)
+        return begin(rasterised, wave, error);
+    if (!find(rasterised, wave, &done, error) || !gpu_check(wave->device->gpu, "primary hits", error))
+        return PASS_FAILED;
+    return done ? PASS_DONE : PASS_MORE;
+}
+
+const struct pass primary_pass = {
+    .name = "primary",
+    .wants = wants,
+    .reserve = reserve,
+    .run = run,
+    .finish = finish,
+};

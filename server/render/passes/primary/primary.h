@@ -4,13 +4,16 @@
 #define FARLIGHT_RENDER_PASSES_PRIMARY_H
 
 #include "gpu/texture.h"
-#include "render/context/context.h"
+#include "render/context/pass.h"
 #include "trace/raster/view.h"
 
 /* The visibility buffer: which primitive of which instance each pixel sees, in a layer for each of the current
  * samples. It has a strip of the picture's rows at a time, so that no picture needs more than some memory at once.
  */
 struct primary {
+    bool rasterises;           /* first hits of the frame are rasterised, else traced */
+    uint32_t strip_rows;       /* rows that are rasterised together */
+    uint32_t sample_shift_max; /* 2^this samples are rendered together at most */
     /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the strip's uppermost. An array. */
     struct gpu_texture visible;
     struct gpu_texture depth; /* reversed, 32-bit float; of the layer that is drawn */
@@ -23,27 +26,24 @@ struct primary {
     bool cleared;
 };
 
-/* Makes room for strips of that many rows of the request's picture, and for that many samples. */
-bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, uint32_t samples,
-                     struct error *error);
+/* Makes the rays of a slice and finds their hits: in the visibility buffer, or by the tracer. */
+extern const struct pass primary_pass;
+
 /* Draws the strip from that row on for all samples that the uniforms describe, a part of the scene a call until it
  * is done. */
 void primary_rasterise_begin(struct primary *primary, uint32_t first_row, uint32_t samples);
-bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error);
-/* Rays, paths and black pixels of context->slice. */
-bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error);
-/* Its hits, from the visibility buffer, or, where `primary` is NULL, a part of them a call from the tracer. */
-bool primary_find(const struct primary *primary, struct render_context *context, bool *done, struct error *error);
-/* In place of that, for rays that only ask where they hit: their intersections, a part of them a call; and then,
- * if their surfaces are asked for after all, hits of them and the list of these. */
-bool primary_intersect(struct render_context *context, bool *done, struct error *error);
-bool primary_make_surfaces(struct render_context *context, struct error *error);
-/* In place of all that, where the tracer has a shorter way to where eyes look (tracer_finds_eyes): begins a slice;
- * and shared/eye_hit.h in place of its hits. */
-void primary_begin_eyes(struct render_context *context);
-bool primary_find_eyes(struct render_context *context, struct error *error);
+bool primary_rasterise(struct primary *primary, const struct render_frame *frame, bool *done, struct error *error);
+/* Parts of the pass for eyes that look at a key view (key_view/eyes.h). Begin a slice: with rays, or, where the
+ * tracer finds what eyes look at without rays (tracer_finds_eyes), without them. */
+bool primary_begin_traced(struct render_wave *wave, struct error *error);
+void primary_begin_eyes(struct render_wave *wave);
+/* Find what eyes look at: shared/eye_hit.h in place of hits. */
+bool primary_find_eyes(struct render_wave *wave, struct error *error);
+/* Find the rays' intersections alone, a part of them a call; and, if their surfaces are needed after all, make
+ * hits of them and list these. */
+bool primary_intersect(struct render_wave *wave, bool *done, struct error *error);
+bool primary_make_surfaces(struct render_wave *wave, struct error *error);
 /* Announces the programs of the first hits (gpu_program_announce). */
-void primary_announce(struct render_context *context, bool rasterised);
-void primary_finish(struct primary *primary, struct gpu_device *device);
+void primary_announce(struct render_wave *wave, bool rasterised);
 
 #endif

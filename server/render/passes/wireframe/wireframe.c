@@ -1,24 +1,34 @@
 /* SPDX-License-Identifier: MIT */
+/* Paints edges of triangles on first hits. */
 #include "render/passes/wireframe/wireframe.h"
 
 #include "shared/path.h"
 
 #include <epoxy/gl.h>
 
-bool wireframe_paint(struct render_context *context, struct error *error)
+/* Hits that are stored samples name no triangle and get no edges; eyes that look at a key view have no hits. */
+static bool wants(const void *self, const struct render_wave *wave)
 {
-    if (!(context->request.wireframe > 0.0f))
-        return true;
-    const struct gpu_define defines[] = {{context->scene->has_motion ? "HAS_MOTION" : NULL, "1"}, {0}};
-    context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = context_use_with(context, "render/wireframe.comp", defines, error);
-    if (program) {
-        context_bind_hits(context);
-        gpu_buffer_bind_storage(&context->hits, BIND_HITS);
-        gpu_uniform_uint(program, "ray_count", context->ray_count);
-        gpu_uniform_float(program, "half_width", context->request.wireframe / 2.0f);
-        gpu_dispatch(context->device, program, context->ray_count);
-    }
-    context_span_end(context);
-    return program && gpu_check(context->device, "edges of triangles", error);
+    (void)self;
+    return wave->number == 0 && wave->frame->request.wireframe > 0.0f &&
+           wave->frame->request.view_source != VIEW_SOURCE_LAYERS;
 }
+
+static enum pass_progress run(void *self, struct render_wave *wave, struct error *error)
+{
+    (void)self;
+    const struct gpu_define defines[] = {{wave->frame->scene->has_motion ? "HAS_MOTION" : NULL, "1"}, {0}};
+    context_span_begin(wave->device, STAGE_SHADE);
+    const struct gpu_program *program = context_use_with(wave->device, "render/wireframe.comp", defines, error);
+    if (program) {
+        context_bind_hits(wave);
+        gpu_buffer_bind_storage(&wave->hits, BIND_HITS);
+        gpu_uniform_uint(program, "ray_count", wave->ray_count);
+        gpu_uniform_float(program, "half_width", wave->frame->request.wireframe / 2.0f);
+        gpu_dispatch(wave->device->gpu, program, wave->ray_count);
+    }
+    context_span_end(wave->device);
+    return program && gpu_check(wave->device->gpu, "edges of triangles", error) ? PASS_DONE : PASS_FAILED;
+}
+
+const struct pass wireframe_pass = {.name = "wireframe", .wants = wants, .run = run};

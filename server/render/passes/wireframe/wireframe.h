@@ -3,10 +3,9 @@
 #ifndef FARLIGHT_RENDER_PASSES_WIREFRAME_H
 #define FARLIGHT_RENDER_PASSES_WIREFRAME_H
 
-#include "render/context/context.h"
+#include "render/context/pass.h"
 
-/* Of a new slice, whose first hits the context has and nothing has looked at. Hits that are stored samples name no
- * triangle and get no edges. Without `wireframe` in the request it does nothing. Inside no span. */
-bool wireframe_paint(struct render_context *context, struct error *error);
+/* Runs on first hits before other passes read them, where the request has `wireframe`. It has no state. */
+extern const struct pass wireframe_pass;
 
 #endif

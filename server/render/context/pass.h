@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/* A pass over the rays and hits of a slice: four functions, of which frame/ runs those of its list in order.
+ * `self` is the pass's own state, part of a frame's work. */
+#ifndef FARLIGHT_RENDER_CONTEXT_PASS_H
+#define FARLIGHT_RENDER_CONTEXT_PASS_H
+
+#include "render/context/wave.h"
+
+enum pass_progress {
+    PASS_FAILED,
+    PASS_MORE,   /* the pass is not finished: run it again */
+    PASS_DONE,   /* the next pass may run */
+    PASS_REPEAT, /* the slice does not fit its buffers: nothing of it has reached the picture, and it is repeated
+                  */
+};
+
+struct pass {
+    const char *name;
+    /* Whether the pass has work on this wave, which the passes before it have left. */
+    bool (*wants)(const void *self, const struct render_wave *wave);
+    /* Reserves buffers for slices of that many samples and waves of wave->capacity rays, or gives back what the
+     * frame does not need; may be put off (gpu_reserve_begin). NULL: the pass needs none. */
+    bool (*reserve)(void *self, struct render_wave *wave, uint32_t slice_samples, struct error *error);
+    /* Does a step of a few milliseconds. Inside no span. */
+    enum pass_progress (*run)(void *self, struct render_wave *wave, struct error *error);
+    /* Releases what the state holds on the device and leaves it empty. NULL: nothing. */
+    void (*finish)(void *self, struct gpu_device *device);
+};
+
+#endif
