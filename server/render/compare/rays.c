@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Counts and errors of two answers to the same rays, in histograms. */
 #include "render/compare/rays.h"
 
 #include "trace/visibility.h"
@@ -10,8 +11,8 @@
 /* ---- histograms --------------------------------------------------------------------------------- */
 
 #define BIN_SHIFT 16                          /* keeps the exponent and seven bits of the mantissa */
-#define BIN_LOWEST ((127u - 48u) << 7)        /* of 2^-48 */
-#define BIN_HIGHEST (BIN_LOWEST + 64u * 128u) /* of 2^16 */
+#define BIN_LOWEST ((127u - 48u) << 7)        /* the bin of 2^-48 */
+#define BIN_HIGHEST (BIN_LOWEST + 64u * 128u) /* the bin of 2^16 */
 
 static uint32_t bits_of(float value)
 {
@@ -170,7 +171,7 @@ static double snorm16(uint bits)
     return fmax((double)(int16_t)(uint16_t)bits / 32767.0, -1.0);
 }
 
-/* As unpack_unit() of shaders/common/math.glsl, without normalising. */
+/* Unpacks like unpack_unit() of shaders/common/math.glsl, without normalising. */
 static void unpack_normal(uint bits, double v[3])
 {
     v[0] = snorm16(bits & 0xffffu);

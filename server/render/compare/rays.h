@@ -55,9 +55,9 @@ struct wave_tally {
     enum ray_kind kind;
     uint64_t rays; /* alive ones, and dead ones that something was hit by */
     uint64_t both_hit, both_missed, only_first, only_second;
-    uint64_t far;                 /* of both_hit */
-    uint64_t edges;               /* of only_first, only_second and far */
-    uint64_t other_surface;       /* of both_hit, not far and not on an edge: another normal, material or side */
+    uint64_t far;           /* among both_hit */
+    uint64_t edges;         /* among only_first, only_second and far */
+    uint64_t other_surface; /* among both_hit, not far and not on an edge: another normal, material or side */
     uint64_t first_ns, second_ns; /* tracing */
     struct error_histogram distance, relative, normal;
 };
@@ -72,17 +72,17 @@ struct wave_comparison {
     enum ray_kind kind;
     uint64_t rays, both_hit, both_missed, only_first, only_second, far, edges, other_surface;
     uint64_t first_ns, second_ns;
-    /* Of rays that hit with both and are not on an edge: difference in world space, in scene diagonals. */
+    /* Errors of rays that hit with both and are not on an edge: difference in world space, in scene diagonals. */
     float distance_median, distance_p99, distance_max;
-    float relative_median; /* of the same, as a share of the reference's distance */
-    /* Of those that are not far either: between the shading normals, degrees. */
+    float relative_median; /* errors as a share of the reference's distance */
+    /* Angles between the shading normals of those rays that are not far either, degrees. */
     float normal_median, normal_p99, normal_max;
 };
 
 void wave_tally_figures(const struct wave_tally *tally, struct wave_comparison *figures);
 
 struct wave_compare_settings {
-    float diagonal;  /* of the scene, world space; above 0 */
+    float diagonal;  /* the scene's, in world space; above 0 */
     float far_share; /* two hits are far from each other from this share on of the diagonal, or of the distance if
                         that is longer than the diagonal; above 0 */
 };

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Traces a wave by the second tracer and reads both answers back, a part at a time. */
 #include "render/compare/waves.h"
 
 #include "base/clock.h"
@@ -153,7 +154,8 @@ void comparison_begin(struct comparison *comparison, struct gpu_scene *scene, st
     comparison->tracers[0] = first;
     comparison->tracers[1] = second;
     comparison->settings = (struct wave_compare_settings){
-        .diagonal = scene->diagonal > 0.0f ? scene->diagonal : 1.0f, /* of nothing but discs, a metre */
+        .diagonal =
+            scene->diagonal > 0.0f ? scene->diagonal : 1.0f, /* a metre, where the scene has nothing but discs */
         .far_share = far_share > 0.0f ? far_share : WAVE_FAR_SHARE,
     };
 }
@@ -168,7 +170,7 @@ static bool reserve_answers(struct comparison *comparison, const struct wave *wa
                : gpu_buffer_reserve(comparison->device, hits, wave->ray_count * sizeof(struct hit), error);
 }
 
-/* The same rays, the answers to our own buffers. */
+/* The second tracer gets the same rays and writes its answers to our own buffers. */
 static bool make_twin(struct comparison *comparison, const struct wave *wave, struct wave *twin,
                       struct error *error)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Places cameras and fills a frame's camera uniforms. */
 #include "render/context/camera.h"
 
 #include "trace/raster/view.h"
@@ -7,7 +8,7 @@
 #include <string.h>
 
 #define PI 3.14159265358979323846
-/* Of the bounds' extents: the eye is at least so far before them. */
+/* The eye's minimum distance before the bounds, as a share of their extents. */
 #define NEAREST_SHARE 0.01
 
 static double dot3(const double a[3], const double b[3])
@@ -59,7 +60,7 @@ bool frame_camera_look_at(struct frame_camera *camera, const float eye[3], const
 /* The picture's axes, not by an upward direction: seen from above there is none. */
 struct axes {
     double right[3], above[3], back[3];
-    double slope_x, slope_y; /* of what touches the margin */
+    double slope_x, slope_y; /* slopes of the edges that the margin leaves */
 };
 
 static void axes_of(struct axes *axes, const struct frame_framing *framing, float aspect)
@@ -76,7 +77,7 @@ static void axes_of(struct axes *axes, const struct frame_framing *framing, floa
 
 enum { TO_RIGHT, TO_LEFT, TO_TOP, TO_BOTTOM, TO_EYE };
 
-/* Of each edge the normal of the plane through the eye: all lies on one side of it. */
+/* Normals of the planes through the eye and each edge of the picture: the bounds lie on one side of each. */
 void frame_camera_directions(double directions[FRAME_CAMERA_DIRECTIONS][3], const struct frame_framing *framing,
                              float aspect)
 {

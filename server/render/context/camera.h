@@ -9,20 +9,20 @@
 
 /* How a camera that sees all of some bounds is placed. Angles in radians. */
 struct frame_framing {
-    float azimuth, elevation; /* of the eye: from +z about +y towards +x, and above the horizon */
+    float azimuth, elevation; /* the eye's: from +z about +y towards +x, and above the horizon */
     float fov_y;              /* before the zoom */
     float margin; /* share of the picture that stays free beside the bounds, at each edge, before the zoom */
     float zoom;   /* scales the picture about its middle */
 };
-/* A camera that sees all, as near as that allows: two opposite edges of the picture, or of the margin, are
- * touched. What it depends on is how far all reaches in these directions: the greatest dot product with a point
- * for each. `size`: of all, in metres; the eye is at least a part of that before it. */
+/* A camera that sees everything, as near as that allows: two opposite edges of the picture, or of the margin, are
+ * touched. It depends on the extent along these directions: the greatest dot product with a point for each.
+ * `size`: the whole's, in metres; the eye is at least a part of that before it. */
 #define FRAME_CAMERA_DIRECTIONS 5
 void frame_camera_directions(double directions[FRAME_CAMERA_DIRECTIONS][3], const struct frame_framing *framing,
                              float aspect);
 void frame_camera_around(struct frame_camera *camera, const struct frame_framing *framing, float aspect,
                          const double supports[FRAME_CAMERA_DIRECTIONS], double size);
-/* Likewise, of all within bounds. */
+/* Places such a camera around a box. */
 void frame_camera_auto(struct frame_camera *camera, const struct frame_framing *framing, const float lower[3],
                        const float upper[3], float aspect);
 /* Pixels of one view. */

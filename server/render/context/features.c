@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Finds the features that a scene's materials and lights use. */
 #include "render/context/features.h"
 
 #include "shared/material.h"

@@ -10,7 +10,7 @@
 
 struct scene_features {
     bool textures;             /* some material has a texture */
-    bool bump;                 /* one of them is a bump map */
+    bool bump;                 /* a texture is a bump map */
     bool area_lights;          /* some light is a rectangle or a sphere */
     bool anisotropy;           /* some material has a grain */
     bool specular;             /* some material's mirror differs from what Fresnel's equations say */
@@ -24,7 +24,7 @@ struct scene_features {
     bool thin_walls;           /* some glass has no body */
     bool diffuse_transmission; /* some material scatters light to its other side */
     bool anisotropy_map;       /* some grain differs from place to place */
-    bool clear;                /* of some material most may be seen in a smooth mirror, or through it */
+    bool clear;                /* some material is mostly seen in a smooth mirror, or through it */
     bool mirrors;              /* some material sends a ray on: a smooth one, glass, a blended one */
 };
 

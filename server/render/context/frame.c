@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What passes ask about the frame in progress, and its uniforms on the device. */
+/* Questions of passes about the frame in progress, and its uniforms on the device. */
 #include "render/context/frame.h"
 
 #include "shared/bindings.h"
@@ -9,7 +9,7 @@
 #include <epoxy/gl.h>
 
 #define AO_RAYS_DEFAULT 8               /* lambda of the paper on voxels and A-buffers */
-#define AO_DISTANCE_DEFAULT (1 / 10.0f) /* of the scene's diagonal */
+#define AO_DISTANCE_DEFAULT (1 / 10.0f) /* a share of the scene's diagonal */
 
 void context_bind_frame(const struct render_frame *frame)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What follows from a request alone: its planes and their bytes, and what two requests have in common. */
+/* Planes of a request's picture and their bytes, and what two requests have in common. */
 #include "render/context/request.h"
 
 #include "shared/layers.h"

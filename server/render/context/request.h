@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is asked of a frame: the request, and what follows from it alone. */
+/* The request of a frame, and what follows from it alone. */
 #ifndef FARLIGHT_RENDER_CONTEXT_REQUEST_H
 #define FARLIGHT_RENDER_CONTEXT_REQUEST_H
 
@@ -21,12 +21,12 @@ struct frame_camera {
     float near; /* metres; 0: chosen from the scene */
 };
 
-/* Of a view, whose frames follow each other (render/passes/denoise/history.h). */
+/* How the frames of a view follow each other (render/passes/denoise/history.h). */
 enum frame_history {
     HISTORY_NONE,  /* the frame stands alone, and so does the next one */
-    HISTORY_KEPT,  /* it stands alone, and the next one may follow it */
-    HISTORY_USED,  /* it follows the one before */
-    HISTORY_MOVING /* and has other noise than that, whatever the seed; no samples are added to its own */
+    HISTORY_KEPT,  /* the frame stands alone, and the next one may follow it */
+    HISTORY_USED,  /* the frame follows the one before */
+    HISTORY_MOVING /* HISTORY_USED with other noise, whatever the seed; no samples are added to it */
 };
 
 /* A part of a picture, pixels; width 0: all of it. */
@@ -44,7 +44,7 @@ struct frame_ground {
 };
 
 struct frame_request {
-    uint32_t width, height; /* of the whole picture */
+    uint32_t width, height; /* the whole picture's */
     /* Only the tiles of 8 x 8 pixels that this part touches get samples, and the result is the part. Not with
      * `noise` and `denoise`, which look at pixels around, attachments and VIEW_SOURCE_LAYERS. */
     struct frame_crop crop;
@@ -53,7 +53,7 @@ struct frame_request {
     float baseline; /* metres between neighbouring eyes */
     bool eyes_over; /* views one below the other are those of eyes side by side */
     enum view_source view_source;
-    /* What is rendered is seen by another camera than the picture's; only with VIEW_SOURCE_LAYERS. */
+    /* Another camera than the picture's sees what is rendered; only with VIEW_SOURCE_LAYERS. */
     bool has_key;
     struct frame_camera key_camera;
     /* 0: what is seen. 1, 2: of the surfaces that it hides, the first and the second at each pixel that an eye
@@ -82,14 +82,14 @@ struct frame_request {
     float aperture;             /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
     float focus; /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum pixel_filter filter;
-    enum brdf brdf;    /* of rough surfaces; integrator path */
+    enum brdf brdf;    /* reflection of rough surfaces; integrator path */
     float clamp;       /* times 2^-exposure_stops: see shaders/render/fireflies.glsl; 0: nothing is limited */
     float ao_distance; /* metres; 0: a tenth of the scene's diagonal */
-    float ao_falloff;  /* as a power of 1 - distance / ao_distance; 0: all counts the same */
+    float ao_falloff;  /* power of 1 - distance / ao_distance; 0: all counts the same */
     uint32_t ao_rays;  /* a sample; 0: 8 */
     float wireframe;   /* pixels: width of lines along the edges of triangles; 0: none */
     struct frame_ground ground;
-    float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
+    float layer_opacity;  /* opacity of opaque surfaces, integrator raycast; 0: 0.5 */
     uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */
     /* RGBA8 of the picture alone: it comes as these planes, which are less to read back, and which its encoder
@@ -116,7 +116,7 @@ struct frame_request {
     float compare_far_share; /* 0: WAVE_FAR_SHARE, see render/compare/rays.h */
 };
 
-/* As bits, with that of the beauty where the request names none. */
+/* The layers as bits, with the beauty where the request names none. */
 uint32_t frame_request_layers(const struct frame_request *request);
 /* The plane that an attachment alone is made of: a layer after all others. */
 #define LAYER_STICKING ((enum layer)31)
@@ -124,22 +124,23 @@ uint32_t frame_request_layers(const struct frame_request *request);
  * light. */
 bool frame_request_is_first_sample(enum layer layer);
 bool frame_request_is_light(enum layer layer);
-/* All that there is a plane for in the picture: layers and those that attachments are made of. */
+/* Bits of the picture's planes: layers, and those that attachments are made of. */
 uint32_t frame_request_planes(const struct frame_request *request);
-/* Of a plane's pixels on the host, that of the beauty where the request attaches what it is. */
+/* The format of a plane's pixels on the host; where the request attaches the plane, that of the attachment. */
 unsigned frame_request_plane_format(const struct frame_request *request, enum layer layer);
-uint32_t frame_format_bytes(unsigned format); /* of a pixel */
-/* Of a plane's rows on the host; a multiple of 8, or all that there are. As Y'CbCr an odd last one has two. */
+uint32_t frame_format_bytes(unsigned format); /* bytes of a pixel */
+/* Bytes of a plane's rows on the host; a multiple of 8 rows, or all that there are. In Y'CbCr an odd last row has
+ * two. */
 uint64_t frame_request_plane_bytes(const struct frame_request *request, enum layer layer, uint32_t rows);
-/* Of the frame's pixels, all planes. */
+/* Bytes of the frame's pixels, all planes. */
 uint64_t frame_request_bytes(const struct frame_request *request);
-/* Behind the surfaces of the picture. */
+/* Whether another background than the environment is seen behind the picture's surfaces. */
 bool frame_request_hides_environment(const struct frame_request *request);
-/* What its clamp limits radiance to, before exposure; 0: nothing is limited. */
+/* The limit of radiance by the request's clamp, before exposure; 0: there is none. */
 float frame_request_radiance_limit(const struct frame_request *request);
 /* Whether the same ray brings the same radiance. */
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b);
-/* How many samples a pixel will have is not known beforehand. */
+/* Whether it is not known beforehand how many samples a pixel will have. */
 bool frame_request_goes_on(const struct frame_request *request);
 /* Whether the samples of `b` may be added to those of `a`: they are equal but for their number and the use of the
  * sum, and `b` does not start anew. */

@@ -17,7 +17,7 @@ struct slice {
 struct render_wave {
     struct render_device *device;
     const struct render_frame *frame;
-    struct wave_notes *notes; /* what shading notes for layers */
+    struct wave_notes *notes; /* notes that shading takes for layers */
     uint32_t waves_queued;    /* waves of a slice, where the host does not wait for their counts */
     uint32_t capacity;        /* rays that the buffers hold */
     struct slice slice;
@@ -35,7 +35,7 @@ struct render_wave {
     struct wave_state known_state; /* with counts_on_host: as it was last read */
     struct gpu_buffer slice_sums;  /* vec4 per sample of a slice: radiance so far, coverage */
     struct gpu_buffer_place sums;  /* the slice's sums: slice_sums, or its part of the picture */
-    uint64_t shadow_rays;          /* of the slice, those that the state does not count */
+    uint64_t shadow_rays;          /* shadow rays of the slice that the state does not count */
 };
 
 /* Sets the wave's number, for its spans too. */
@@ -44,7 +44,7 @@ void context_set_number(struct render_wave *wave, uint32_t number);
 void context_bind_sums(const struct render_wave *wave);
 /* Binds the scene, the frame's uniforms and the wave's state. */
 void context_bind(struct render_wave *wave);
-/* The same, with the rays, hits, paths and hit list of the wave. */
+/* Binds these, and the rays, hits, paths and hit list of the wave. */
 void context_bind_hits(struct render_wave *wave);
 /* Defines of passes that read hits (common/material.glsl): at most CONTEXT_SURFACE_DEFINES to `defines`. Returns
  * how many. */

@@ -5,6 +5,7 @@
 
 #include "render/frame/check.h"
 #include "render/frame/key.h"
+#include "render/picture/resolve.h"
 #include "shared/bindings.h"
 
 #include <epoxy/gl.h>
@@ -16,8 +17,8 @@ static const struct gpu_texel_formats texel_formats = {.of_unit = {[UNIT_TANGENT
                                                                    [UNIT_SHADE_ENVIRONMENT] = GL_R32F,
                                                                    [UNIT_RAY_TIMES] = GL_R32F}};
 
-/* While the scene is brought to a device that has nothing of it: the program that depends on its materials alone,
- * of what is to be met exactly. A guess that is wrong costs time, so where more decides nothing is announced. */
+/* The program that depends on the scene's materials alone, for hits that are met exactly. A guess that is wrong
+ * costs time, so nothing is announced where more decides. */
 void announce_first(struct frame_renderer *renderer)
 {
     struct frame_work *work = renderer->work;
@@ -41,7 +42,7 @@ void announce_first(struct frame_renderer *renderer)
     work->frame.tracer = NULL;
 }
 
-/* Of a frame that is made in one pass: what depends on no structure. */
+/* Programs of a frame that is made in one pass, as far as they depend on no structure. */
 void announce_shading(struct frame_renderer *renderer)
 {
     struct frame_work *work = renderer->work;
@@ -58,7 +59,7 @@ void announce_programs(struct frame_renderer *renderer)
     struct frame_work *work = renderer->work;
     struct wave_shading *shading = &work->shading;
     gpu_program_announce(renderer->device, &texel_formats);
-    /* What takes longest begins first; the rest is in the order of its use. */
+    /* The longest one begins first; the rest is in the order of its use. */
     if (frame_is_eyes_pass(renderer)) {
         key_eyes_announce(&work->eyes, &work->wave);
     } else {

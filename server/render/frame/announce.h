@@ -9,7 +9,7 @@
 void announce_first(struct frame_renderer *renderer);
 /* While the structure is built, for a frame that is made in one pass: programs that depend on no structure. */
 void announce_shading(struct frame_renderer *renderer);
-/* All programs of the picture that is being reserved. */
+/* Every program of the picture that is being reserved. */
 void announce_programs(struct frame_renderer *renderer);
 
 #endif

@@ -81,7 +81,7 @@ static bool check_integrator(const struct frame_request *request, struct error *
     return true;
 }
 
-/* Their surfaces are those of the key view. */
+/* Surfaces of pictures made from layers are those of the key view. */
 static bool check_rendered(const struct frame_request *request, const char *what, struct error *error)
 {
     if (request->view_source != VIEW_SOURCE_LAYERS)
@@ -127,7 +127,7 @@ static bool check_layers(const struct frame_request *request, struct error *erro
     return true;
 }
 
-/* Of views and of where they come from. */
+/* Checks the views, and where they come from. */
 static bool check_views(const struct frame_request *request, struct error *error)
 {
     const uint32_t across = request->views_across ? request->views_across : 1;

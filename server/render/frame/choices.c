@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Sizes of slices, and whether first hits are rasterised. */
 #include "render/frame/choices.h"
 
 #include "render/context/camera.h"

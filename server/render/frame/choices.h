@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a frame does differently from device to device. The same on a device whenever it is asked, so that the same
+/* Choices that differ from device to device. On one device each is the same whenever it is made, so that the same
  * request goes on giving the same bytes. */
 #ifndef FARLIGHT_RENDER_FRAME_CHOICES_H
 #define FARLIGHT_RENDER_FRAME_CHOICES_H

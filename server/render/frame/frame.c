@@ -13,6 +13,7 @@
 #include "render/frame/samples.h"
 #include "render/frame/update.h"
 #include "render/frame/work.h"
+#include "render/picture/readback.h"
 #include "render/waves/integrator.h"
 
 #include <string.h>
@@ -175,7 +176,7 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
     };
     if (is_alone(renderer) || refused.kind != ERROR_NONE)
         return true;
-    const struct tracer_impl *impls[2]; /* that are shared with the other frames */
+    const struct tracer_impl *impls[2]; /* tracers that are shared with the other frames */
     size_t count = 0;
     for (size_t i = 0; i < 2; i++)
         if (wanted[i] && !(wanted[i]->depends_on & CHANGED_VIEW))
@@ -187,7 +188,8 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
            tracer_set_are_free(&renderer->shared->tracers, impls, count, &request->tracer_options);
 }
 
-/* Of a frame of several views that of one; of one whose eyes are made from layers the key view. */
+/* The view that a structure may depend on: one of several views, or the key view where eyes are made from layers.
+ */
 static struct trace_view view_of(const struct frame_request *request)
 {
     const struct frame_camera camera = frame_key_camera(request);

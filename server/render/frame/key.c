@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames whose eyes are made from a key view's layers (key_view.h): which of a frame's passes is in hand. First,
- * where the kept layers are of something else, each layer is rendered, as a picture of its own by the frame's
- * tracer and integrator; then the eyes. Each pass goes through the frame's phases from its first sample on. */
+/* Frames whose eyes are made from a key view's layers (key.h): which picture of the frame is rendered. First,
+ * where the kept layers are of something else, each layer is rendered by the frame's tracer and integrator; then
+ * the eyes. */
 #include "render/frame/key.h"
 
 #include "render/context/camera.h"
@@ -48,7 +48,7 @@ static float distance_between(const struct frame_camera *a, const struct frame_c
     return sqrtf(squared);
 }
 
-/* How far an eye of the picture may be from that of the key view. */
+/* The maximum distance of an eye of the picture from that of the key view. */
 static float farthest_eye(const struct frame_request *request)
 {
     float eye[2];
@@ -68,7 +68,7 @@ static float radius_for(const struct frame_request *request)
     return asked > 0.0f ? ldexpf(asked, (int)ceilf(log2f(farthest / asked))) : farthest;
 }
 
-/* One texel a pixel, of the picture's own eye. */
+/* The structure has a texel a pixel, of the picture's own eye. */
 static void set_hidden(const struct frame_request *request, struct tracer_options *options)
 {
     struct quadtree_settings *settings = &options->quadtree;
@@ -83,7 +83,7 @@ static void set_layers(const struct frame_request *request, struct quadtree_sett
 {
     settings->radius = radius_for(request);
     if (settings->layers == 0 && !is_for_these_eyes(request))
-        settings->layers = 1; /* what little another one shows would be rendered as a whole */
+        settings->layers = 1; /* another layer shows little, and would be rendered as a whole */
 }
 
 bool frame_key_take(struct frame_renderer *renderer, struct error *error)
@@ -97,7 +97,7 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
     else
         set_layers(request, &options.quadtree);
     if (options.quadtree.hits == QUADTREE_HITS_AUTO)
-        options.quadtree.hits = QUADTREE_HITS_PLANE; /* what is thinner than a texel is there as well */
+        options.quadtree.hits = QUADTREE_HITS_PLANE; /* things thinner than a texel are there as well */
     if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
         return false;
     if (!impl->texel_view || !impl->layer_hits)
@@ -119,7 +119,7 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
     key->is_made = false;
     picture_restart(&key->sums);
     if (!key_view_reserve(key, renderer->device, texels, layer_count, error))
-        return false; /* it may have been put off: the choice is made again */
+        return false; /* memory may have been put off: the choice is made again */
     key->is_marked = is_for_these_eyes(&renderer->request);
     if (key->is_marked && !key_view_mark_anew(key, renderer->device, error))
         return false;
@@ -134,7 +134,7 @@ static bool is_noise_new(const struct frame_renderer *renderer)
            renderer->key.first_sample == renderer->eyes_samples_before;
 }
 
-/* Which passes the frame needs. */
+/* Chooses which picture the frame needs first. */
 static bool choose_first(struct frame_renderer *renderer, struct error *error)
 {
     struct key_view *key = &renderer->key;
@@ -186,7 +186,7 @@ static struct frame_tiles tiles_of(struct key_view *key, uint32_t layer)
 bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
-    if (renderer->request.hidden_layer) { /* its only pass */
+    if (renderer->request.hidden_layer) { /* the frame's only picture */
         work->frame.trace_state = work->trace_state;
         work->frame.layer_tracer = renderer->key_tracer;
         work->frame.layer = renderer->request.hidden_layer;
@@ -237,7 +237,7 @@ void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_re
         request->height = renderer->key.tile_rows[renderer->pass] * 8;
 }
 
-/* All of the layer's samples are in its sums. */
+/* Keeps the layer, all of whose samples are in its sums. */
 static enum pass_progress keep(struct frame_renderer *renderer, struct error *error)
 {
     struct key_view *key = &renderer->key;

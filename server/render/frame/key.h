@@ -21,7 +21,7 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error);
 /* Sets the frame to the picture that is rendered next, once the tracers are built: request, tracer, and what gets
  * the samples. */
 bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error);
-/* All eyes are intersected: the layers follow. */
+/* Ends the marks, once every eye is intersected: the layers follow. */
 bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error);
 /* Limits a layer whose tiles are rendered one by one to as many rows as the picture of those tiles has. */
 void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_request *request);

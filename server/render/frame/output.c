@@ -3,6 +3,8 @@
 #include "render/frame/output.h"
 
 #include "render/frame/ready.h"
+#include "render/picture/readback.h"
+#include "render/picture/resolve.h"
 
 static bool reserve_pixels(struct frame_renderer *renderer, struct error *error)
 {
@@ -37,7 +39,7 @@ static bool pass_on(struct frame_renderer *renderer, bool has_band, uint32_t pla
     return true;
 }
 
-/* One band of one plane; the last one is followed by none. */
+/* Resolves a band of a plane and passes the band before it on; the last one is followed by none. */
 static bool read_band(struct frame_renderer *renderer, struct error *error)
 {
     struct picture *picture = &renderer->picture;

@@ -14,9 +14,9 @@
 
 struct entry {
     const struct pass *pass;
-    bool is_of_work; /* its state is at `state` in the frame's work; else the renderer is its state */
+    bool is_of_work; /* the pass's state is at `state` in the frame's work; else the renderer is its state */
     size_t state;
-    bool is_brief; /* it is a dispatch or two, done in the step of the pass before it */
+    bool is_brief; /* a dispatch or two, done in the step of the pass before it */
 };
 
 #define OF_WORK(member) .is_of_work = true, .state = offsetof(struct frame_work, member)

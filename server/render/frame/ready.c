@@ -17,18 +17,18 @@
 
 /* The time of a step that reserves memory. */
 #define RESERVE_NS UINT64_C(3000000)
-/* Of a slice at first: few paths are longer, and waves without rays cost some dispatches each. */
+/* Waves queued for a slice at first: few paths are longer, and waves without rays cost some dispatches each. */
 #define WAVES_QUEUED_MAX 16
-/* Of a step that uploads and integrates an environment. */
+/* The time of a step that uploads and integrates an environment. */
 #define ENVIRONMENT_STEP_NS UINT64_C(6000000)
 /* Pixels that are rasterised together: more take a while to reserve and to clear. */
 #define STRIP_PIXELS_MAX (1u << 22)
-/* The same of all samples that are rasterised together: 64 MiB. */
+/* Pixels of all samples that are rasterised together: 64 MiB. */
 #define LAYERS_PIXELS_MAX (1u << 23)
 /* The number of samples that texture filtering assumes for a picture that accumulates without an end. */
 #define SAMPLES_GOING_ON 16
 
-/* A step of it. */
+/* Does a step of uploading and integrating the environment. */
 static bool update_environment(struct frame_renderer *renderer, bool *done, struct error *error)
 {
     struct frame_work *work = renderer->work;
@@ -112,7 +112,7 @@ static uint32_t rays_a_path(const struct frame_renderer *renderer)
     return once ? 1 : CHOICES_WAVE_PER_SLICE;
 }
 
-/* What it needs is known before any of it is reserved. */
+/* Sizes the picture, its slices and waves, before any buffer is reserved. */
 static bool size_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
@@ -157,7 +157,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
-/* They take a third of a millisecond, and stay from frame to frame. */
+/* Places of a filter take a third of a millisecond, and stay from frame to frame. */
 static void fill_filter(struct render_frame *frame)
 {
     _Static_assert(sizeof(frame->uniforms.filter_places) / sizeof(float) > PIXEL_FILTER_INTERVALS,
@@ -169,7 +169,7 @@ static void fill_filter(struct render_frame *frame)
     frame->has_filter = true;
 }
 
-/* Once it is known what the frame goes on from. */
+/* Limits the request's samples, once it is known which samples the picture holds. */
 static void limit_samples(const struct frame_renderer *renderer, struct frame_request *request)
 {
     uint32_t before = renderer->samples_before, maximum = request->samples_max;
@@ -181,7 +181,7 @@ static void limit_samples(const struct frame_renderer *renderer, struct frame_re
     request->samples = request->samples < lacking ? request->samples : lacking;
 }
 
-/* What needs no memory of the device. */
+/* Sets what needs no memory of the device. */
 static bool set_up(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
@@ -193,7 +193,7 @@ static bool set_up(struct frame_renderer *renderer, struct error *error)
     work->frame.display_values = renderer->shared->copy.scene->environment.display_values;
     work->frame.uniforms.depth = request->depth;
     work->frame.uniforms.far_width[2] = frame_request_hides_environment(request) ? 1.0f : 0.0f;
-    /* Those of a texel of a layer all pass through its middle. */
+    /* Samples of a layer's texel all pass through its middle. */
     work->frame.spread =
         !frame_is_layer_pass(renderer) && (request->samples > 1 || frame_request_goes_on(request));
     work->frame.uniforms.far_width[1] =
@@ -205,7 +205,7 @@ static bool set_up(struct frame_renderer *renderer, struct error *error)
     return size_frame(renderer, error);
 }
 
-/* Once its tracers are what the scene is. */
+/* Gets ready, once the tracers are brought to the scene. */
 static bool get_ready(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
@@ -240,7 +240,7 @@ enum pass_progress ready_step(struct frame_renderer *renderer, struct error *err
     return !made ? PASS_FAILED : is_ready ? PASS_DONE : PASS_MORE;
 }
 
-/* While its structure is built. */
+/* Announces programs while the structure is built. */
 bool ready_announce_early(struct frame_renderer *renderer, struct error *error)
 {
     struct error failed = {0};
@@ -260,7 +260,7 @@ void reserve_begin(const struct frame_renderer *renderer)
     gpu_reserve_begin(renderer->device, RESERVE_NS);
 }
 
-/* What has not failed for good is gone on with by the next step. */
+/* The next step goes on with what has not failed for good. */
 bool reserve_end(const struct frame_renderer *renderer, bool made, const struct error *failed, struct error *error)
 {
     bool put_off = gpu_reserve_end(renderer->device);

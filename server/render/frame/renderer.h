@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What outlives a frame: the device's resources of a scene, and those of each of its viewers. */
+/* Resources that outlive a frame: those of a scene on the device, and those of each of its viewers. */
 #ifndef FARLIGHT_RENDER_FRAME_RENDERER_H
 #define FARLIGHT_RENDER_FRAME_RENDERER_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a frame gives: pixels, layers, stage times and statistics. */
+/* The result of a frame: pixels, layers, stage times and statistics. */
 #ifndef FARLIGHT_RENDER_FRAME_RESULT_H
 #define FARLIGHT_RENDER_FRAME_RESULT_H
 
@@ -7,7 +7,7 @@
 #include "render/compare/rays.h"
 #include "render/context/request.h"
 
-/* Of one sample, that is not to be added to, the place is the pixel's middle; several are spread by the filter.
+/* A single sample, to which no other is added, lies in the pixel's middle; several are spread by the filter.
  * With a lens, several views, or where something moves, first hits are traced whatever `primary` says. What
  * PRIMARY_AUTO chooses follows from tracer, scene, size, whether there are several samples, and device: for a
  * device it is measured once. Where something moves, a tracer of stored samples is refused: ERROR_UNSUPPORTED,
@@ -40,7 +40,7 @@ struct frame_result {
     uint32_t attachments;
     size_t size_bytes;
     uint32_t width, height;
-    /* Held per pixel, with those of the frames before that it goes on from; with noise: at most. */
+    /* Samples held per pixel, those of frames that it goes on from included; with noise: at most. */
     uint32_t samples;
     float noise; /* with noise in the request: the largest error of a tile, as far as is known; else 0 */
     enum pixel_format format;
@@ -49,19 +49,19 @@ struct frame_result {
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
     uint32_t sorted_waves; /* whose rays were brought into the order of their directions */
     uint32_t device_waits; /* how often the host has waited for the device, bringing the scene there included */
-    uint32_t dispatches, barriers; /* of compute passes; between passes of any kind */
+    uint32_t dispatches, barriers; /* compute passes, and barriers between passes of any kind */
     uint64_t uploaded_bytes, structure_bytes;
-    struct structure_rows structure; /* what the tracer says of it, and of its waves */
+    struct structure_rows structure; /* rows of the tracer about its structure and its waves */
     struct stage_times times;
     struct wave_comparison *comparisons; /* owned; ascending by wave and kind; NULL: nothing was compared */
     uint32_t comparison_count;
 };
 void frame_result_finish(struct frame_result *result);
-/* Of width x height: DEPTH f32, metres along the view to the first surface that the pixel's first sample met, 0
- * where there is none; NORMALS 4 u8, (n / 2 + 1/2) * 255 of the mean of the samples in world space, then 255, all
- * 0 where there is none; STICKING 4 u8, the first: 255 times the mean of the samples' shares that mirrors, glass
- * and highlights have in them (shaders/common/sticking.glsl), of each 2 x 2 pixels the first one's, the others 0.
- * Valid as long as the pixels; `which` is one of the result's attachments. */
+/* An attachment of width x height pixels: DEPTH f32, metres along the view to the first surface that the pixel's
+ * first sample met, 0 where there is none; NORMALS 4 u8, (n / 2 + 1/2) * 255 of the mean of the samples in world
+ * space, then 255, all 0 where there is none; STICKING 4 u8, the first: 255 times the mean of the samples' shares
+ * that mirrors, glass and highlights have in them (shaders/common/sticking.glsl), of each 2 x 2 pixels the first
+ * one's, the others 0. Valid as long as the pixels; `which` is one of the result's attachments. */
 const uint8_t *frame_result_attachment(const struct frame_result *result, enum attachment which);
 
 #endif

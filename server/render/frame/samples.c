@@ -33,7 +33,7 @@ static void place_sample(const struct render_frame *frame, uint32_t index, float
         place[i] += pixel_filter_offset((const float *)uniforms->filter_places, numbers[i]);
 }
 
-/* The uniforms of the samples in hand. */
+/* Sets the uniforms of the samples that come next. */
 static bool set_sample(struct frame_renderer *renderer, struct error *error)
 {
     _Static_assert(sizeof(((struct frame_uniforms *)0)->sample_places) == SAMPLES_TOGETHER_MAX * 2 * sizeof(float),
@@ -60,8 +60,8 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
     return context_upload_uniforms(&work->frame, error);
 }
 
-/* What is seen in the strip of that row: strips begin where they do if no row is left out, so that rounding puts
- * edges where it does then. */
+/* Begins the strip of that row. Strips begin where they do if no row is left out, so that rounding puts edges
+ * where it does then. */
 static void begin_strip(struct frame_renderer *renderer, uint32_t row)
 {
     row -= row % renderer->work->primary.strip_rows;
@@ -161,7 +161,7 @@ static void begin_ahead(struct frame_renderer *renderer)
     slices_ahead_begin(ahead, renderer->device, &renderer->slices, renderer->sample);
 }
 
-/* Those of the queued slices that are done. *again: one of them is done again. */
+/* Takes those of the queued slices that are done. *again: a slice among them is done again. */
 static bool land(struct frame_renderer *renderer, bool *again, struct error *error)
 {
     struct slices_ahead *ahead = &renderer->work->ahead;
@@ -181,7 +181,7 @@ static bool land(struct frame_renderer *renderer, bool *again, struct error *err
     return true;
 }
 
-/* If it is time to: which tiles have samples enough. If all have, the frame has. */
+/* Measures which tiles have samples enough, if that is due. If all have, the frame has. */
 static bool measure_noise(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
@@ -232,7 +232,7 @@ static bool end_slice(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
-/* What a step of the slice's passes has led to. */
+/* Goes on from a step of the slice's passes. */
 static bool follow(struct frame_renderer *renderer, enum pass_progress progress, struct error *error)
 {
     renderer->samples_phase = SAMPLES_PASSES;
@@ -269,7 +269,7 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
     }
     const uint32_t row = picture_row_of(renderer->target, work->wave.slice.first_slot);
     if (work->primary.rasterises && row - work->primary.first_row >= work->primary.strip_rows) {
-        slices_put_back(&renderer->slices, &work->wave.slice); /* it is the first of the next strip */
+        slices_put_back(&renderer->slices, &work->wave.slice); /* the slice is the first of the next strip */
         begin_strip(renderer, row);
         return true;
     }
@@ -280,14 +280,14 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
 
 /* ---- the picture ---- */
 
-/* All samples are in the picture. */
+/* Ends the samples, all of which are in the picture. */
 static enum pass_progress end_samples(struct frame_renderer *renderer, struct error *error)
 {
     if (frame_is_mark_pass(renderer))
         return frame_key_end_marks(renderer, error) ? PASS_REPEAT : PASS_FAILED;
     if (frame_is_eyes_pass(renderer) && !key_view_copy_count(&renderer->key, renderer->device, error))
         return PASS_FAILED;
-    /* It is there when the picture is, which is copied behind it. */
+    /* The copy is there when the picture is, which is copied behind it. */
     return trace_state_copy_counts(renderer->work->frame.trace_state, error) ? PASS_DONE : PASS_FAILED;
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Cuts a picture's slots into slices; halves of a slice that overflowed come first. */
 #include "render/frame/slices.h"
 
 #include "shared/path.h"

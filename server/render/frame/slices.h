@@ -18,11 +18,11 @@ struct slices {
 /* How many of the remaining `samples` are traced together, as a power of two: the rays of a pixel form packets, so
  * they are adjacent in a wave. It does not change the picture. */
 uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples);
-/* The same if slices were large, of a picture of `samples` what follows the first `done`; but no more than a
- * quarter of them, as halves of the samples are compared (denoise/README.md), and a part of a group is no fair
- * share of it. */
+/* The group of samples as a power of two if slices were large, for the samples of a picture of `samples` that
+ * follow the first `done`; but no more than a quarter of them, as halves of the samples are compared
+ * (passes/denoise/README.md), and a part of a group is no fair share of it. */
 uint32_t slices_group_shift(uint32_t samples, uint32_t done);
-/* From the first pixel on. */
+/* Begins with the first pixel again. */
 void slices_restart(struct slices *slices);
 /* The next slice for that many samples, of tiles that have not stopped and few that have between them; false: none
  * is left. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Queued slices: a ring of read-backs, and the size of slices by their time stamps. */
 #include "render/frame/slices_ahead.h"
 
 #include "gpu/registry.h"
@@ -12,7 +13,7 @@
 #define SLICE_RAYS_MIN (1u << 12)
 #define SLICE_RAYS_MAX (1u << 30)
 #define SLICE_GROWTH 8u
-#define SLICE_GROWTH_SLOW 2u /* of a slice that took longer than a step */
+#define SLICE_GROWTH_SLOW 2u /* growth after a slice that took longer than a step */
 
 static struct slice_ahead *next_of(struct slices_ahead *ahead)
 {
@@ -68,7 +69,7 @@ bool slices_ahead_take(struct slices_ahead *ahead, struct gpu_device *device, co
     return gpu_readback_take(device, &oldest->state, state, error);
 }
 
-/* 0: it has none. The slice is done, and so are its time stamps. */
+/* The query's time; 0: it has none. The slice is done, and so are its time stamps. */
 static uint64_t time_of(unsigned query)
 {
     GLint available = 0;
@@ -112,7 +113,7 @@ uint32_t slices_ahead_next_rays(struct slice_cost cost, uint64_t fixed_ns, uint6
     return (uint32_t)(next < SLICE_RAYS_MIN ? SLICE_RAYS_MIN : next < SLICE_RAYS_MAX ? next : SLICE_RAYS_MAX);
 }
 
-/* False: of one size alone. */
+/* Returns false while slices of a single size were measured. */
 static bool learn_fixed(struct slices_ahead *ahead, struct slice_cost cost)
 {
     const struct slice_cost last = ahead->last;

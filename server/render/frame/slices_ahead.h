@@ -11,11 +11,11 @@
 /* While the device works on one, the next is there already. */
 #define SLICES_AHEAD_MAX 2
 
-/* From where to do it again. */
+/* A queued slice, and what is needed to do it again. */
 struct slice_ahead {
     struct gpu_readback state; /* a struct wave_state, as it is behind the slice's last pass */
     struct slices slices;      /* before it was taken */
-    uint32_t sample, rays;     /* of its first wave */
+    uint32_t sample, rays;     /* sample of the slice, and rays of its first wave */
     unsigned queries[2];       /* GL time stamps: it begins, it ends */
 };
 
@@ -24,13 +24,13 @@ struct slice_cost {
     uint64_t took_ns;
 };
 
-/* All-zero is the valid empty one. */
+/* An all-zero one is empty and valid. */
 struct slices_ahead {
     struct slice_ahead ring[SLICES_AHEAD_MAX];
     uint32_t oldest, count;
-    uint32_t slice_rays;    /* of the slices that take as long as they should; 0: not known */
+    uint32_t slice_rays;    /* rays of slices that take as long as they should; 0: not known */
     struct slice_cost last; /* no rays: there was none */
-    uint64_t fixed_ns;      /* what a slice takes however few rays it has */
+    uint64_t fixed_ns;      /* time of a slice however few rays it has */
     bool knows_fixed;       /* slices of two sizes were measured */
 };
 
@@ -39,7 +39,7 @@ uint32_t slices_ahead_rays(const struct slices_ahead *ahead, uint32_t maximum);
 /* A slice is about to be taken from `slices`, at that sample. There is a place for it. */
 void slices_ahead_begin(struct slices_ahead *ahead, struct gpu_device *device, const struct slices *slices,
                         uint32_t sample);
-/* All passes of the slice, which has so many rays in its first wave, are queued. */
+/* Adds the slice, all of whose passes are queued; its first wave has that many rays. */
 bool slices_ahead_add(struct slices_ahead *ahead, struct gpu_device *device, const struct gpu_buffer *wave_state,
                       uint32_t rays, struct error *error);
 /* Whether the oldest is done; false if there is none. */
@@ -49,15 +49,15 @@ bool slices_ahead_take(struct slices_ahead *ahead, struct gpu_device *device, co
                        struct wave_state *state, struct error *error);
 /* From the slice just taken, how large those to come are to be for the device to work about `step_ns` on one. */
 void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *slice, uint64_t step_ns);
-/* What it learns of a slice that took so long. is_rest: it has fewer rays than were asked for, as a band of the
- * picture ended. */
+/* Learns from a slice that took so long. is_rest: it has fewer rays than were asked for, as a band of the picture
+ * ended. */
 void slices_ahead_note(struct slices_ahead *ahead, struct slice_cost cost, bool is_rest, uint64_t step_ns);
 /* How many rays the next slices have, after such a one: the device works about `step_ns` on each, or twice as long
  * as it takes anyway if that is more, so that half of its time at least goes into rays. */
 uint32_t slices_ahead_next_rays(struct slice_cost cost, uint64_t fixed_ns, uint64_t step_ns);
 /* Other rays, or by another tracer: the next slice is a first one. */
 void slices_ahead_forget(struct slices_ahead *ahead);
-void slices_ahead_drop(struct slices_ahead *ahead); /* all of them */
+void slices_ahead_drop(struct slices_ahead *ahead); /* drops every slice */
 void slices_ahead_finish(struct slices_ahead *ahead, struct gpu_device *device);
 
 #endif

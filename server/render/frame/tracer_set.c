@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tracers that are kept, what each has not yet been told, and which of them may be replaced. */
 #include "render/frame/tracer_set.h"
 
 #include <string.h>

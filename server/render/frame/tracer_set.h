@@ -8,14 +8,14 @@
 /* When each kind of change last happened to a scene's copy on the device. It determines the changes that a tracer
  * still has to be told, whatever its owner and however long it was not in use. */
 struct change_history {
-    uint64_t update_count;               /* of updates that changed something */
+    uint64_t update_count;               /* number of updates that changed something */
     uint64_t last[sizeof(unsigned) * 8]; /* by bit of enum scene_change: the number of the last such update */
 };
 void change_history_note(struct change_history *history, unsigned changed);
 
-#define TRACERS_KEPT 4 /* of those that no frame uses the one that was used longest ago is replaced */
+#define TRACERS_KEPT 4 /* where no frame uses a tracer, the one that was used longest ago is replaced */
 
-/* Of the scene, or of one view (frame/state.h). Zero, but for the history, is an empty set. */
+/* A scene's tracers, or those of one view (frame/state.h). Zero, but for the history, is an empty set. */
 struct tracer_set {
     const struct change_history *history; /* the scene's; outlives the set */
     struct tracer_slot {
@@ -23,7 +23,7 @@ struct tracer_set {
         const struct tracer_impl *impl;
         struct tracer_options options;
         uint64_t told;          /* updates in the history before its last update */
-        struct trace_view view; /* of its last update; zero: there was none, or no view */
+        struct trace_view view; /* the view of its last update; zero: there was none, or no view */
         uint64_t last_use;
         uint32_t users; /* frames in progress */
     } slots[TRACERS_KEPT];

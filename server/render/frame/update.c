@@ -11,7 +11,7 @@
 #include "render/frame/work.h"
 #include "render/waves/integrator.h"
 
-/* Of a step in which a thread packs what is large of the scene. */
+/* The time of a step in which a thread packs what is large of the scene. */
 #define UPDATE_STEP_NS UINT64_C(6000000)
 
 /* An update that failed leaves no revision. */
@@ -35,7 +35,8 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     note_showing(shared, revision_before, &changes);
     if (!updated)
         return false;
-    /* What others moved and put back may be in other parts of a tracer's structure, which are not added up. */
+    /* Things that others moved and put back may be in other parts of a tracer's structure, which are not added up.
+     */
     if (renderer->kept_showing != shared->showing)
         renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
@@ -80,7 +81,7 @@ static bool bring_scene(struct frame_renderer *renderer, bool *done, struct erro
     return reserve_end(renderer, brought, &failed, error);
 }
 
-/* The motion is not kept: it is read at once. */
+/* Finds the moves at once, as the motion is not kept. */
 static bool find_moves(struct frame_renderer *renderer, struct error *error)
 {
     return !frame_has_motion_layer(renderer) ||

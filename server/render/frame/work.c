@@ -72,7 +72,7 @@ struct frame_work *frame_work_take(struct frame_scene *shared, const struct inte
     return work;
 }
 
-/* As many stay as are in use, and one. */
+/* Keeps as much idle work as is in use, and one more. */
 void frame_work_give(struct frame_scene *shared, struct frame_work *work)
 {
     if (!work)

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Integrates the environment into irradiance, and makes the default light. */
 #include "render/light/environment.h"
 
 #include "base/clock.h"
@@ -15,7 +16,7 @@
 /* The sums of one row of an equirectangular image: per texel and channel only the five functions of the azimuth
  * that the nine harmonics share. */
 struct row_sums {
-    double one[3], x[3], z[3], xz[3], xx[3]; /* of colour times 1, sx, sz, sx sz, sx sx; s: unit circle */
+    double one[3], x[3], z[3], xz[3], xx[3]; /* sums of colour times 1, sx, sz, sx sz, sx sx; s: unit circle */
 };
 
 float environment_float_from_half(uint16_t half)

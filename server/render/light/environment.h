@@ -14,26 +14,26 @@
 
 struct environment {
     bool known;             /* the rest is of `revision` */
-    uint64_t revision;      /* of the scene's environment */
+    uint64_t revision;      /* revision of the scene's environment */
     uint32_t kind;          /* ENVIRONMENT_* */
-    float irradiance[9][3]; /* of the environment itself; the colour that multiplies an image included */
+    float irradiance[9][3]; /* the environment's own; the colour that multiplies an image included */
     bool default_light;
     struct gpu_buffer default_lights; /* SKY_LIGHTS of struct light */
-    uint32_t default_light_group;     /* theirs */
-    /* Of an image that is being integrated: */
+    uint32_t default_light_group;     /* light group of the default lights */
+    /* An image that is being integrated: */
     uint64_t summed_revision; /* 0: none is */
     uint32_t summed_rows;
     double sums[9][3];
 };
 
-/* Of an image's texel; infinity becomes the largest half, NaN becomes 0. */
+/* The float of an image's texel; infinity becomes the largest half, NaN becomes 0. */
 float environment_float_from_half(uint16_t half);
 /* Works until about `end_ns`; *done false: it is to be called again. */
 bool environment_update(struct environment *environment, struct gpu_device *device, const struct gpu_scene *gpu,
                         uint64_t end_ns, bool *done, struct error *error);
 void environment_fill_uniforms(const struct environment *environment, struct frame_uniforms *uniforms,
                                const struct gpu_scene *gpu);
-/* Of the scene, or the default light where it has none. */
+/* Lights of the scene, or the default light where it has none. */
 struct gpu_buffer *environment_lights(struct environment *environment, struct gpu_scene *gpu);
 void environment_finish(struct environment *environment, struct gpu_device *device);
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Makes the table of the environment's brightness by direction. */
 #include "render/light/environment_choice.h"
 
 #include "shared/bindings.h"
@@ -60,8 +61,8 @@ static void sky_luminances(float luminances[SKY_ROWS])
     }
 }
 
-/* Of a row of texels, each with its share of its neighbours': what lies between two texels is blended of both, and
- * so an eighth of the light of a texel shines from each half of a texel beside it. */
+/* Brightness of a row of texels, each with its share of its neighbours': light between two texels is blended of
+ * both, and so an eighth of the light of a texel shines from each half of a texel beside it. */
 static void image_row(float *row, float *scratch, const struct scene_environment *image, uint32_t v)
 {
     uint32_t width = image->width;

@@ -12,7 +12,7 @@ struct environment_choice {
     bool known; /* the rest is of `revision` and `kind` */
     uint64_t revision;
     uint32_t kind;          /* ENVIRONMENT_* */
-    uint32_t rows, columns; /* of the table; 0: there is none, as all directions are alike or black */
+    uint32_t rows, columns; /* size of the table; 0: there is none, as all directions are alike or black */
     float extent; /* steradians over which its light is spread: the square of its sum by the sum of its squares */
     struct gpu_buffer table;
 };
@@ -21,7 +21,7 @@ struct environment_choice {
 bool environment_choice_update(struct environment_choice *choice, struct gpu_device *device,
                                const struct environment *environment, const struct scene_environment *given,
                                struct error *error);
-/* To a program in use, with HAS_ENVIRONMENT_TABLE if there is one. */
+/* Binds the table to a program in use, with HAS_ENVIRONMENT_TABLE if there is one. */
 void environment_choice_bind(struct environment_choice *choice, struct gpu_device *device,
                              const struct gpu_program *program);
 void environment_choice_finish(struct environment_choice *choice, struct gpu_device *device);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Measures the error of each tile and stops those that have samples enough. */
 #include "render/picture/noise.h"
 
 #include "render/picture/picture.h"

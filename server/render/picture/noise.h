@@ -21,14 +21,14 @@
 
 #define PICTURE_NOISE_UNKNOWN 1e6f /* an error, before there are 16 samples */
 
-/* Of a picture whose request has `noise`; all-zero: of others. */
+/* The noise of a picture whose request limits it; all-zero for other pictures. */
 struct picture_noise {
     uint32_t tile_count;            /* in the order of slots */
     uint32_t going_on;              /* tiles that get samples */
     float error;                    /* the largest of a tile, as last looked at */
     uint32_t *samples;              /* owned; where a tile has stopped; 0: it goes on */
     float *errors;                  /* owned; of each tile */
-    struct gpu_buffer tile_samples; /* the same as samples */
+    struct gpu_buffer tile_samples; /* `samples` on the device */
     struct gpu_buffer tile_errors;
     uint32_t band_count;
     struct gpu_buffer *halves; /* owned; like the bands of the first plane: of the first half_samples */
@@ -37,7 +37,7 @@ struct picture_noise {
 struct picture;
 struct render_frame;
 
-/* Of the request's picture, whose bands are there: it goes on from `samples_before`, or begins. */
+/* Begins the request's picture, whose bands are there, or goes on from `samples_before`. */
 bool picture_noise_begin(struct picture *picture, const struct render_frame *frame, uint32_t samples_before,
                          struct error *error);
 /* The next number of samples, after that many, at which something has to be measured. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Bands of a picture's sums, and slices added to them. */
 #include "render/picture/picture.h"
 
 #include "render/context/request.h"

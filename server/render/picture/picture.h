@@ -3,7 +3,6 @@
 #ifndef FARLIGHT_RENDER_PICTURE_H
 #define FARLIGHT_RENDER_PICTURE_H
 
-#include "gpu/readback.h"
 #include "render/context/wave.h"
 #include "render/picture/noise.h"
 
@@ -17,12 +16,12 @@ struct picture {
     uint32_t cleared;   /* bands that are so for this frame */
     uint32_t band_count;
     uint32_t layers;          /* bits; each layer is a plane, in the order of their numbers */
-    uint32_t plane_count;     /* of them */
+    uint32_t plane_count;     /* number of planes */
     struct gpu_buffer *bands; /* plane after plane; vec4 a slot, of the beauty radiance and coverage, summed */
     const struct gpu_buffer *denoised; /* bands that are shown in place of those of the first plane; NULL: none */
     struct picture_noise noise;        /* where tiles stop one by one */
-    struct gpu_buffer resolved;        /* one band of a plane in the output's format */
-    uint8_t *pixels;                   /* what has been read back so far, plane after plane */
+    struct gpu_buffer resolved;        /* a band of a plane in the output's format */
+    uint8_t *pixels;                   /* pixels read back so far, plane after plane */
     size_t size_bytes;
 };
 
@@ -35,7 +34,7 @@ bool picture_begin(struct picture *picture, struct render_frame *frame, uint32_t
 /* Reserves and clears it, unless it is kept; may be put off (gpu_reserve_begin). */
 bool picture_reserve(struct picture *picture, const struct render_frame *frame, uint32_t samples_before,
                      struct error *error);
-bool picture_has_tile(const struct picture *picture, uint32_t tile); /* it gets samples */
+bool picture_has_tile(const struct picture *picture, uint32_t tile); /* whether a tile gets samples */
 /* The end of the slots without a gap, from `slot` on, whose tiles get samples. */
 uint32_t picture_run_end(const struct picture *picture, uint32_t slot);
 /* Row of the first slot of a band. */
@@ -45,27 +44,14 @@ uint32_t picture_strip_rows(const struct picture *picture, uint32_t pixels_max);
 uint32_t picture_slot_count(const struct picture *picture);
 /* First slot of the band after the one that `slot` is in. */
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);
-/* That adds slices, in use. */
+/* The program that adds slices, in use. */
 const struct gpu_program *picture_accumulate_program(struct render_wave *wave, struct error *error);
-/* Where the current slice is summed up (context->sums): of a picture of one sample that is the picture, but for
- * parts of a slice that begin where no storage block may. */
+/* The place where the current slice is summed up: for a picture of one sample that is the picture, but for parts
+ * of a slice that begin where no storage block may. */
 struct gpu_buffer_place picture_sums_place(const struct picture *picture, const struct render_wave *wave);
 /* Adds the current slice to a plane: the slice's samples in `sums` from first_sum on. */
 bool picture_accumulate(struct picture *picture, struct render_wave *wave, uint32_t plane, struct gpu_buffer *sums,
                         uint32_t first_sum, struct error *error);
-/* Before the first band is read; may be put off (gpu_reserve_begin). */
-bool picture_reserve_pixels(struct picture *picture, const struct render_frame *frame, struct error *error);
-/* Announces the programs that accumulate and resolve (gpu_program_announce). */
-void picture_announce(const struct picture *picture, struct render_wave *wave);
-/* resolve.c: band of a plane -> picture->resolved. */
-bool picture_resolve_band(struct picture *picture, const struct render_frame *frame, uint32_t plane, uint32_t band,
-                          struct error *error);
-/* readback.c: from there to picture->pixels in two steps, between which the device may have other work: `resolved`
- * is free again after the first. */
-bool picture_copy_band(struct picture *picture, const struct render_frame *frame, struct gpu_readback *copy,
-                       uint32_t plane, uint32_t band, struct error *error);
-bool picture_take_band(struct picture *picture, const struct render_frame *frame, struct gpu_readback *copy,
-                       uint32_t plane, uint32_t band, struct error *error);
 enum layer picture_plane_layer(const struct picture *picture, uint32_t plane);
 struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band);
 /* How many slots a band has, and the first of them. */
@@ -78,8 +64,6 @@ struct gpu_buffer *picture_slice_band(const struct picture *picture, const struc
 uint64_t picture_device_bytes(const struct picture *picture);
 uint32_t picture_band_first_row(const struct picture *picture, uint32_t band);
 uint32_t picture_band_row_count(const struct picture *picture, uint32_t band);
-/* readback.c. Leaves the request's crop of the pixels, of which there are all. */
-void picture_cut(struct picture *picture, const struct frame_request *request);
 void picture_drop_pixels(struct picture *picture);
 void picture_finish(struct picture *picture, struct gpu_device *device);
 

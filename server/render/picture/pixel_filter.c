@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Distributions of the pixel filters, inverted into places. */
 #include "render/picture/pixel_filter.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* From the device to memory that the frame's taker owns. */
-#include "render/picture/picture.h"
+#include "render/picture/readback.h"
 
 #include "base/clock.h"
 #include "render/context/request.h"

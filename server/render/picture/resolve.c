@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB, or Y'CbCr of that; of
  * light that is a display's values these, clamped, and for floats what a display emits for them. */
-#include "render/context/request.h"
-#include "render/picture/picture.h"
+#include "render/picture/resolve.h"
 
 #include "shared/layers.h"
 #include "shared/path.h"
@@ -16,7 +15,7 @@ static bool is_exposed(enum layer layer)
     return layer == LAYER_BEAUTY || frame_request_is_light(layer);
 }
 
-/* Of the sum of a layer's samples what its pixels show. */
+/* The factor from the sum of a layer's samples to what its pixels show. */
 static float scale_of(const struct picture *picture, const struct frame_request *request, enum layer layer)
 {
     float mean = 1.0f / (float)picture->samples;
@@ -44,7 +43,7 @@ static const char *form_of(enum layer layer)
     return LAYER_BITS_CRYPTO >> layer & 1 ? "PAIRS" : layer == LAYER_MOTION ? "PLAIN" : NULL;
 }
 
-/* Of a program of display.glsl; with the curve where it makes display values. */
+/* Defines of a program of display.glsl; with the curve where it makes display values. */
 #define DISPLAY_DEFINES 4
 static void display_defines(const struct render_frame *frame, enum layer layer, bool displays,
                             struct gpu_define defines[DISPLAY_DEFINES])

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Owen-scrambled Sobol points, as shaders/common/sequence.glsl has them. */
 #include "render/picture/sequence.h"
 
 static uint32_t hash(uint32_t v)

@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-/* Of a pixel: its block's seed, and its place there. */
+/* A pixel's seed: that of its block, and the pixel's place there. */
 struct sequence_seed {
     uint32_t block, place;
 };
@@ -15,7 +15,7 @@ struct sequence_seed sequence_seed(uint32_t x, uint32_t y, uint32_t seed);
 /* In [0, 1). `dimension`: SEQUENCE_* of shared/frame.h. */
 float sequence_number(struct sequence_seed pixel, uint32_t dimension, uint32_t index);
 void sequence_pair(float pair[2], struct sequence_seed pixel, uint32_t dimension, uint32_t index);
-/* The same numbers in another order: those of 2^group_shift samples, which begin at a multiple of that, close
+/* Numbers of the pair in another order: those of 2^group_shift samples, which begin at a multiple of that, close
  * together. */
 void sequence_pair_sorted(float pair[2], struct sequence_seed pixel, uint32_t dimension, uint32_t index,
                           uint32_t group_shift);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Compacts waves: lists of hits, and the places of children. */
 #include "render/waves/compact.h"
 
 #include "host_passes/host_passes.h"
@@ -12,7 +13,7 @@ static uint32_t blocks_of(uint32_t item_count)
     return (item_count + COMPACT_BLOCK - 1) / COMPACT_BLOCK;
 }
 
-/* As the device counts them. */
+/* Counts as the device does. */
 static struct wave_counts counts_of(uint32_t count)
 {
     const uint32_t groups = (count + 63) / 64, x = groups < WAVE_GROUPS_MAX ? groups : WAVE_GROUPS_MAX;
@@ -82,13 +83,13 @@ static bool scan(struct render_wave *wave, const struct gpu_program *program, st
 {
     gpu_buffer_bind_storage(&wave->block_offsets, BIND_BLOCK_OFFSETS);
     gpu_buffer_bind_storage(&wave->state, BIND_WAVE);
-    gpu_dispatch(wave->device->gpu, program, 1); /* one group */
+    gpu_dispatch(wave->device->gpu, program, 1); /* a single group */
     if (wave->device->counts_on_host)
         gpu_buffer_read(wave->device->gpu, &wave->state, 0, &wave->known_state, sizeof(wave->known_state));
     return gpu_check(wave->device->gpu, "compacting", error);
 }
 
-/* As the scans do. */
+/* Writes the state as the scans do. */
 static void write_state(struct render_wave *wave)
 {
     gpu_buffer_write(wave->device->gpu, &wave->state, 0, &wave->known_state, sizeof(wave->known_state));
@@ -152,7 +153,7 @@ static bool decide_order(struct render_wave *wave, struct error *error)
     if (!program)
         return false;
     gpu_buffer_bind_storage(&wave->state, BIND_WAVE);
-    gpu_dispatch(wave->device->gpu, program, 1); /* one group */
+    gpu_dispatch(wave->device->gpu, program, 1); /* a single group */
     return true;
 }
 

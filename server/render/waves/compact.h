@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Lists made on the device by prefix sums: their order is that of what they are made from, every time, and they
- * have no holes; or by the host (host_passes). How long they are the device notes in
- * context->wave_state, from which the passes over them are dispatched. */
+ * have no holes; or made by the host (host_passes). The device notes their lengths in wave->state, from which the
+ * passes over them are dispatched. */
 #ifndef FARLIGHT_RENDER_WAVES_COMPACT_H
 #define FARLIGHT_RENDER_WAVES_COMPACT_H
 
@@ -10,13 +10,13 @@
 /* In the order of struct wave_state. */
 enum wave_list { WAVE_RAYS, WAVE_RAY_BLOCKS, WAVE_HITS, WAVE_HIT_BLOCKS, WAVE_SHADOW_RAYS };
 
-/* A slice begins: the state of its first rays, of context->ray_count rays. */
+/* A slice begins: sets the state of its first wave, of wave->ray_count rays. */
 void compact_begin(struct render_wave *wave);
 /* A slice that the device stopped is done again. */
 void compact_go_on(struct render_wave *wave);
-/* One invocation of the program for each item of the list. */
+/* Dispatches an invocation of the program for each item of the list. */
 void compact_dispatch(struct render_wave *wave, const struct gpu_program *program, enum wave_list list);
-/* Lists the hits of the current wave: context->hit_list, hit_places and hit_count. */
+/* Lists the hits of the wave: hit_list, hit_places and hit_count. */
 bool compact_hits(struct render_wave *wave, struct error *error);
 struct compact_order {
     uint32_t children_a_hit;
@@ -24,7 +24,7 @@ struct compact_order {
     bool sorts;       /* by the children's directions, where that pays (compact_sample.comp) */
 };
 
-/* The places of the hits' children (context->block_offsets) and their number, context->ray_count. */
+/* Finds the places of the hits' children (wave->block_offsets) and their number, wave->ray_count. */
 bool compact_children(struct render_wave *wave, const struct compact_order *order, struct gpu_buffer *child_counts,
                       struct error *error);
 /* Makes the wave one of `count` shadow rays of each hit. `all_count`: they count as rays of the slice as they are;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The table of integrators, and what each sets up for its shader. */
 #include "render/waves/integrator.h"
 
 #include "render/light/environment_choice.h"
@@ -10,7 +11,7 @@
 
 /* Rays that go straight on through blended surfaces do not count as bounces. */
 #define STRAIGHT_WAVES 16
-/* Likewise the layers of ray casting: what is left of the ray limits them, and where that never ends, as behind
+/* Layers of ray casting do not count either: the rest of the ray limits them, and where that never ends, as behind
  * perfectly clear panes, this many beyond the depth. */
 #define LAYERS_MAX 256
 #define OPACITY_DEFAULT 0.5f
@@ -92,7 +93,7 @@ static bool prepare_environment_choice(const struct render_frame *frame, struct 
                                      &frame->scene->scene->environment, error);
 }
 
-/* Of an image; what a mirror sees of other environments its own rays find as well. */
+/* The table is an image's; a mirror's own rays find other environments as well. */
 static size_t distributed_defines(const struct render_wave *wave, struct gpu_define *defines)
 {
     size_t n = integrator_emitter_defines(wave->frame, defines);
@@ -133,8 +134,7 @@ static void set_path(const struct render_frame *frame, const struct gpu_program 
     set_environment_choice(frame, program);
 }
 
-/* Of scene_features.mirrors nothing is left out, but what a tracer stores is rounded, and a grain narrows a lobe.
- */
+/* scene_features.mirrors leaves nothing out, but what a tracer stores is rounded, and a grain narrows a lobe. */
 static size_t whitted_defines(const struct render_wave *wave, struct gpu_define *defines)
 {
     if (wave->frame->features.mirrors || wave->frame->features.anisotropy || wave->sampled_hits ||

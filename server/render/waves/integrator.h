@@ -21,12 +21,12 @@ struct integrator {
     bool meets_lights;       /* rays hit area lights, by their weights */
     uint32_t shadow_waves;   /* how many waves of shadow rays the buffers hold; no more are traced at once */
     uint32_t straight_waves; /* waves beyond the depth that are left to rays which go straight on */
-    uint32_t (*shadow_rays_a_hit)(const struct render_frame *frame); /* of the current frame */
+    uint32_t (*shadow_rays_a_hit)(const struct render_frame *frame); /* shadow rays of each hit in this frame */
     /* The rest may be NULL: none. */
     const char *ground;     /* a define of render/ground.comp */
     const char *left_scene; /* a define of render/left_scene.glsl */
     const char *gather;     /* a define of render/gather.comp */
-    size_t (*defines)(const struct render_wave *wave, struct gpu_define *defines);    /* of the shader */
+    size_t (*defines)(const struct render_wave *wave, struct gpu_define *defines);    /* defines of the shader */
     void (*set)(const struct render_frame *frame, const struct gpu_program *program); /* uniforms and bindings */
     /* At the start of a frame and when the capacity of its waves grows. */
     bool (*prepare)(const struct render_frame *frame, struct error *error);

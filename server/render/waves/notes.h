@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What shading notes beside radiance, for layers of a picture: the parts of the light, and what covers samples. */
+/* Notes of shading beside radiance, for layers of a picture: the parts of the light, and what covers samples. */
 #ifndef FARLIGHT_RENDER_WAVES_NOTES_H
 #define FARLIGHT_RENDER_WAVES_NOTES_H
 
@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-/* All-zero: nothing is noted. */
+/* An all-zero one notes nothing. */
 struct wave_notes {
     uint32_t layers;            /* bits of the picture's layers beside the beauty */
     uint32_t plane_samples;     /* samples of the slice, in each plane of the sums */
@@ -20,7 +20,7 @@ struct wave_notes {
 
 /* The number of a layer's plane in the sums. */
 uint32_t notes_plane(const struct wave_notes *notes, uint32_t layer_bit);
-/* What covers samples, where shading finds it; NULL: it does not. */
+/* The surfaces that cover samples, where shading finds them; NULL: it does not. */
 struct gpu_buffer *notes_covers(struct wave_notes *notes);
 /* Layers of light (shaders/render/light_layers.glsl): whether there are some, the defines of a program that notes
  * them, and their sums bound to it. */

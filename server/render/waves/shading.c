@@ -17,7 +17,8 @@
 #include <epoxy/gl.h>
 
 #define DEFINES_MAX                                                                                               \
-    (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + NOTES_LIGHT_DEFINES + 3) /* and what ends them */
+    (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + NOTES_LIGHT_DEFINES +                                     \
+     3) /* three more and the end of the list */
 
 static uint32_t shadow_rays(const struct wave_shading *shading, const struct render_frame *frame)
 {
@@ -242,7 +243,7 @@ static enum pass_progress make_wave(struct wave_shading *shading, struct render_
     return move_children(shading, wave, error) ? PASS_DONE : PASS_FAILED;
 }
 
-/* The children become the context's rays and paths; counts the wave. */
+/* Makes the children the wave's rays and paths, and counts the wave. */
 static enum pass_progress next_wave(struct wave_shading *shading, struct render_wave *wave, struct error *error)
 {
     context_span_begin(wave->device, STAGE_SHADE);

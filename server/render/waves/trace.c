@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Traces a frame's waves a step at a time, by a second tracer too where tracers are compared. */
 #include "render/waves/trace.h"
 
 #include "base/clock.h"

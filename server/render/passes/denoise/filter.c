@@ -8,7 +8,7 @@
 
 #include <math.h>
 
-#define LEVELS 4u /* of the wavelet: the widest sees 15 pixels far */
+#define LEVELS 4u /* levels of the wavelet: the widest sees 15 pixels far */
 /* Rows that a strip's own depend on: each level sees 2^level pixels far and its risk DENOISE_CHOICE_RADIUS times
  * that, and noise is looked for 4 pixels around. */
 #define EDGE_ROWS (((1u << LEVELS) - 1) * (1 + DENOISE_CHOICE_RADIUS) + 4)
@@ -62,7 +62,7 @@ static bool reserve_strip(struct denoise_filter *filter, const struct render_fra
            gpu_buffer_reserve(device, &filter->risks, pixels * 2 * sizeof(float), error);
 }
 
-/* All of the picture where it fits. */
+/* Begins a strip, which is the whole picture where it fits. */
 static bool begin_strip(struct denoise_filter *filter, const struct render_frame *frame, struct error *error)
 {
     const uint64_t most = rows_max(frame, filter->picture);
@@ -148,8 +148,8 @@ static void bind_give(struct denoise_filter *filter, const struct render_frame *
     gpu_buffer_bind_storage(denoise_sums_band(filter->sums, DENOISE_SUM_RESULT, band), BIND_DENOISE_OUT);
 }
 
-/* Of few samples of mirrors and glass, noise hides what is seen there; halves of many differ by that, and so do
- * those that come from the picture before, as the eye moves. */
+/* Noise of few samples of mirrors and glass hides what is seen there; halves of many samples differ by that, and
+ * so do those that come from the picture before, as the eye moves. */
 static float mirror_doubt(const struct denoise_history *history, uint32_t samples)
 {
     const float many = fminf(fmaxf((float)samples / (float)FEW_SAMPLES - 1.0f, 0.0f), 1.0f);
@@ -298,7 +298,7 @@ static bool dispatch(struct denoise_filter *filter, const struct render_frame *f
     return gpu_check(frame->device->gpu, "denoising", error);
 }
 
-/* Behind the one in hand. */
+/* The pass that follows. */
 static uint32_t next_pass(const struct denoise_filter *filter)
 {
     const uint32_t next = filter->pass + 1;

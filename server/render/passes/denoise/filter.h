@@ -12,15 +12,15 @@ struct denoise_filter {
     struct denoise_sums *sums; /* these three are the renderer's */
     struct denoise_history *history;
     struct picture *picture;
-    struct gpu_buffer notes;                   /* of the slice in hand */
-    struct gpu_buffer guides, slopes;          /* of what is seen */
-    struct gpu_buffer motions;                 /* where the sums have them */
+    struct gpu_buffer notes;                   /* notes of the slice */
+    struct gpu_buffer guides, slopes;          /* guides by what is seen */
+    struct gpu_buffer motions;                 /* motions, where the sums have them */
     struct gpu_buffer first, wider, levels[2]; /* halves of the light: at first; filtered; as it was chosen */
     struct gpu_buffer risks;
     /* progress */
-    uint32_t strip_row, strip_rows; /* of the strip in hand, with what its edges depend on */
+    uint32_t strip_row, strip_rows; /* rows of the strip, with those that its edges depend on */
     uint32_t own_row, own_end;      /* rows of the picture that it is for */
-    uint32_t pass, row;             /* that the next step does; row: of the strip, or of the picture */
+    uint32_t pass, row;             /* the next step's; row: of the strip, or of the picture */
 };
 
 /* Notes what the hits of a slice are, for its denoiser. */

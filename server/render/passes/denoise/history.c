@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Keeps a view's picture, and binds the one before for reprojection. */
 #include "render/passes/denoise/history.h"
 
 #include "render/context/camera.h"
@@ -9,7 +10,8 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* Of one eye through a pinhole: the pixels of others see what several places of another picture show. */
+/* Keeps pictures of one eye through a pinhole: the pixels of others see what several places of another picture
+ * show. */
 static bool may_keep(const struct render_frame *frame)
 {
     const struct frame_request *request = &frame->request;
@@ -17,7 +19,7 @@ static bool may_keep(const struct render_frame *frame)
            request->aperture == 0.0f && request->noise == 0.0f && !frame->scene->has_motion;
 }
 
-/* The same scene; while it moves perhaps in another pose. */
+/* Whether the scene is the same; while it moves, perhaps in another pose. */
 static bool is_followed(const struct denoise_kept *before, const struct denoise_kept *now)
 {
     struct frame_request same = before->request;
@@ -45,7 +47,7 @@ bool denoise_history_begin(struct denoise_history *history, struct render_frame 
                            bool goes_on, struct error *error)
 {
     history->is_written = history->is_used = history->is_moving = history->things_moved = false;
-    if (frame->request.hidden_layer > 0) /* of the picture that was written last */
+    if (frame->request.hidden_layer > 0) /* the history is of the picture that was written last */
         return true;
     if (!may_keep(frame)) {
         denoise_history_finish(history, frame->device->gpu);

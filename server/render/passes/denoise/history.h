@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What a view keeps of its last picture for the next one: of each pixel the light that falls there, how many
- * samples that is worth, and the guide; and from where it was seen. The next frame finds there what it sees again
- * (Schied et al. Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). README.md says what of it is trusted.
- */
+/* A view's last picture, kept for the next one: for each pixel the light that falls there, how many samples that
+ * is worth, and the guide; and where it was seen from. The next frame finds there what it sees again (Schied et
+ * al. Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). README.md says what of it is trusted. */
 #ifndef FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
 #define FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
 
@@ -14,21 +13,21 @@ struct denoise_kept {
     struct gpu_buffer pixels; /* uvec4 a pixel, row by row: shaders/render/denoise_reproject.comp */
     struct frame_uniforms uniforms;
     struct frame_request request;
-    uint64_t showing, revision; /* as in frame_scene, and of the scene */
+    uint64_t showing, revision; /* `showing` of frame_scene, and the scene's revision */
     struct denoise_places places;
-    bool whole; /* it has all of a picture */
+    bool whole; /* a whole picture is kept */
 };
 
 struct denoise_history {
     struct denoise_kept kept[2];
     uint32_t now;    /* which of them the frame in hand is written to; the other one is of the picture before */
-    bool is_written; /* by the frame in hand */
-    bool is_used;    /* the same */
+    bool is_written; /* the frame that is rendered writes it */
+    bool is_used;    /* the frame that is rendered uses it */
     uint32_t moving; /* frames so far: each has noise of its own */
     bool is_moving;  /* the frame in hand, or the last one, is one of them */
     /* DENOISE_MOVED_TEXELS an instance, where some have moved since the picture before. */
     struct gpu_buffer moved;
-    bool things_moved; /* it has something */
+    bool things_moved; /* `moved` has something */
 };
 
 /* Once it is known what the frame shows. `goes_on`: it adds samples to the picture that was written last, and

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Compares where instances are with where they were. */
 #include "render/passes/denoise/places.h"
 
 #include "scene/affine.h"

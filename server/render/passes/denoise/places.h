@@ -16,12 +16,12 @@ struct denoise_places {
     uint32_t count, capacity;
 };
 
-/* Of the scene as it is posed. */
+/* Notes where the scene's instances are, as it is posed. */
 void denoise_places_note(struct denoise_places *places, const struct gpu_scene *scene);
 /* Whether both are of the same instances. */
 bool denoise_places_match(const struct denoise_places *a, const struct denoise_places *b);
-/* Of those that match: of each instance the matrix that leads from where a point of it is to where it was. Of one
- * that has another shape it leads as far as DENOISE_ANEW. */
+/* For places that match: the matrix of each instance that leads from where a point of it is to where it was. That
+ * of an instance with another shape leads as far as DENOISE_ANEW. */
 void denoise_places_compare(const struct denoise_places *before, const struct denoise_places *now,
                             float (*before_from_now)[12]);
 void denoise_places_finish(struct denoise_places *places);

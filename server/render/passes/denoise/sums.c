@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Notes guides of a slice's hits and adds them to the sums of the picture. */
 #include "render/passes/denoise/sums.h"
 
 #include "render/waves/compact.h"
@@ -9,7 +10,7 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* Of DENOISE_AUTO: up to half of these samples a picture gets all of it, with all of them none
+/* By DENOISE_AUTO a picture is filtered in full up to half of these samples, and not at all from all of them on
  * (protocol/words.def). */
 #define AUTO_SAMPLES 128u
 
@@ -17,7 +18,7 @@ float denoise_strength(const struct frame_request *request, uint32_t samples)
 {
     if (request->denoise != DENOISE_AUTO)
         return request->denoise == DENOISE_ON ? 1.0f : 0.0f;
-    if (request->noise > 0.0f) /* it is rendered until that is below what was asked for */
+    if (request->noise > 0.0f) /* the picture is rendered until its noise is below what was asked for */
         return 0.0f;
     const float left = 2.0f - 2.0f * (float)samples / (float)AUTO_SAMPLES;
     return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
@@ -91,7 +92,7 @@ bool denoise_sums_begin(struct denoise_sums *sums, const struct render_frame *fr
     return true;
 }
 
-/* In use, with all that it reads. */
+/* The program that notes, in use, with all that it reads. */
 static const struct gpu_program *note_program(const struct denoise_sums *sums, struct gpu_buffer *notes,
                                               struct gpu_buffer *moved, bool follows, struct render_wave *wave,
                                               struct error *error)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a picture that is denoised has beside its samples' radiance: the radiance of half of them, and what their
- * first hits are. It is noted slice by slice and reaches the sums when the slice reaches the picture. */
+/* Sums of a denoised picture beside its samples' radiance: the radiance of half of them, and what their first hits
+ * are. Slices note it, and it reaches the sums when the slice reaches the picture. */
 #ifndef FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
 #define FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
 
@@ -10,11 +10,11 @@
 
 enum denoise_sum {
     DENOISE_SUM_HALF,    /* the light of the first half: shaders/render/denoise_half.glsl */
-    DENOISE_SUM_DOUBLED, /* that of as many samples as the last power of two, which will be half of them */
+    DENOISE_SUM_DOUBLED, /* the light of as many samples as the last power of two, which will be half of them */
     DENOISE_SUM_ALBEDO,
     DENOISE_SUM_NORMAL,
     DENOISE_SUM_MOTION, /* where has_motion; else nothing */
-    DENOISE_SUM_RESULT, /* of the denoised picture, as many samples; no sum of slices */
+    DENOISE_SUM_RESULT, /* the denoised picture's, of as many samples; no sum of slices */
     DENOISE_SUM_COUNT
 };
 
@@ -24,28 +24,28 @@ struct denoise_sums {
     /* Notes say what is seen in smooth mirrors and behind glass. Not where pictures follow one another: what each
      * sample meets there differs from one to the next. */
     bool follows;
-    bool has_motion; /* that, or something has moved since the picture before */
+    bool has_motion; /* `follows`, or something has moved since the picture before */
 };
 
 /* Whether the frame has noise, and is to lose it: of those that trace no rays at random, and of pictures made from
  * others, nothing is noted and nothing changes. */
 bool denoise_is_wanted(const struct render_frame *frame);
-/* The same of the samples in hand: of DENOISE_AUTO those behind the last that it looks at are not noted. */
+/* Whether the samples that come next are noted: by DENOISE_AUTO those behind the last that it looks at are not. */
 bool denoise_notes_samples(const struct render_frame *frame);
 /* How much of the filtering a picture of that many samples gets, 0 to 1. */
 float denoise_strength(const struct frame_request *request, uint32_t samples);
-/* One of the programs that ask how many samples a pixel has: its tile may have stopped. `reprojected`: the light
- * of the picture has that of pictures before in it. */
+/* A program that asks how many samples a pixel has, as its tile may have stopped. `reprojected`: the light of the
+ * picture has that of pictures before in it. */
 const struct gpu_program *denoise_use(const struct render_frame *frame, const struct denoise_sums *sums,
                                       const char *shader, bool reprojected, struct error *error);
 /* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
 bool denoise_sums_begin(struct denoise_sums *sums, const struct render_frame *frame, const struct picture *picture,
                         uint32_t samples_before, const struct denoise_history *history, struct error *error);
-/* The context has hits of a new slice: notes what they are. `moved`: see denoise_history_moved(). Inside no span.
- */
+/* The wave has hits of a new slice: notes what they are. `moved`: see denoise_history_moved(). Inside no span. */
 bool denoise_note(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
                   struct render_wave *wave, struct error *error);
-/* It has those of the rays that these have sent on: of what is seen in mirrors and through glass they say more. */
+/* The wave has hits of the rays that these have sent on: they say more of what is seen in mirrors and through
+ * glass. */
 bool denoise_follow(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
                     struct render_wave *wave, struct error *error);
 /* Adds the current slice, before the picture has it. Call it once the slice cannot be repeated, but on the device.

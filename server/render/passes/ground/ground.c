@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Finds and shades the ground's hits. */
 #include "render/passes/ground/ground.h"
 
 #include "render/light/environment_choice.h"
@@ -11,9 +12,10 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-/* Of each hit, where each is chosen by its light: a ray brings its part or none, so one would make much noise. */
+/* Shadow rays of each hit, where each is chosen by its light: a ray brings its part or none, so one would make
+ * much noise. */
 #define SHADOW_RAYS 4u
-/* Those of emitters, of surfaces, and the rest. */
+/* Defines of emitters, of surfaces, and the rest. */
 #define DEFINES_MAX (4 + CONTEXT_SURFACE_DEFINES + 6 + NOTES_LIGHT_DEFINES)
 
 bool ground_is_shown(const struct render_frame *frame)

@@ -153,7 +153,7 @@ static uint32_t light_planes_end(const struct wave_notes *notes)
     return notes_have_light(notes) ? planes + 1 : 0;
 }
 
-/* All but how open a place is, which begins with 0. */
+/* Notes every layer but ambient occlusion, which begins with 0. */
 static bool note_hits(struct layers *layers, struct render_wave *wave, struct error *error)
 {
     bool needs_surface = layers->noting & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
@@ -247,7 +247,7 @@ static bool trace_ao_rays(struct layers *layers, struct render_wave *wave, bool 
         .visibility = &layers->ao_visibility,
         .times = wave->frame->scene->has_motion ? &layers->ao_times : NULL,
     };
-    const bool begins = !wave->frame->trace_state->in_progress; /* its rays are counted once */
+    const bool begins = !wave->frame->trace_state->in_progress; /* the wave's rays are counted once */
     return compact_shadow_rays(wave, layers->asking, begins, &rays, error) &&
            wave_trace(wave, RAY_SHADOW, &rays, done, error);
 }

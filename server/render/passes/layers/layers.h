@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What a picture's samples saw beside its light: layers of the first surface that each ray met, also where that
- * lets light through. One sample of the slice in hand after the other is noted in sums of the slice, which reach
- * the picture when the slice does; what a layer holds is said in protocol/words.def, ENUMERATION(LAYER). */
+/* Layers of a picture beside its light: properties of the first surface that each ray met, also where that lets
+ * light through. Each sample of a slice is noted in sums of the slice, which reach the picture when the slice
+ * does; protocol/words.def says what a layer holds, ENUMERATION(LAYER). */
 #ifndef FARLIGHT_RENDER_PASSES_LAYERS_H
 #define FARLIGHT_RENDER_PASSES_LAYERS_H
 
@@ -14,10 +14,10 @@ struct layers {
     struct wave_notes notes; /* notes.layers 0: nothing is done, and no memory is held */
     struct moves moves;
     struct gpu_buffer ao_rays, ao_times, ao_visibility;
-    uint32_t noting; /* of the current slice: those that hits are noted in */
-    bool noted;      /* of the current slice: properties of its hits */
-    uint32_t asked;  /* likewise: rays of ao that each hit has been given */
-    uint32_t asking; /* likewise: and that are made and not traced to the end; 0: none */
+    uint32_t noting; /* the slice's layers that hits are noted in */
+    bool noted;      /* properties of the slice's hits are noted */
+    uint32_t asked;  /* rays of ao that each hit of the slice has been given */
+    uint32_t asking; /* rays of ao that are made and not traced to the end; 0: none */
 };
 
 /* Notes properties of first hits, and of other hits what the tracer does not know. */
@@ -29,8 +29,8 @@ void layers_begin(struct layers *layers, const struct render_frame *frame, bool 
 bool layers_are_shaded(const struct layers *layers);
 /* A new slice begins. */
 void layers_begin_slice(struct layers *layers, const struct render_wave *wave);
-/* Of the current slice LAYER_UNKNOWN is the caller's to write: where in the sums its plane begins; UINT32_MAX: it
- * is not wanted. layers->noting: what is left to note. */
+/* Leaves LAYER_UNKNOWN of the current slice to the caller and returns where in the sums its plane begins;
+ * UINT32_MAX: it is not wanted. layers->noting: what is left to note. */
 uint32_t layers_take_unknown(struct layers *layers);
 /* Adds the current slice to the picture. Call it once the slice cannot be repeated. */
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_wave *wave,

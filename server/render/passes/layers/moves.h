@@ -8,7 +8,7 @@
 #include "gpu_scene/scene.h"
 #include "render/context/request.h"
 
-struct moves {                   /* all-zero: none */
+struct moves {                   /* an all-zero one has none */
     struct gpu_buffer instances; /* shared/layers.h: struct move */
     struct gpu_buffer vertices;
     bool has_any; /* else nothing but the camera moves */

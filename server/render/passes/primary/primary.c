@@ -72,7 +72,7 @@ static void set_layer(struct primary *primary)
     primary->cleared = true;
 }
 
-/* What one layer still needs, or a part of it. *whole: the layer is done. */
+/* Draws a layer, or a part of it. *whole: the layer is done. */
 static bool draw_part(struct primary *primary, const struct render_frame *frame, bool *whole, struct error *error)
 {
     const struct raster_view_target target = {
@@ -101,7 +101,7 @@ bool primary_rasterise(struct primary *primary, const struct render_frame *frame
     context_span_begin(frame->device, STAGE_PRIMARY);
     gpu_push_group(frame->device->gpu, "rasterise primary");
     context_bind_frame(frame);
-    /* All of the picture, of which the framebuffer has a strip. */
+    /* The viewport is the whole picture, of which the framebuffer has a strip. */
     glViewport(0, -(GLint)primary->first_row, (GLsizei)primary->visible.width, (GLsizei)frame->request.height);
     glDepthMask(GL_TRUE); /* clearing heeds both */
     glDisable(GL_SCISSOR_TEST);

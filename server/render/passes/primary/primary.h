@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the eye sees first: rays of a slice's pixels and, where they are rasterised, their hits. */
+/* First hits: rays of a slice's pixels and, where they are rasterised, the visibility buffer. */
 #ifndef FARLIGHT_RENDER_PASSES_PRIMARY_H
 #define FARLIGHT_RENDER_PASSES_PRIMARY_H
 
@@ -17,9 +17,9 @@ struct primary {
     /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the strip's uppermost. An array. */
     struct gpu_texture visible;
     struct gpu_texture depth; /* reversed, 32-bit float; of the layer that is drawn */
-    struct gpu_framebuffer framebuffers[SAMPLES_TOGETHER_MAX]; /* one a layer */
-    uint32_t first_row;                                        /* of the strip, in the picture */
-    uint32_t layer_count;                                      /* that are drawn */
+    struct gpu_framebuffer framebuffers[SAMPLES_TOGETHER_MAX]; /* a framebuffer for each layer */
+    uint32_t first_row;                                        /* the strip's first row in the picture */
+    uint32_t layer_count;                                      /* layers that are drawn */
     /* where drawing goes on */
     uint32_t layer;
     struct raster_view view;
