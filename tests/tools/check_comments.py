@@ -54,7 +54,7 @@ AT_MOST = {
     "server/gpu_scene": (18, 0),
     "server/host_passes": (4, 0),
     "server/net": (13, 0),
-    "server/render": (23, 0),
+    "server/render": (4, 0),
     "server/scene": (15, 0),
     "server/session": (20, 0),
     "server/store": (7, 0),
