@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A pass over the rays and hits of a slice: four functions, of which frame/ runs those of its list in order.
- * `self` is the pass's own state, part of a frame's work. */
+/* A pass of a frame, or of a slice of its samples: four functions. frame/passes.c lists the passes in order.
+ * `self` is a pass's state: part of a frame's work, or the renderer. */
 #ifndef FARLIGHT_RENDER_CONTEXT_PASS_H
 #define FARLIGHT_RENDER_CONTEXT_PASS_H
 
@@ -8,15 +8,16 @@
 
 enum pass_progress {
     PASS_FAILED,
-    PASS_MORE,   /* the pass is not finished: run it again */
-    PASS_DONE,   /* the next pass may run */
-    PASS_REPEAT, /* the slice does not fit its buffers: nothing of it has reached the picture, and it is repeated
-                  */
+    PASS_MORE, /* the pass is not finished: run it again */
+    PASS_DONE, /* the next pass may run */
+    /* A slice that does not fit its buffers is repeated, nothing of which has reached the picture; a frame goes
+     * back to its builds, for the next of its pictures. */
+    PASS_REPEAT,
 };
 
 struct pass {
     const char *name;
-    /* Whether the pass has work on this wave, which the passes before it have left. */
+    /* Whether the pass has work on the wave that the passes before it have left. NULL: it always has. */
     bool (*wants)(const void *self, const struct render_wave *wave);
     /* Reserves buffers for slices of that many samples and waves of wave->capacity rays, or gives back what the
      * frame does not need; may be put off (gpu_reserve_begin). NULL: the pass needs none. */

@@ -300,10 +300,11 @@ static enum pass_progress land_all(struct frame_renderer *renderer, struct error
         return PASS_MORE;
     if (!measure_noise(renderer, error))
         return PASS_FAILED;
-    if (renderer->sample == renderer->work->frame.request.samples)
-        return end_samples(renderer, error);
-    renderer->samples_phase = SAMPLES_BEGIN;
-    return PASS_MORE;
+    if (renderer->sample < renderer->work->frame.request.samples) {
+        renderer->samples_phase = SAMPLES_BEGIN;
+        return PASS_MORE;
+    }
+    return end_samples(renderer, error);
 }
 
 static bool wants(const void *self, const struct render_wave *wave)
