@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Barriers from the accesses that programs declare. */
 #include "gpu/barrier.h"
 
 #include "gpu/uniforms.h"
@@ -44,7 +45,7 @@ void gpu_accesses_add(struct gpu_program *program, const char *text)
     }
 }
 
-/* ---- what the driver sees ---- */
+/* ---- resources known to the driver ---- */
 
 static GLint resources(const struct gpu_program *program, GLenum kind)
 {

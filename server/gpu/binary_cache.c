@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Files of the cache: reading, writing, and removal of the least recently used. */
 #include "gpu/binary_cache.h"
 
 #include "base/file_io.h"
@@ -18,15 +19,16 @@
 #define BINARY_BYTES_MAX (64u << 20)
 #define NAME_BYTES 64
 #define ENDING ".program"
-#define ENDING_FRESH ".fresh" /* not yet whole */
-/* A frame has about twenty programs, so the limit is exceeded by the programs of two frames at most. */
+#define ENDING_FRESH ".fresh" /* incomplete */
+/* Number of writes between trims. A frame has about twenty programs, so the limit is exceeded by the programs
+ * of two frames at most. */
 #define WRITES_BETWEEN_TRIMS 32
-/* Entries that one trim looks at, so that its time has a bound; the next trim goes on. */
+/* Maximum of entries that a trim reads, which bounds its time; the next trim continues. */
 #define ENTRIES_MAX 8192u
-/* An older unfinished file is of a process that was killed: writing one takes far less. */
+/* Age in seconds above which an unfinished file is that of a killed process: writing one takes far less. */
 #define FRESH_SECONDS_MAX 600
 
-/* A file is this header and the driver's bytes. */
+/* Header of a file; the driver's bytes follow. */
 struct header {
     char magic[8];
     uint32_t format, size_bytes;
@@ -57,8 +59,8 @@ bool gpu_cache_folder(char *path, size_t size)
     return mkdir(path, 0700) == 0 || errno == EEXIST;
 }
 
-/* Binaries are code: a folder that other users may write to is refused. One that they may read is closed to them.
- */
+/* Whether only this user can write to the folder. Binaries are code: a folder that others may write to is
+ * refused; one that they may read is closed to them. */
 static bool is_ours_alone(int folder)
 {
     struct stat found;
@@ -141,7 +143,7 @@ bool gpu_binary_read(const struct gpu_binary_cache *cache, const struct gpu_bina
         return false;
     const bool good = read_file(file, key, binary);
     if (good)
-        (void)futimens(file, NULL); /* used just now */
+        (void)futimens(file, NULL); /* marks it as used */
     close(file);
     return good;
 }
@@ -210,7 +212,7 @@ static void trim(const struct gpu_binary_cache *cache)
     }
     free(entries);
     if (listing)
-        closedir(listing); /* with its descriptor */
+        closedir(listing); /* closes its descriptor, too */
     else if (folder >= 0)
         close(folder);
 }
@@ -228,7 +230,7 @@ void gpu_binary_write(struct gpu_binary_cache *cache, const struct gpu_binary_ke
     memcpy(header.magic, magic, sizeof(magic));
     header.checksum = XXH3_64bits(binary->data, binary->size_bytes);
     file_name(name, key);
-    /* Under a name of its own first: another process may read at any moment. */
+    /* The file gets its name when it is complete: another process may read at any moment. */
     snprintf(fresh, sizeof(fresh), "%ld-%llx-%u" ENDING_FRESH, (long)getpid(),
              (unsigned long long)(uintptr_t)cache, number);
     const int file = openat(cache->folder, fresh, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);

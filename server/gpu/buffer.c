@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Buffers: allocation, transfers and bindings. */
 #include "gpu/buffer.h"
 
 #include "base/progress.h"
@@ -8,7 +9,7 @@
 #include <epoxy/gl.h>
 
 #define STORAGE_FLAGS (GL_DYNAMIC_STORAGE_BIT | GL_MAP_WRITE_BIT)
-/* Small buffers start at one page. */
+/* Minimum capacity: one page. */
 #define CAPACITY_MIN_BYTES 4096
 #define STEP_BYTES ((size_t)256)
 
@@ -20,9 +21,9 @@ static void release(struct gpu_device *device, struct gpu_buffer *buffer)
     *buffer = (struct gpu_buffer){0};
 }
 
-/* llvmpipe compiles a program for what is bound: for buffer textures whose memory is a power of two or not, and
- * whose size has a first or second byte of 0 or not, as it takes these for levels. Bound to others, the program is
- * compiled again, which takes up to a second. So all capacities are alike in this. */
+/* Rounds a size so that all capacities look alike to llvmpipe. It compiles a program for the bound buffer
+ * textures: whether their memory is a power of two, and whether the first or second byte of their size is 0, as
+ * it takes these for levels. With others bound, the program is compiled again, which takes up to a second. */
 static size_t alike(size_t bytes)
 {
     size_t capacity = (bytes + STEP_BYTES - 1) & ~(STEP_BYTES - 1);
@@ -33,7 +34,8 @@ static size_t alike(size_t bytes)
 
 static size_t grown_capacity(size_t old_bytes, size_t size_bytes)
 {
-    /* A first allocation is exact: most buffers are filled once. One that grows will grow again. */
+    /* A first allocation is exact, as most buffers are filled once. A buffer that grows will probably grow
+     * again. */
     size_t capacity = old_bytes ? size_bytes + size_bytes / 2 : size_bytes;
     if (capacity < size_bytes)
         capacity = size_bytes;
@@ -55,7 +57,7 @@ static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_
         gpu_note_loss(device, error);
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more buffer names");
     }
-    /* Clears older errors, which are not this allocation's and must not hide its own. */
+    /* Earlier errors are not this allocation's, and must not hide its own. */
     GLenum before = glGetError();
     glNamedBufferStorage(buffer->name, (GLsizeiptr)capacity, NULL,
                          device->facts.software ? STORAGE_FLAGS | GL_MAP_READ_BIT : STORAGE_FLAGS);
@@ -81,7 +83,7 @@ bool gpu_buffer_reserve(struct gpu_device *device, struct gpu_buffer *buffer, si
         if (!allocate(device, buffer, grown_capacity(old_bytes, size_bytes), error))
             return false;
     } else if (size_bytes != buffer->size_bytes) {
-        /* What the buffer texture spans goes by the used bytes; the next bind makes it again. */
+        /* A buffer texture spans the used bytes; the next bind makes it again. */
         gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
         buffer->texture = 0;
     }
@@ -99,9 +101,9 @@ bool gpu_buffer_upload(struct gpu_device *device, struct gpu_buffer *buffer, con
     return true;
 }
 
-/* NVIDIA's driver (580) clears a buffer of more than some pages after what is written into it behind the clear:
+/* Waits for a clear. NVIDIA's driver (580) clears a buffer of more than some pages after a later write into it:
  * only glFinish() keeps them in order, no barrier and no flush does. */
-static void let_clear_end(const struct gpu_device *device, struct gpu_buffer *buffer)
+static void wait_for_clear(const struct gpu_device *device, struct gpu_buffer *buffer)
 {
     if (buffer->was_cleared && !device->facts.software)
         glFinish();
@@ -113,7 +115,7 @@ void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_
     if (!gpu_buffer_reserve(device, buffer, size_bytes ? size_bytes : 1, error))
         return NULL;
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
-    let_clear_end(device, buffer);
+    wait_for_clear(device, buffer);
     void *data = glMapNamedBufferRange(buffer->name, 0, (GLsizeiptr)buffer->size_bytes,
                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
     if (data)
@@ -147,7 +149,7 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
                       size_t size_bytes)
 {
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
-    let_clear_end(device, buffer);
+    wait_for_clear(device, buffer);
     if (size_bytes)
         glNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
     progress_tell();
@@ -201,7 +203,7 @@ void gpu_buffer_copy(struct gpu_device *device, struct gpu_buffer_place from, st
 
 void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer)
 {
-    /* One that was bound and never held anything has only its texture. */
+    /* A buffer that was bound while empty has only its texture. */
     if (buffer->name || buffer->texture)
         release(device, buffer);
     *buffer = (struct gpu_buffer){0};

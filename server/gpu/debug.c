@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Callback for the driver's messages, and a stack of group names. */
 #include "gpu/debug.h"
 
 #include "base/log.h"
@@ -7,7 +8,7 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-/* Passes nest two or three deep; deeper names are counted but not kept. */
+/* Maximum depth of kept names. Passes nest two or three deep; deeper names are counted but not kept. */
 #define GROUP_DEPTH_MAX 16
 
 static _Thread_local const char *group_names[GROUP_DEPTH_MAX];
@@ -24,7 +25,7 @@ static enum log_level level_of(GLenum type, GLenum severity)
 {
     if (type == GL_DEBUG_TYPE_ERROR || severity == GL_DEBUG_SEVERITY_HIGH)
         return LOG_ERROR;
-    /* Performance hints are many, and none is the user's concern. */
+    /* Performance hints are numerous and do not concern the user. */
     if (type == GL_DEBUG_TYPE_PERFORMANCE || type == GL_DEBUG_TYPE_OTHER)
         return LOG_DEBUG;
     return severity == GL_DEBUG_SEVERITY_MEDIUM ? LOG_WARNING : LOG_DEBUG;
@@ -34,7 +35,7 @@ static void APIENTRY on_message(GLenum source, GLenum type, GLuint id, GLenum se
                                 const GLchar *text, const void *user)
 {
     (void)id, (void)length, (void)user;
-    /* Compile logs come back with the error that program.c makes. */
+    /* Compile logs are part of the error that program.c makes. */
     if (source == GL_DEBUG_SOURCE_SHADER_COMPILER || severity == GL_DEBUG_SEVERITY_NOTIFICATION)
         return;
     if (type == GL_DEBUG_TYPE_PUSH_GROUP || type == GL_DEBUG_TYPE_POP_GROUP)
@@ -46,7 +47,7 @@ void gpu_debug_start(void)
 {
     group_depth = 0;
     glEnable(GL_DEBUG_OUTPUT);
-    glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS); /* else the group's name would be another's */
+    glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS); /* otherwise a message might get another group's name */
     glDebugMessageCallback(on_message, NULL);
 }
 

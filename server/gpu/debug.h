@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The driver's messages, and the names of the passes they belong to. */
+/* Log of the driver's messages, with the names of the passes that cause them. */
 #ifndef FARLIGHT_GPU_DEBUG_H
 #define FARLIGHT_GPU_DEBUG_H
 

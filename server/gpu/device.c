@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Creation of a device: its place, facts and defaults; loss, and reservations of memory. */
 #include "gpu/device.h"
 
 #include "base/clock.h"
@@ -16,7 +17,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* glGetError keeps one flag for each of a few kinds; after a loss it may report one for ever. */
+/* Maximum of errors read: glGetError keeps one flag for each of a few kinds, and may report one for ever after
+ * a loss. */
 #define GL_ERRORS_READ_MAX 8
 
 static _Thread_local struct gpu_device *current_device;
@@ -30,7 +32,7 @@ static void missing_function(void)
 {
 }
 
-/* epoxy's own handler ends the process; a driver without a function must be an error message. */
+/* Handles a function that the driver lacks with an error message; epoxy's own handler ends the process. */
 static void (*on_missing_function(const char *name))(void)
 {
     log_write(LOG_ERROR, "gpu", "the driver has no %s", name);
@@ -52,14 +54,14 @@ static bool sounds_like_software(const char *renderer)
     return false;
 }
 
-/* The context is current. */
+/* Whether the current context renders in software. */
 static bool renders_in_software(void)
 {
     const GLubyte *renderer = glGetString(GL_RENDERER);
     return renderer && sounds_like_software((const char *)renderer);
 }
 
-/* The context is current. */
+/* Reads the names of the current context's driver. */
 static void ask_info(struct gpu_device_info *info, const struct gpu_egl_place *place)
 {
     *info = (struct gpu_device_info){.index = place->index};
@@ -70,7 +72,8 @@ static void ask_info(struct gpu_device_info *info, const struct gpu_egl_place *p
     info->software = place->software || sounds_like_software(info->name);
 }
 
-/* Zink queues its work as GPUs do, on lavapipe too. FARLIGHT_LIKE_GPU=1 is for tests on machines without a GPU. */
+/* Whether software GL's sizes are chosen. Zink queues its work as GPUs do, on lavapipe too. FARLIGHT_LIKE_GPU=1
+ * is for tests on machines without a GPU. */
 static bool chooses_as_software(const struct gpu_device_info *info)
 {
     const char *like_gpu = getenv("FARLIGHT_LIKE_GPU");
@@ -88,21 +91,22 @@ void gpu_facts_choose(struct gpu_facts *facts, bool software)
 {
     facts->software = facts->shares_memory = software;
     facts->step_scale = software ? 1 : 64;
-    /* Software GL has no latency to hide, and its caches are the processor's; a GPU wants enough rays to fill
-     * itself. */
+    /* Software GL has no latency to hide, and its caches are the processor's; a GPU needs enough rays to fill it.
+     */
     facts->slice_rays_max = software ? 1u << 16 : 1u << 20;
     facts->range_rays_first = software ? 4096 : UINT32_MAX;
-    /* Seconds of a slow GPU, if every ray took all of its rounds: a thousandth of them is usual. No driver ends
-     * what a processor does. */
+    /* The limit is seconds of a slow GPU if every ray took all of its rounds, though a thousandth is usual. No
+     * driver limits the time of a processor. */
     facts->dispatch_rounds_max = software ? 0 : (uint64_t)1 << 35;
     facts->packet_rays = software ? 8 : 1;
-    /* Software GL takes some ten milliseconds for as many. A GPU has at least twice its number in a storage block.
-     */
+    /* Software GL takes some ten milliseconds for this many. A GPU's storage block holds at least twice its
+     * number. */
     facts->band_slots_max = software ? 1u << 18 : 1u << 22;
-    /* A ray of a large scene needs some hundred; it has enough of them to be finished in one dispatch, unless the
-     * scene is made to keep it. Software GL leaves a loop after 65535 rounds. */
+    /* A ray of a large scene needs some hundred tests; with this many it finishes in one dispatch, unless the
+     * scene is built to prevent it. Software GL leaves a loop after 65535 rounds. */
     facts->ray_tests_max = software ? 65000 : 1u << 16;
-    /* With more, a step of the smallest range of rays would take software GL longer than a cancel may. */
+    /* With more primitives, a step of the smallest range of rays would take software GL longer than a cancel
+     * may. */
     facts->primitives_max = software ? 65000 : 0;
     facts->axes_samples_max = (software ? 1 : 8) * (4ull * 3 * 1024 * 1024);
 }
@@ -150,8 +154,8 @@ size_t gpu_device_list(struct gpu_device_info *list, size_t max)
     return count;
 }
 
-/* Opens the first place that fits the options: the one that was named; else hardware before software, and of
- * several the least used. */
+/* Opens the first place that fits the options: the named one, or else hardware before software, and among several
+ * the least used. */
 static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const struct gpu_options *options,
                        bool debug, struct error *error)
 {
@@ -164,7 +168,7 @@ static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const 
     for (int software = by_index ? 0 : options->software; software < 2; software++) {
         for (size_t i = 0; i < count; i++) {
             bool fits = by_index ? places[i].index == options->index : places[i].software == software;
-            /* Of Mesa's surfaceless platform it is not known before it is open; it is tried last. */
+            /* Mesa's surfaceless platform has an unknown renderer until it is open, so it is tried last. */
             if (!by_index && !places[i].device)
                 fits = software == 1;
             if (!fits)
@@ -177,7 +181,7 @@ static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const 
             *chosen = places[i];
             if (by_index || software || !renders_in_software())
                 return true;
-            /* Mesa offers devices that it cannot drive, such as those of another driver. */
+            /* Mesa lists devices that it cannot drive, such as those of another driver. */
             places[i].software = true;
             gpu_egl_close(egl);
         }
@@ -194,7 +198,7 @@ static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const 
                                "packages libegl-mesa0 and libgl1-mesa-dri");
 }
 
-/* The state that every pass may rely on. */
+/* Sets the state that every pass may rely on. */
 static bool create_defaults(struct gpu_device *device, struct error *error)
 {
     static const unsigned char zeros[GPU_EMPTY_BUFFER_BYTES];
@@ -306,7 +310,7 @@ static const char *gl_error_name(GLenum code)
     }
 }
 
-/* A driver tells of a reset only until it is over, while the context stays lost. */
+/* Whether a reset was reported. A driver reports it only until it is over, while the context stays lost. */
 static bool was_reset(struct gpu_device *device)
 {
     device->lost = device->lost || (device->facts.robust && glGetGraphicsResetStatus() != GL_NO_ERROR);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* EGL: devices, displays and contexts. */
 #include "gpu/egl.h"
 
 #include <epoxy/egl.h>
@@ -9,7 +10,8 @@
 #include <dlfcn.h>
 #include <link.h>
 
-/* A driver that has been unloaded cannot be named in a report, nor its own leaks be suppressed by its name. */
+/* Keeps the driver loaded: a report could not name an unloaded driver, nor could its own leaks be suppressed by
+ * name. */
 static int pin_driver(struct dl_phdr_info *info, size_t size, void *data)
 {
     (void)size, (void)data;
@@ -19,7 +21,7 @@ static int pin_driver(struct dl_phdr_info *info, size_t size, void *data)
 }
 #endif
 
-/* Whole words only: one extension's name may be the start of another's. */
+/* Whether the list has the whole word: one extension's name may be the start of another's. */
 static bool has_word(const char *words, const char *word)
 {
     size_t length = strlen(word);
@@ -67,7 +69,7 @@ size_t gpu_egl_places(struct gpu_egl_place *places, size_t max)
             any_software |= places[count++].software;
         }
     }
-    /* The surfaceless platform would only show Mesa's software renderer a second time. */
+    /* The surfaceless platform would only list Mesa's software renderer a second time. */
     if (!any_software && count < max && has_word(extensions, "EGL_MESA_platform_surfaceless"))
         places[count] = (struct gpu_egl_place){.index = (int)count}, count++;
     return count;
@@ -111,7 +113,7 @@ static EGLContext create_context(EGLDisplay display, EGLConfig config, bool robu
     return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
 }
 
-/* Robust is better, and no configuration at all fits a context that never draws to a surface. */
+/* Creates a context, preferably a robust one; without a configuration, as it never draws to a surface. */
 static bool create_any_context(struct gpu_egl *egl, const char *extensions, bool debug)
 {
     bool any_config = has_word(extensions, "EGL_KHR_no_config_context");

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Reads a driver's limits, and compares them with the programs' needs. */
 #include "gpu/limits.h"
 
 #include <epoxy/gl.h>

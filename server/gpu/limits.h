@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Limits of a driver beside what the programs need: the rows of limits.def. */
+/* Limits of a driver beside the needs of the programs: the rows of limits.def. */
 #ifndef FARLIGHT_GPU_LIMITS_H
 #define FARLIGHT_GPU_LIMITS_H
 
@@ -21,9 +21,10 @@ struct gpu_limit_row {
 };
 extern const struct gpu_limit_row gpu_limit_rows[GPU_LIMIT_COUNT];
 
-/* Of the context that is current. */
+/* Reads the limits of the current context. */
 void gpu_limits_ask(uint64_t values[GPU_LIMIT_COUNT]);
-/* Whether all of them suffice; else ERROR_UNSUPPORTED names the first that does not, its value and the need. */
+/* Whether all of them suffice; otherwise ERROR_UNSUPPORTED names the first one that does not, its value and the
+ * need. */
 bool gpu_limits_check(const uint64_t values[GPU_LIMIT_COUNT], struct error *error);
 
 #endif

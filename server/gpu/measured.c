@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The file of a device's measurements, and the rule for software GL. */
 #include "gpu/measured.h"
 
 #include "gpu/binary_cache.h"
@@ -13,9 +14,10 @@
 
 #define LINE "first hits are traced from %f primitives a pixel on, from %f with several samples\n"
 
-/* Rasterising, in which one thread of software GL transforms all vertices, is as fast as tracing at 0.6 primitives
- * a pixel, and takes 1.8 times as long at 3 (one sample and four of scans of 47K to 871K triangles, 320x240 and
- * 640x480). Where there are fewer in all neither takes long, and pictures stay those of views, which rasterise. */
+/* Rule for software GL. Rasterising, for which one of its threads transforms all vertices, is as fast as tracing
+ * at 0.6 primitives a pixel, and takes 1.8 times as long at 3 (one sample and four of scans of 47K to 871K
+ * triangles, 320x240 and 640x480). With fewer primitives in all neither takes long, and pictures stay the same as
+ * in views, which rasterise. */
 static const struct gpu_measured of_software = {
     .known = true, .traced_from = {0.6f, 0.6f}, .primitives_min = 100000};
 
@@ -56,7 +58,7 @@ bool gpu_measured_store(const struct gpu_device_info *info, const struct gpu_mea
     char path[4096], fresh[4128];
     if (!file_path(path, sizeof(path), info))
         return false;
-    /* Under a name of its own first: another daemon may read at any moment. */
+    /* The file gets its name when it is complete: another daemon may read at any moment. */
     snprintf(fresh, sizeof(fresh), "%s.%ld", path, (long)getpid());
     FILE *file = fopen(fresh, "we");
     if (!file)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What was measured on a device, so that it is measured once: kept on the disk beside the programs, under the
- * driver's vendor, renderer and version and that of the daemon. */
+/* Measurements of a device, kept on the disk beside the programs so that they are made once, under the driver's
+ * vendor, renderer and version and that of the daemon. */
 #ifndef FARLIGHT_GPU_MEASURED_H
 #define FARLIGHT_GPU_MEASURED_H
 
@@ -11,18 +11,18 @@ struct gpu_device_info;
 
 struct gpu_measured {
     bool known;
-    /* From so many primitives a pixel on first hits are found clearly faster by tracing than by rasterising: with
-     * one sample a pixel, with several. Rasterising takes time for each primitive, tracing hardly any. */
+    /* Primitives per pixel from which tracing finds first hits clearly faster than rasterising: with one sample
+     * per pixel, with several. Rasterising takes time for each primitive, tracing hardly any. */
     float traced_from[2];
-    uint64_t primitives_min; /* where there are fewer in all they are rasterised */
+    uint64_t primitives_min; /* with fewer in all they are rasterised */
 };
 
-/* False: nothing is known of the device. Of software GL nothing is ever measured, so that its pictures do not
- * depend on what a machine was found to be: there is a rule. */
+/* Reads the measurements. False: none are known. Software GL has a fixed rule and is never measured, so that
+ * its pictures do not depend on the machine. */
 bool gpu_measured_load(const struct gpu_device_info *info, struct gpu_measured *measured);
-/* False: there is no cache that can be written. */
+/* Writes the measurements. False: no cache is writable. */
 bool gpu_measured_store(const struct gpu_device_info *info, const struct gpu_measured *measured);
-/* Whether first hits are traced, where that is left to the device. */
+/* Whether first hits are traced, where the device decides. */
 bool gpu_measured_traces(const struct gpu_measured *measured, bool several_samples, uint64_t primitives,
                          uint64_t pixels);
 

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
+/* Extensions that report memory, and shares of it. */
 #include "gpu/memory.h"
 
 #include "base/host.h"
 
 #include <epoxy/gl.h>
 
-/* Share of a device's own memory: the rest is for other programs, and for what drivers keep beside what is asked.
- */
+/* Share of a device's own memory: the rest is for other programs, and for the driver's own use. */
 #define SHARE_PERCENT 70
 /* Share of the host's memory for software GL. Scenes, blobs, edits and frames have 50 % of it (server/config.c); a
- * quarter is left to what none of these limits counts, and to other programs. */
+ * quarter is left for memory that none of these limits counts, and for other programs. */
 #define HOST_SHARE_PERCENT 25
-/* Of what is free: other programs have theirs already. */
+/* Share of the free memory: other programs have theirs already. */
 #define FREE_SHARE_PERCENT 85
-/* Where nothing is told. Devices with OpenGL 4.5 and less memory of their own are rare; an integrated one shares
- * the host's, of which this is at most a quarter. */
+/* Default where nothing is reported. Devices with OpenGL 4.5 and less memory of their own are rare; an
+ * integrated one shares the host's, of which this is at most a quarter. */
 #define UNTOLD_BYTES ((uint64_t)2 << 30)
 #define UNTOLD_HOST_PARTS 4
 
@@ -35,7 +35,7 @@ struct gpu_memory_answers gpu_memory_ask(bool software)
 
 struct gpu_memory gpu_memory_from(const struct gpu_memory_answers *answers)
 {
-    /* What a driver over software GL tells is a constant: lavapipe's is 2 GiB. */
+    /* A driver over software GL reports a constant: lavapipe's is 2 GiB. */
     if (answers->software)
         return (struct gpu_memory){GPU_MEMORY_HOST, answers->host_bytes};
     if (answers->total_bytes)

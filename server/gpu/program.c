@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Cache of programs: their keys, look-up, linking and dispatch. */
 #include "gpu/program.h"
 
 #include "base/clock.h"
@@ -31,7 +32,7 @@ struct cached_program {
 
 struct gpu_program_cache {
     struct cached_program *first;
-    struct hashmap found; /* by the key's hash: a frame asks some hundred times */
+    struct hashmap found; /* by the key's hash: a frame looks up some hundred */
 };
 
 struct gpu_program_cache *gpu_program_cache_create(void)
@@ -53,7 +54,7 @@ void gpu_program_cache_destroy(struct gpu_program_cache *cache)
 }
 
 struct key {
-    size_t length; /* more than KEY_MAX: it is too long */
+    size_t length; /* more than KEY_MAX: too long */
     char text[KEY_MAX + 1];
 };
 
@@ -70,7 +71,7 @@ static void key_append(struct key *key, const char *text, char end)
     key->length += length + 1;
 }
 
-/* One line for files and defines; false: longer than KEY_MAX. */
+/* Makes the key, one line with files and defines. False: longer than KEY_MAX. */
 static bool make_key(struct key *key, const struct gpu_program_source *source, struct error *error)
 {
     const char *paths[] = {source->compute, source->vertex, source->geometry, source->fragment};
@@ -107,7 +108,7 @@ static bool load(GLuint program, const struct gpu_binary *binary)
     if (!binary->data)
         return false;
     glProgramBinary(program, binary->format, binary->data, (GLsizei)binary->size_bytes);
-    /* A format of another driver is an error of GL and no more than a miss here. */
+    /* A binary in another driver's format is a GL error, and here only a miss. */
     if (glGetError() == GL_NO_ERROR)
         glGetProgramiv(program, GL_LINK_STATUS, &linked);
     return linked == GL_TRUE;
@@ -121,7 +122,7 @@ static void store(struct gpu_device *device, GLuint program, const struct gpu_bi
     gpu_binary_finish(&binary);
 }
 
-/* From what was compiled ahead or is on the disk, else compiled. */
+/* Links a program that was compiled ahead or is on the disk; compiles others. */
 static bool link_program(struct gpu_device *device, GLuint program, struct gpu_build *build,
                          struct gpu_binary *binary, bool *compiled, struct error *error)
 {
@@ -186,12 +187,13 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     if (ok)
         program = add_program(device, &build.program, source->compute != NULL, key, hash);
     if (program)
-        build.program.uniforms = NULL; /* handed over */
+        build.program.uniforms = NULL; /* ownership has moved */
     gpu_build_finish(&build);
     gpu_binary_finish(&binary);
     if (!program) {
         gpu_object_destroy(device->registry, GPU_PROGRAM, name);
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program"); /* unless a reason stands there */
+        /* unless a reason is set already */
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program");
         return NULL;
     }
     program->compiled = compiled;
@@ -199,8 +201,9 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     return &program->program;
 }
 
-/* What llvmpipe compiles at a dispatch it hands over on the disk. Other software GL compiles hardly anything
- * before a program is used: contexts for it cost more than they gain. */
+/* Whether programs are compiled ahead. The code that llvmpipe compiles at a dispatch passes through the disk.
+ * Other software GL compiles hardly anything before a program is used: contexts for it cost more than they
+ * gain. */
 static bool compiles_ahead(const struct gpu_device *device)
 {
     const struct gpu_facts *facts = &device->facts;
@@ -208,7 +211,7 @@ static bool compiles_ahead(const struct gpu_device *device)
     return gains && facts->has_program_binary && !device->compiles;
 }
 
-/* A program that is on the disk is not compiled, as it is loaded in no time. */
+/* Announces a program; one on the disk need not be compiled, as it is loaded in no time. */
 static void announce(struct gpu_device *device, const struct gpu_program_source *source, const struct key *key)
 {
     struct gpu_build build;

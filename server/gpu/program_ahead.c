@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Threads that compile announced programs. */
 #include "gpu/program_ahead.h"
 
 #include "base/clock.h"
@@ -13,12 +14,14 @@
 #include <string.h>
 #include <time.h>
 
-/* Compilers are single threads. More would need more memory and gain little: a frame has a few large programs. */
+/* Maximum of threads. A compiler is a single thread; more would need more memory and gain little: a frame has a
+ * few large programs. */
 #define THREADS_MAX 2
-/* Of a driver that compiles several together. */
+/* Programs given at once to a driver that compiles several together. */
 #define TOGETHER_MAX 32
-/* Mesa writes what it has compiled in threads of its own, which have the lowest priority: some milliseconds, and
- * more on a busy machine. Until they sleep, and no longer than this; the second, where none is found. */
+/* Names of Mesa's threads that write compiled code to the disk, with the lowest priority: some milliseconds,
+ * and more on a busy machine. The wait lasts until they sleep, and no longer than this; the second limit is for
+ * when none is found. */
 #define WRITERS_NAME ":disk$"
 #define WRITERS_MAX 8
 #define WRITTEN_NS_MAX UINT64_C(100000000)
@@ -28,7 +31,7 @@
 enum state { WAITING, BEGUN, DONE };
 
 struct item {
-    struct item *next; /* in the order in which they were announced, which is that of their need */
+    struct item *next; /* in the order of the announcements, which is that of their need */
     struct gpu_build build;
     struct gpu_binary binary;
     enum state state;
@@ -38,21 +41,21 @@ struct item {
 struct worker {
     struct gpu_ahead *ahead;
     pthread_t thread;
-    bool started;   /* and not joined */
-    bool stands_in; /* for the device's thread while that waits: it ends after one program */
+    bool started;   /* started and not joined */
+    bool stands_in; /* helps while the device's thread waits: it ends after one program */
     bool ended;
 };
 
 struct gpu_ahead {
     const struct gpu_device *device;
-    pthread_mutex_t lock; /* of all that follows */
+    pthread_mutex_t lock; /* guards the members below */
     pthread_cond_t changed;
     struct item *first, **end;
     struct worker workers[THREADS_MAX];
-    bool ends, unavailable; /* no context can be had */
+    bool ends, unavailable; /* unavailable: no context can be made */
 };
 
-/* Locked. The next ones that wait; 0: there are none. */
+/* Locked. Begins the next waiting items; 0: there are none. */
 static size_t begin_items(struct gpu_ahead *ahead, struct item **items)
 {
     const size_t max = ahead->device->facts.compiles_together ? TOGETHER_MAX : 1;
@@ -121,7 +124,7 @@ static void *run(void *context)
     struct gpu_ahead *ahead = worker->ahead;
     struct gpu_egl beside;
     pthread_setname_np(pthread_self(), "compile");
-    host_thread_gives_way(); /* to what builds; what waits for this one takes no time */
+    host_thread_gives_way(); /* builds go first; a program that is waited for takes no time here */
     const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
     if (opened) {
         compile_items(ahead, worker->stands_in);
@@ -169,7 +172,7 @@ void gpu_ahead_destroy(struct gpu_ahead *ahead)
     free(ahead);
 }
 
-/* Locked. Where it stands in the list. */
+/* Locked. Finds the item's link in the list. */
 static struct item **find(struct gpu_ahead *ahead, const char *key)
 {
     for (struct item **at = &ahead->first; *at; at = &(*at)->next)
@@ -186,13 +189,13 @@ bool gpu_ahead_knows(struct gpu_ahead *ahead, const char *key)
     return knows;
 }
 
-/* Locked. */
+/* Locked. Starts a worker. */
 static void start(struct worker *worker)
 {
     if (worker->started && !worker->ended)
         return;
     if (worker->started)
-        pthread_join(worker->thread, NULL); /* which does no more than return */
+        pthread_join(worker->thread, NULL); /* the thread only has to return */
     worker->ended = false;
     worker->started = pthread_create(&worker->thread, NULL, run, worker) == 0;
 }
@@ -201,7 +204,7 @@ static size_t thread_count(const struct gpu_facts *facts)
 {
     if (facts->compiles_together)
         return 1;
-    /* Beside the device's thread, which compiles, too, where that happens at a dispatch. */
+    /* The device's thread compiles, too, where that happens at a dispatch. */
     const size_t count = facts->compiles_at_dispatch ? parallel_processors() - 1 : THREADS_MAX;
     return count < THREADS_MAX ? count : THREADS_MAX;
 }
@@ -244,7 +247,8 @@ static bool any_waiting(const struct gpu_ahead *ahead)
     return at;
 }
 
-/* Locked. Of two processors none is idle while the device's thread waits for the one thread that compiles. */
+/* Locked. Starts a second thread while the device's thread waits for the only one that compiles, so that no
+ * processor is idle. */
 static void stand_in(struct gpu_ahead *ahead)
 {
     struct worker *worker = &ahead->workers[1];
@@ -263,7 +267,7 @@ bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *
         stand_in(ahead);
     while (item && item->state == BEGUN)
         pthread_cond_wait(&ahead->changed, &ahead->lock);
-    if (item) { /* this thread alone changes the list */
+    if (item) { /* only this thread changes the list */
         *place = item->next;
         if (ahead->end == &item->next)
             ahead->end = place;

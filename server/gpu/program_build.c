@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Texts of a program's stages, and its compilation. */
 #include "gpu/program_build.h"
 
 #include "base/progress.h"
@@ -58,7 +59,8 @@ bool gpu_build_prepare(struct gpu_build *build, const struct gpu_device *device,
     ok = ok && make_key(build, &device->info);
     if (!ok) {
         gpu_build_finish(build);
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program"); /* unless a reason stands there */
+        /* unless a reason is set already */
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program");
     }
     return ok;
 }
@@ -78,7 +80,7 @@ void gpu_build_start(struct gpu_build *build, unsigned program)
     glLinkProgram(program);
 }
 
-static bool tell_compiled(const struct gpu_stage *stage, struct error *error)
+static bool stage_compiled(const struct gpu_stage *stage, struct error *error)
 {
     char log[4096] = "", named[sizeof(error->text)];
     GLint compiled = GL_FALSE;
@@ -98,7 +100,7 @@ bool gpu_build_end(struct gpu_build *build, unsigned program, struct error *erro
     progress_tell();
     for (unsigned i = 0; i < build->stage_count; i++) {
         struct gpu_stage *stage = &build->stages[i];
-        compiled = linked || (compiled && tell_compiled(stage, error));
+        compiled = linked || (compiled && stage_compiled(stage, error));
         glDetachShader(program, stage->shader);
         glDeleteShader(stage->shader);
         stage->shader = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Builds a program from its sources. The thread of the device makes the texts; another thread may compile and link
+/* Builds a program from its sources. The device's thread makes the texts; another thread may compile and link
  * them, in a context of its own. */
 #ifndef FARLIGHT_GPU_PROGRAM_BUILD_H
 #define FARLIGHT_GPU_PROGRAM_BUILD_H
@@ -27,14 +27,14 @@ struct gpu_build {
     struct gpu_binary_key key;
 };
 
-/* Makes the texts, the uniforms and the key. On failure nothing is left. */
+/* Makes the texts, the uniforms and the key. On failure nothing is kept. */
 bool gpu_build_prepare(struct gpu_build *build, const struct gpu_device *device,
                        const struct gpu_program_source *source, struct error *error);
-/* Compiles and links in the current context and asks for no result, which would wait for it. */
+/* Compiles and links in the current context without asking for a result, which would wait. */
 void gpu_build_start(struct gpu_build *build, unsigned program);
 /* Waits for the result. False: *error has the compiler's log. */
 bool gpu_build_end(struct gpu_build *build, unsigned program, struct error *error);
-/* Gets the binary of a linked program. False: the driver gives none. */
+/* Gets the binary of a linked program. False: the driver supports none. */
 bool gpu_build_binary(struct gpu_binary *binary, unsigned program);
 void gpu_build_finish(struct gpu_build *build); /* accepts zeros */
 

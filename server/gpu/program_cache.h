@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The programs of a device, for its life. */
+/* Table of a device's programs, which live as long as it. */
 #ifndef FARLIGHT_GPU_PROGRAM_CACHE_H
 #define FARLIGHT_GPU_PROGRAM_CACHE_H
 
 struct gpu_program_cache;
 
 struct gpu_program_cache *gpu_program_cache_create(void); /* NULL: out of memory */
-/* The table; the GL programs are the registry's. Accepts NULL. */
+/* Destroys the table; the GL programs are the registry's. Accepts NULL. */
 void gpu_program_cache_destroy(struct gpu_program_cache *cache);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Dispatches without groups, which make llvmpipe compile. */
 #include "gpu/program_rehearse.h"
 
 #include <epoxy/gl.h>
@@ -8,7 +9,7 @@ static bool is_of_floats(GLenum format)
     return format != GL_R32UI;
 }
 
-/* 0: it is no buffer texture. */
+/* Format of a unit's buffer texture; 0: it is no buffer texture. */
 static GLenum format_of(const struct gpu_texel_formats *formats, GLenum type, GLint unit)
 {
     const bool floats = type == GL_SAMPLER_BUFFER;
@@ -18,8 +19,8 @@ static GLenum format_of(const struct gpu_texel_formats *formats, GLenum type, GL
     return own && is_of_floats(own) == floats ? own : floats ? GL_RGBA32F : GL_RGBA32UI;
 }
 
-/* What is drawn to be read by a pass. Its size matters to llvmpipe only where it is a power of two, as few
- * pictures are. */
+/* Binds a texture that stands for a drawn one. Its size matters to llvmpipe only where it is a power of two, as
+ * few pictures' is. */
 static GLuint bind_drawn(GLuint unit)
 {
     GLuint texture = 0;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Preprocessor of shaders: includes, defines and line numbers. */
 #include "gpu/program_source.h"
 
 #include "gpu/shader_sources.h"
@@ -8,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Deeper is a circle that the once-only rule did not break. */
+/* Maximum depth of includes; deeper ones are a circle that the once-only rule did not break. */
 #define INCLUDE_DEPTH_MAX 32
 
 struct expansion {
@@ -71,7 +72,7 @@ static const char *skip_blanks(const char *at, const char *end)
     return at;
 }
 
-/* The text after `#name`, NULL if the line is no such directive. */
+/* Text after `#name`; NULL if the line is no such directive. */
 static const char *directive(const char *line, const char *end, const char *name)
 {
     size_t length = strlen(name);
@@ -92,7 +93,7 @@ static const char *define_value(const struct gpu_define *defines, const char *na
     return NULL;
 }
 
-/* The text between the quotes of `"path"`; NULL if there are no quotes. */
+/* Text between the quotes of `"path"`; NULL if there are no quotes. */
 static const char *quoted(const char *at, const char *end, size_t *length)
 {
     if (at >= end || *at != '"')
@@ -112,7 +113,7 @@ static bool expand_include(struct expansion *expansion, const char *at, const ch
                            unsigned line_number)
 {
     size_t length = 0;
-    if (at < end && *at == '<') /* the C library's headers, for the other reader of shared files */
+    if (at < end && *at == '<') /* headers of the C library, for the C side of shared files */
         return append(expansion->text, "\n", 1, expansion->error);
     const char *path = quoted(at, end, &length);
     if (!path) {
@@ -199,7 +200,7 @@ bool gpu_source_insert(struct gpu_source_text *text, size_t offset, const char *
                        struct error *error)
 {
     const size_t behind = text->length - offset;
-    if (!append(text, bytes, length, error)) /* only makes room */
+    if (!append(text, bytes, length, error)) /* only reserves memory */
         return false;
     memmove(text->text + offset + length, text->text + offset, behind);
     memcpy(text->text + offset, bytes, length);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Copies to a mapped buffer, with a fence behind each. */
 #include "gpu/readback.h"
 
 #include "gpu/barrier.h"
@@ -8,7 +9,7 @@
 #include <string.h>
 
 #define MAP_FLAGS (GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT)
-/* Between two looks at whether the device still lives. */
+/* Interval between two checks whether the device still lives. */
 #define WAIT_NS 1000000000u
 
 void gpu_readback_drop(struct gpu_readback *readback)
@@ -21,7 +22,7 @@ void gpu_readback_drop(struct gpu_readback *readback)
 void gpu_readback_finish(struct gpu_device *device, struct gpu_readback *readback)
 {
     gpu_readback_drop(readback);
-    /* Unmaps it, too. */
+    /* Destroying the buffer unmaps it, too. */
     gpu_object_destroy(device->registry, GPU_BUFFER, readback->name);
     gpu_memory_give(device, readback->capacity_bytes);
     *readback = (struct gpu_readback){0};

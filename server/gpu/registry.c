@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Creation and destruction of GL objects by kind. */
 #include "gpu/registry.h"
 
 #include "base/hashmap.h"
@@ -6,9 +7,9 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* A map, as hundreds of jobs have 100,000 objects, and end together. */
+/* The registry is a map, as hundreds of jobs have 100,000 objects, and end together. */
 struct gpu_registry {
-    struct hashmap objects; /* by kind and name; the values say nothing */
+    struct hashmap objects; /* by kind and name; the values are meaningless */
     size_t counts[GPU_OBJECT_KIND_COUNT];
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One list of every GL object that lives, so that a context can be left with nothing in it. */
+/* List of every living GL object, so that a context can be emptied. */
 #ifndef FARLIGHT_GPU_REGISTRY_H
 #define FARLIGHT_GPU_REGISTRY_H
 
@@ -20,8 +20,8 @@ enum gpu_object_kind {
 struct gpu_registry;
 
 struct gpu_registry *gpu_registry_create(void);               /* NULL: out of memory */
-void gpu_registry_destroy(struct gpu_registry *registry);     /* the list, not the objects; accepts NULL */
-void gpu_registry_destroy_all(struct gpu_registry *registry); /* every object that is left */
+void gpu_registry_destroy(struct gpu_registry *registry);     /* frees the list, not the objects; accepts NULL */
+void gpu_registry_destroy_all(struct gpu_registry *registry); /* destroys all remaining objects */
 size_t gpu_registry_count(const struct gpu_registry *registry, enum gpu_object_kind kind);
 /* Makes an object; 0: out of memory. */
 unsigned gpu_object_create(struct gpu_registry *registry, enum gpu_object_kind kind);

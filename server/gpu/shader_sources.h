@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The files of shaders/, compiled into the binary by shaders/embed.sh. */
+/* Files of shaders/, compiled into the binary by shaders/embed.sh. */
 #ifndef FARLIGHT_GPU_SHADER_SOURCES_H
 #define FARLIGHT_GPU_SHADER_SOURCES_H
 

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* Textures and framebuffers: formats, allocation and bindings. */
 #include "gpu/texture.h"
 
 #include "gpu/registry.h"
 
 #include <epoxy/gl.h>
 
-#define COLOURS_MAX 8 /* that every device draws at once */
+#define COLOURS_MAX 8 /* maximum that every device supports */
 
 struct format_row {
     GLenum format;
@@ -61,7 +62,7 @@ static bool check_size(const struct gpu_device *device, uint32_t width, uint32_t
     return true;
 }
 
-/* `layers` 0: no array. */
+/* Reserves a texture; `layers` 0: no array. */
 static bool reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
                     uint32_t width, uint32_t height, uint32_t layers, struct error *error)
 {
@@ -81,7 +82,7 @@ static bool reserve(struct gpu_device *device, struct gpu_texture *texture, unsi
     texture->layers = layers;
     texture->name = gpu_object_create(device->registry, kind_of(texture));
     if (texture->name) {
-        (void)glGetError(); /* an older error would be attributed to this call */
+        (void)glGetError(); /* an earlier error would be attributed to this call */
         if (layers > 0)
             glTextureStorage3D(texture->name, 1, internal_format, (GLsizei)width, (GLsizei)height,
                                (GLsizei)layers);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* A ring of timestamp queries. */
 #include "gpu/timer.h"
 
 #include "base/clock.h"
@@ -15,15 +16,15 @@ struct span {
     enum stage stage;
     uint32_t wave;
     uint64_t cpu_start_ns, cpu_duration_ns;
-    unsigned queries[2]; /* begin, end; 0: the CPU alone measured it */
+    unsigned queries[2]; /* begin, end; 0: measured by the CPU alone */
 };
 
 struct gpu_timer {
     struct gpu_device *device;
-    struct span *spans; /* since the last collect */
+    struct span *spans; /* spans since the last collect */
     size_t span_count, span_capacity;
     unsigned queries[RING_SPANS][2];
-    size_t next_query, queries_used; /* of the ring */
+    size_t next_query, queries_used; /* those of the ring */
     bool open;
 };
 
@@ -106,13 +107,13 @@ static bool is_available(unsigned query)
     return available;
 }
 
-/* The device is through with the span, if it measures it at all. */
+/* Whether the device has finished the span, if it measures it at all. */
 static bool is_done(const struct span *span)
 {
     return !span->queries[1] || is_available(span->queries[1]);
 }
 
-/* The device is through with all spans, though it may have other work behind them. */
+/* Whether the device has finished all spans, though it may have other work after them. */
 static bool all_available(const struct gpu_timer *timer)
 {
     for (size_t i = timer->span_count; i-- > 0;)
@@ -121,8 +122,8 @@ static bool all_available(const struct gpu_timer *timer)
     return false;
 }
 
-/* False: the query has no result, as after the loss of the context. It waits for one that is late: once a query
- * was asked whether it is available, Mesa's zink returns from glFinish() before it is. */
+/* Gets a query's time. False: the query has no result, as after the loss of the context. It waits for a late
+ * one: once a query was asked whether it is available, Mesa's zink returns from glFinish() before it is. */
 static bool query_time(unsigned query, uint64_t *time_ns)
 {
     GLuint64 value = 0;
@@ -131,13 +132,13 @@ static bool query_time(unsigned query, uint64_t *time_ns)
     return value != 0;
 }
 
-/* The first spans. */
+/* Collects the first `count` spans. */
 static void collect(struct gpu_timer *timer, size_t count, struct stage_times *times)
 {
-    /* The GPU's clock now, to convert its times to the host's. */
+    /* GPU clock at this moment, to convert its times to the host's. */
     GLint64 gpu_now_ns = 0;
     glGetInteger64v(GL_TIMESTAMP, &gpu_now_ns);
-    uint64_t cpu_from_gpu_ns = clock_now_ns() - (uint64_t)gpu_now_ns; /* wraps, and wraps back */
+    uint64_t cpu_from_gpu_ns = clock_now_ns() - (uint64_t)gpu_now_ns; /* may wrap, and wraps back */
     for (size_t i = 0; i < count; i++) {
         const struct span *span = &timer->spans[i];
         uint64_t begin_ns, end_ns;

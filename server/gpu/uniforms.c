@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The block of a program's uniforms: declarations, values, and a ring of ranges. */
 #include "gpu/uniforms.h"
 
 #include "gpu/program.h"
@@ -16,7 +17,7 @@
 #define VEC4_BYTES 16u
 #define ASKS_AT_START "UNIFORMS_AT_START"
 #define IN_BLOCK "_in_block"
-/* A thousand passes where a range begins at a multiple of 256 bytes, more than a frame has. */
+/* Ranges of a thousand passes, each at a multiple of 256 bytes: more than a frame has. */
 #define RING_BYTES (256u << 10)
 
 enum value_kind { VALUE_UINT, VALUE_INT, VALUE_BOOL, VALUE_FLOAT };
@@ -33,15 +34,15 @@ static const struct value_type {
 struct member {
     char name[NAME_BYTES];
     const struct value_type *type;
-    uint32_t length; /* of an array; 0: it is none */
+    uint32_t length; /* elements of an array; 0: no array */
     uint32_t offset_bytes;
 };
 
 struct gpu_uniforms {
     struct member members[MEMBERS_MAX];
     uint32_t count, size_bytes;
-    bool changed;                     /* since they were written to the buffer */
-    uint32_t turn, ring_offset_bytes; /* where they were written */
+    bool changed;                     /* changed since the last write to the buffer */
+    uint32_t turn, ring_offset_bytes; /* place of the last write */
     _Alignas(16) unsigned char values[BLOCK_BYTES_MAX];
 };
 
@@ -76,7 +77,8 @@ static uint32_t array_length(const char *text, const struct gpu_define *defines)
     return (uint32_t)strtoul(text, NULL, 10);
 }
 
-/* Gives it its place by the rules of std140; one that has one already, by another stage or module, keeps it. */
+/* Adds a member at its place by the rules of std140; one that another stage or module has declared keeps its
+ * place. */
 static bool add(struct gpu_uniforms *uniforms, const struct member *declared)
 {
     const struct member *known = find(uniforms, declared->name, strlen(declared->name));
@@ -94,7 +96,7 @@ static bool add(struct gpu_uniforms *uniforms, const struct member *declared)
     return true;
 }
 
-/* "uint first, count" or "int rows[ROWS]" */
+/* Reads a declaration: "uint first, count" or "int rows[ROWS]". */
 static bool read_declaration(struct gpu_uniforms *uniforms, char *text, const struct gpu_define *defines)
 {
     char type[8], *rest = NULL;
@@ -126,7 +128,7 @@ bool gpu_uniforms_take(struct gpu_uniforms *uniforms, struct gpu_source_text *te
         while (before > text->text && (before[-1] == ' ' || before[-1] == '\t'))
             before--;
         if (before > text->text && before[-1] != '\n')
-            continue; /* behind a layout(), or in a comment */
+            continue; /* after a layout(), or in a comment */
         char declaration[256] = "";
         const size_t length = strcspn(at, ";\n");
         if (at[length] == ';' && length < sizeof(declaration))
@@ -142,7 +144,7 @@ bool gpu_uniforms_take(struct gpu_uniforms *uniforms, struct gpu_source_text *te
     return true;
 }
 
-/* Mesa puts a uniform in the place of its copy, but not in that of an expression. */
+/* Functions for copies: Mesa optimises a plain copy back into the uniform, but not an expression. */
 static const char at_start[] = "bool at_start(bool v) { return v; }\n"
                                "uint at_start(uint v) { return v | 0u; }\n"
                                "int at_start(int v) { return v | 0; }\n"
@@ -171,7 +173,8 @@ bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_tex
                       struct error *error)
 {
     struct block block = {0};
-    const char *files = text->text ? strstr(text->text, "#line ") : NULL; /* behind what must come first */
+    const char *files = text->text ? strstr(text->text, "#line ") : NULL; /* after the lines that must come
+                                                                             first */
     const bool copies = files && software && strstr(files, "#ifdef " ASKS_AT_START);
     if (!files)
         return true;
@@ -190,7 +193,7 @@ bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_tex
         write_format(&block, "};\n");
     for (uint32_t i = 0; copies && i < uniforms->count; i++) {
         const struct member *member = &uniforms->members[i];
-        if (member->length == 0) /* a copied array has code for each of its elements */
+        if (member->length == 0) /* copying an array would have code for each of its elements */
             write_format(&block, "%s %s = at_start(%s" IN_BLOCK ");\n", member->type->name, member->name,
                          member->name);
     }
@@ -265,7 +268,7 @@ bool gpu_uniforms_start(struct gpu_device *device)
     *ring = (struct gpu_uniform_ring){
         .name = gpu_object_create(device->registry, GPU_BUFFER),
         .alignment_bytes = alignment > 0 ? (uint32_t)alignment : 256,
-        .end_bytes = RING_BYTES, /* the first pass has it allocated */
+        .end_bytes = RING_BYTES, /* makes the first pass allocate */
     };
     return ring->name != 0;
 }
@@ -273,7 +276,7 @@ bool gpu_uniforms_start(struct gpu_device *device)
 static void write_values(struct gpu_uniform_ring *ring, struct gpu_uniforms *uniforms, uint32_t size_bytes)
 {
     if (size_bytes > RING_BYTES - ring->end_bytes) {
-        /* Fresh memory under the old name; passes that are under way keep what they read. */
+        /* The old name gets fresh memory; passes in progress keep theirs. */
         glNamedBufferData(ring->name, RING_BYTES, NULL, GL_STREAM_DRAW);
         ring->end_bytes = 0;
         ring->turn++;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Time stamps round dispatches. */
 #include "gpu/watch.h"
 
 #include "gpu/registry.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Deformed vertices: compares each node's pose with its current vertices, and runs a pass of
+/* Deforms vertices: compares each node's pose with its current vertices, and runs a pass of
  * shaders/gpu_scene/deform.comp over those that differ. Per frame only joint matrices and target weights are
  * uploaded. */
 #include "gpu_scene/deform.h"
@@ -16,30 +16,30 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A pass over the vertices of one use, as the shutter opens or as it closes. */
+/* A pass over the vertices of one use, for shutter open or close. */
 struct pass {
     uint32_t use;
     bool closes;
-    uint32_t first_joint, first_morph, morph_count; /* in the parameters */
+    uint32_t first_joint, first_morph, morph_count; /* places in the parameters */
 };
 
 struct work {
     struct gpu_scene *gpu;
     const struct scene *scene;
-    struct pass *passes; /* 2 a use at most */
+    struct pass *passes; /* at most 2 per use */
     uint32_t pass_count;
     float (*parameters)[4];
     size_t parameter_count, parameter_capacity;
 };
 
-/* ---- what a pose says ---- */
+/* ---- values of a pose ---- */
 
 static const struct scene_skin *skin_of(const struct scene *scene, const struct deform_use *use)
 {
     return use->skin ? scene_skin(scene, use->skin) : NULL;
 }
 
-/* To be freed; NULL and *error. */
+/* Values of a use in a pose, to be freed; NULL and *error. */
 static float *values_of(const struct scene *scene, const struct scene_pose *pose, const struct deform_use *use,
                         uint32_t *count, struct error *error)
 {
@@ -72,8 +72,8 @@ static void join(struct deform_box *box, const float lower[3], const float upper
     }
 }
 
-/* A vertex is the weighted mean of its positions under each joint, so it lies in the hull of each joint's
- * transformed box of its vertices, enlarged by the targets' maximum offset. */
+/* Bounds a mesh in a pose. A vertex is the weighted mean of its positions under each joint, so it lies in the
+ * hull of each joint's transformed box of its vertices, enlarged by the targets' maximum offset. */
 static void grow_by_pose(struct deform_box *box, const struct scene_mesh *mesh, const struct deform_mesh *rest,
                          const float *values, bool has_skin, uint32_t joint_count)
 {
@@ -88,7 +88,7 @@ static void grow_by_pose(struct deform_box *box, const struct scene_mesh *mesh, 
         }
     uint32_t count = has_skin ? (rest->joint_count < joint_count ? rest->joint_count : joint_count) + 1 : 1;
     for (uint32_t joint = 0; joint < count; joint++) {
-        bool moved = joint + 1 < count; /* the last box is not moved by any joint */
+        bool moved = joint + 1 < count; /* no joint moves the last box */
         float lower[3], upper[3];
         for (int k = 0; k < 3; k++) {
             lower[k] = moved ? rest->joints[joint].lower[k] : has_skin ? rest->unmoved.lower[k] : mesh->lower[k];
@@ -116,7 +116,7 @@ static void find_box(struct deform_use *use, const struct scene *scene, const st
         grow_by_pose(&use->box, mesh, rest, use->close, use->skin != 0, joint_count);
 }
 
-/* ---- what is to be done ---- */
+/* ---- list of passes ---- */
 
 static bool add_parameters(struct work *work, size_t count)
 {
@@ -131,7 +131,7 @@ static bool add_parameters(struct work *work, size_t count)
     return true;
 }
 
-/* Targets without weight are not looked at. */
+/* Adds a pass; targets without weight are skipped. */
 static bool add_pass(struct work *work, uint32_t use_index, bool closes)
 {
     const struct deform_use *use = &work->gpu->state->deform.uses[use_index];
@@ -286,7 +286,7 @@ static bool run_passes(struct work *work, struct scene_changes *changes, struct 
     gpu_push_group(gpu->device, "deform");
     bind(gpu);
     bool ok = true;
-    gpu_together_begin(gpu->device); /* each has vertices of its own */
+    gpu_together_begin(gpu->device); /* each pass writes vertices of its own */
     for (uint32_t i = 0; ok && i < work->pass_count; i++)
         ok = run_pass(work, &work->passes[i], error);
     gpu_together_end(gpu->device);
@@ -294,7 +294,7 @@ static bool run_passes(struct work *work, struct scene_changes *changes, struct 
     return ok;
 }
 
-/* What the tables say of a geometry that deforms. */
+/* Sets the tables' entry of a geometry that deforms. */
 static void note_geometry(struct gpu_scene *gpu, uint32_t use_index, uint32_t *close_vertex)
 {
     const struct deform_use *use = &gpu->state->deform.uses[use_index];

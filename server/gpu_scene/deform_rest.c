@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The nodes that deform meshes, and those meshes at rest: in the buffers of shaders/gpu_scene/deform.comp, and in
- * boxes that bound any pose without its vertices. */
+/* Lists the nodes that deform meshes, and stores those meshes at rest: in the buffers of
+ * shaders/gpu_scene/deform.comp, and as boxes that bound any pose without its vertices. */
 #include "gpu_scene/state.h"
 
 #include <float.h>
@@ -50,7 +50,7 @@ void gpu_scene_deform_finish(struct gpu_scene_deform *deform, struct gpu_device 
     *deform = (struct gpu_scene_deform){0};
 }
 
-/* ---- which nodes ---- */
+/* ---- nodes ---- */
 
 static bool can_deform(const struct scene *scene)
 {
@@ -199,7 +199,7 @@ static bool find_target_boxes(struct deform_mesh *rest, const struct scene_mesh 
 
 struct rest_totals {
     uint64_t vertices, influences, target_vertices;
-    uint32_t arrays; /* bit by mesh_array: some mesh has it */
+    uint32_t arrays; /* bit by mesh_array: arrays that some mesh has */
 };
 
 static bool add_mesh(struct gpu_scene_deform *deform, const struct scene_mesh *mesh, struct rest_totals *totals)
@@ -222,7 +222,7 @@ static bool add_mesh(struct gpu_scene_deform *deform, const struct scene_mesh *m
 static bool list_meshes(struct gpu_scene *gpu, const struct scene *scene, struct rest_totals *totals)
 {
     struct gpu_scene_deform *deform = &gpu->state->deform;
-    struct hashmap place_by_id = {0}; /* plus 1 */
+    struct hashmap place_by_id = {0}; /* place plus 1 */
     drop_meshes(deform);
     deform->meshes = calloc((size_t)deform->use_count + 1, sizeof(*deform->meshes));
     bool ok = deform->meshes != NULL;
@@ -248,7 +248,7 @@ static bool check_totals(const struct gpu_scene *gpu, const struct rest_totals *
            gpu_scene_check_texels(gpu, totals->target_vertices, "vertices of morph targets", error);
 }
 
-/* Where a mesh's part of a buffer begins, counted in items, and how many items there are a mesh. */
+/* Parts of a buffer that meshes have, by the unit of their items. */
 enum rest_place { REST_VERTEX, REST_INFLUENCE, REST_TARGET };
 
 static size_t place_of(const struct deform_mesh *rest, enum rest_place place)
@@ -266,7 +266,7 @@ static size_t count_of(const struct scene_mesh *mesh, enum rest_place place)
                : vertices * (place == REST_INFLUENCE ? mesh->influence_count : mesh->target_count);
 }
 
-/* Joints are 16 bits. */
+/* Bytes of an item; joints are 16 bits. */
 static size_t item_bytes(enum mesh_array array)
 {
     return array == MESH_JOINTS     ? sizeof(uint16_t)
@@ -275,13 +275,14 @@ static size_t item_bytes(enum mesh_array array)
                                     : 3 * sizeof(float);
 }
 
-/* Three components are padded to four: a texel of three has no image format, and no driver keeps it so. */
+/* Bytes of an item on the device. Three components are padded to four: a texel of three has no image format,
+ * and no driver stores it so. */
 static size_t packed_bytes(enum mesh_array array)
 {
     return item_bytes(array) == 3 * sizeof(float) ? 4 * sizeof(float) : item_bytes(array);
 }
 
-/* One array of all meshes. */
+/* Writes one array of all meshes. */
 static void write_array(const struct gpu_scene *gpu, const struct packing_part *part, const atomic_bool *stop)
 {
     const struct gpu_scene_deform *deform = &gpu->state->deform;

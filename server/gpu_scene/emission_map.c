@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Sums of an emission texture over a coarse grid, and means from them. */
 #include "gpu_scene/emission_map.h"
 
 #include "protocol/common/srgb.h"
@@ -8,7 +9,7 @@
 
 #define CELLS EMISSION_MAP_CELLS
 
-/* The texels that begin in a cell, or the one that it is a part of. */
+/* Range of the texels that begin in a cell, or the single one that contains it. */
 static void texels_of(uint32_t cell, uint32_t texels, uint32_t *first, uint32_t *end)
 {
     *first = (uint32_t)(((uint64_t)cell * texels + CELLS - 1) / CELLS);
@@ -48,15 +49,15 @@ void emission_map_init(struct emission_map *map, const struct scene_texture *tex
                 cell_mean(texture, linear, x, y) + map->sums[y][x + 1] + map->sums[y + 1][x] - map->sums[y][x];
 }
 
-/* Of the cells from `first` on, which begin in the map. */
+/* Sum over the cells from `first` on, which begin in the map. */
 static double sum_of(const struct emission_map *map, const int first[2], const int count[2])
 {
     const int x0 = first[0], y0 = first[1], x1 = first[0] + count[0], y1 = first[1] + count[1];
     return map->sums[y1][x1] - map->sums[y0][x1] - map->sums[y1][x0] + map->sums[y0][x0];
 }
 
-/* The cells along one axis: those of the bounds and their neighbours. What reaches over an edge of the texture has
- * all of it, whatever is beyond the edge. */
+/* Cells along one axis: those of the bounds and their neighbours. Bounds that extend over an edge of the
+ * texture count all of it, whatever is beyond the edge. */
 static void cells_along(const float uv[3][2], int axis, uint32_t texels, int *first, int *count)
 {
     const double rim = 1.0 / texels;

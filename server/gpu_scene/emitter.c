@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Emitters in world space: a leaf for each cluster of each instance, and the tree over them. While the same
- * instances show the same surfaces the tree keeps its shape, and only its nodes follow what moves. */
+ * instances show the same surfaces the tree keeps its shape, and only its nodes follow the motion. */
 #include "gpu_scene/emitter.h"
 
 #include "base/log.h"
@@ -14,9 +14,10 @@
 #include <string.h>
 
 #define HALF_PI 1.57079632679489662f
-/* More are not sampled; half a second to build. */
+/* Maximum of leaves; more are not sampled. Building takes half a second. */
 #define LEAVES_LIMIT (1u << 20)
-/* glTF's materials are at most as bright, unless they say that they are brighter, as lamps do. */
+/* Radiance above which a material counts as a lamp: glTF's materials do not exceed it, unless they declare a
+ * higher strength. */
 #define LAMP_RADIANCE 1.0f
 
 void emitters_finish(struct emitters *emitters)
@@ -32,7 +33,7 @@ void emitters_finish(struct emitters *emitters)
 
 /* ---- leaves and runs ---- */
 
-/* The surfaces of a geometry, which lie side by side. */
+/* Surfaces of a geometry, which are contiguous. */
 static uint32_t surfaces_of(const struct emitters *emitters, uint32_t geometry, uint32_t *first)
 {
     uint32_t low = 0, high = emitters->surface_count, end;
@@ -88,7 +89,7 @@ static void warn_of_too_many(struct emitters *emitters, uint64_t leaves)
     emitters->too_many = too_many;
 }
 
-/* All but the trails. */
+/* Lists the leaves, all but their trails. */
 static bool list_leaves(struct emitters *emitters, const struct gpu_scene *gpu, struct emitters *listed)
 {
     uint64_t leaves, runs;
@@ -114,11 +115,11 @@ static bool list_leaves(struct emitters *emitters, const struct gpu_scene *gpu, 
 
 /* ---- bounds ---- */
 
-/* How an instance turns and scales normals and areas. */
+/* Transform of an instance for normals and areas. */
 struct turn {
     float normals[9];  /* rows; takes a normal to world space */
-    float area;        /* of a square metre of the object */
-    bool keeps_angles; /* else a cone of normals may become any */
+    float area;        /* area in world space of a square metre of the object */
+    bool keeps_angles; /* otherwise a cone of normals may become any */
 };
 
 static float dot3(const float a[3], const float b[3])
@@ -160,7 +161,7 @@ static float emission_of(const struct scene *scene, const struct scene_pose *pos
     return material->emission[0] + material->emission[1] + material->emission[2];
 }
 
-/* Textures take from the material's emission, and add nothing. */
+/* Textures only reduce a material's emission. */
 static bool any_lamps(const struct emitters *emitters, const struct scene *scene, const struct scene_pose *pose)
 {
     bool found = false;
@@ -172,8 +173,8 @@ static bool any_lamps(const struct emitters *emitters, const struct scene *scene
     return found;
 }
 
-/* The leaves of an instance's surface. What moves while the shutter is open, or is deformed on the device, is
- * bounded by all that it reaches, and may look anywhere. */
+/* Bounds the leaves of an instance's surface. Bounds of an instance that moves while the shutter is open, or
+ * that the device deforms, include all its places and all directions. */
 static void bound_leaves(const struct emitters *emitters, const struct gpu_scene *gpu, uint32_t index,
                          const struct emitter_surface *surface, float emission, struct emitter_bounds *out)
 {
@@ -244,7 +245,7 @@ static bool build(struct emitters *emitters, const struct emitter_bounds *bounds
     return ok;
 }
 
-/* Takes the listed leaves in, which become empty where they are those that are there. */
+/* Moves the listed leaves in; `listed` becomes empty if they equal the present ones. */
 static bool update_tree(struct emitters *emitters, struct emitters *listed, const struct gpu_scene *gpu,
                         const struct scene *scene, const struct scene_pose *pose)
 {

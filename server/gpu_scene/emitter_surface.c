@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Emissive triangles in object space: a mesh is looked at once, however many instances show it and wherever they
- * move. */
+/* Finds emissive triangles in object space: a mesh is read once for all its instances, wherever they move. */
 #include "gpu_scene/emission_map.h"
 #include "gpu_scene/emitter.h"
 #include "gpu_scene/state.h"
@@ -11,10 +10,10 @@
 #include <string.h>
 
 #define HALF_PI 1.57079632679489662f
-/* Of leaves that an instance's triangles make; where there are more, several triangles are one. */
+/* Maximum of leaves per instance; with more triangles, several form a leaf. */
 #define LEAVES_MAX (1u << 15)
 
-/* Whether its triangles are sampled as lights. */
+/* Whether triangles of this material are sampled as lights. */
 static bool shines(const struct scene_material *material)
 {
     return material && material->alpha_mode == ALPHA_OPAQUE && !material->unlit && !material->emission_seen_only &&
@@ -28,7 +27,7 @@ static const struct scene_material *material_of(const struct scene *scene, const
     return material ? scene_pose_material(pose, material) : NULL;
 }
 
-/* ---- which surfaces there are ---- */
+/* ---- list of surfaces ---- */
 
 static void add_surfaces(const struct gpu_scene *gpu, uint32_t geometry, const struct scene *scene,
                          const struct scene_pose *pose, struct emitter_surface *surfaces, uint32_t *count)
@@ -75,7 +74,7 @@ static bool list(const struct gpu_scene *gpu, const struct scene *scene, const s
     return *surfaces != NULL;
 }
 
-/* The triangles of a leaf, so that there are not too many leaves. */
+/* Number of triangles per leaf that keeps the number of leaves within the maximum. */
 static uint32_t choose_cluster_size(const struct gpu_scene *gpu, const struct emitter_surface *surfaces,
                                     uint32_t surface_count)
 {
@@ -104,7 +103,7 @@ static uint64_t texture_signature(const struct scene *scene, const struct textur
     return sum;
 }
 
-/* Of all that clusters are made of; factors of emission are not. */
+/* Signature of all inputs of clusters; factors of emission are not among them. */
 static uint64_t sign(const struct gpu_scene *gpu, const struct scene *scene, const struct scene_pose *pose,
                      const struct emitter_surface *surfaces, uint32_t count, uint32_t cluster_size)
 {
@@ -121,14 +120,14 @@ static uint64_t sign(const struct gpu_scene *gpu, const struct scene *scene, con
 
 /* ---- triangles ---- */
 
-/* A surface, and what its triangles are made of. */
+/* A surface, and the arrays of its triangles. */
 struct source {
     const struct scene_mesh *mesh;
-    const uint32_t *indices; /* of its first triangle */
+    const uint32_t *indices; /* indices of the surface's first triangle */
     const float *positions;
     const float *texcoords; /* NULL: 0 everywhere */
     const struct texture_use *use;
-    const struct emission_map *map; /* NULL: all of it is as bright */
+    const struct emission_map *map; /* NULL: the whole surface is equally bright */
 };
 
 /* Twice the area along the normal, object space. */
@@ -176,7 +175,7 @@ static void grow(struct emitter_bounds *bounds, const struct source *source, uin
     }
 }
 
-/* The sum of the triangles' power, the bounds, and the middle of the normals. */
+/* Sums the triangles' power and bounds, and finds the middle of their normals. */
 static void sum_up(struct emitter_cluster *cluster, const struct source *source, uint32_t first, float *shares)
 {
     struct emitter_bounds *bounds = &cluster->bounds;
@@ -227,7 +226,7 @@ struct maps {
     uint32_t count;
 };
 
-/* NULL: the surface has no texture. */
+/* Map of a texture; NULL: the surface has no texture. */
 static const struct emission_map *find_map(struct maps *maps, const struct scene *scene,
                                            const struct texture_use *use)
 {

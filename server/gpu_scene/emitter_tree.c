@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Builds and refits the tree over emitters, split by power and orientation. */
 #include "gpu_scene/emitter_tree.h"
 
 #include "gpu_scene/unit_vector.h"
@@ -18,7 +19,7 @@ static float dot3(const float a[3], const float b[3])
 
 /* ---- bounds ---- */
 
-/* From the axis of a cone to the farthest of its normals, seen from another axis. */
+/* Angle from an axis to the farthest normal of a cone. */
 static float reach_of(const float axis[3], const struct emitter_bounds *cone)
 {
     return acosf(fminf(fabsf(dot3(axis, cone->axis)), 1.0f)) + cone->spread;
@@ -54,7 +55,7 @@ struct emitter_bounds emitter_bounds_union(const struct emitter_bounds *a, const
     return sum;
 }
 
-/* The integral over the directions that the normals of a cone shine to, weighted by the cosine. */
+/* Integral over the directions that the normals of a cone shine to, weighted by the cosine. */
 static float orientation_cost(float spread)
 {
     const float far = fminf(spread + HALF_PI, 2.0f * HALF_PI), sine = sinf(spread), cosine = cosf(spread);
@@ -62,8 +63,8 @@ static float orientation_cost(float spread)
            HALF_PI * (2.0f * far * sine - cosf(spread - 2.0f * far) - 2.0f * spread * sine + cosine);
 }
 
-/* Bounds with a sum of axes times power in place of a cone: a split is judged by means, which are quick to add up.
- */
+/* Bounds with a sum of axes times power in place of a cone: splits are compared by means, which are quick to
+ * add. */
 struct rough_bounds {
     float lower[3], upper[3], axes[3], power;
 };
@@ -102,7 +103,7 @@ static float cost_of(const struct rough_bounds *bounds)
     const float x = bounds->upper[0] - bounds->lower[0], y = bounds->upper[1] - bounds->lower[1],
                 z = bounds->upper[2] - bounds->lower[2];
     const float mean = sqrtf(dot3(bounds->axes, bounds->axes)) / bounds->power;
-    /* With the square of the diagonal, as what is flat or in one line has no surface. */
+    /* The square of the diagonal is added, as flat or linear bounds have no surface. */
     return bounds->power * (x * y + y * z + z * x + x * x + y * y + z * z) *
            orientation_cost(acosf(fminf(mean, 1.0f)));
 }
@@ -111,7 +112,7 @@ static float cost_of(const struct rough_bounds *bounds)
 
 struct build {
     const struct emitter_bounds *leaves;
-    uint32_t *order, *scratch; /* leaves, in the order of the tree */
+    uint32_t *order, *scratch; /* leaves in the order of the tree */
     struct emitter_node *nodes;
     uint32_t node_count;
     uint32_t *trails;
@@ -142,7 +143,7 @@ static uint32_t bin_of(float middle, const float range[2])
 struct split {
     float cost;
     int axis;
-    uint32_t bin; /* the first of the second child */
+    uint32_t bin; /* first bin of the second child */
     float range[2];
 };
 
@@ -174,7 +175,7 @@ static void try_axis(const struct build *build, uint32_t first, uint32_t count, 
     }
 }
 
-/* Those of the first child to the front; returns how many. */
+/* Moves the leaves of the first child to the front; returns their number. */
 static uint32_t divide(struct build *build, uint32_t first, uint32_t count, const struct split *split)
 {
     uint32_t before = 0, behind = 0;
@@ -197,7 +198,8 @@ static uint32_t levels_of(uint32_t count)
     return levels;
 }
 
-/* Halves where no split is found, or where the tree would become deeper than a trail is long. */
+/* Number of leaves in the first child: half of them where no split is found, or where the tree would become
+ * deeper than a trail is long. */
 static uint32_t first_child_count(struct build *build, uint32_t first, uint32_t count, uint32_t depth)
 {
     struct split best = {.cost = FLT_MAX};
@@ -264,7 +266,7 @@ bool emitter_tree_refit(const struct emitter_bounds *leaves, uint32_t leaf_count
     struct emitter_bounds *bounds = malloc((size_t)node_count * sizeof(*bounds));
     if (!bounds)
         return false;
-    for (uint32_t i = node_count; i-- > 0;) { /* children lie behind their parents */
+    for (uint32_t i = node_count; i-- > 0;) { /* children come after their parents */
         const uint32_t link = nodes[i].link;
         bounds[i] = link & EMITTER_LEAF ? leaves[link & ~EMITTER_LEAF]
                                         : emitter_bounds_union(&bounds[link], &bounds[link + 1]);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes and sphere sets into the scene-wide buffers of shared/geometry.h. */
+/* Packs meshes and sphere sets into the scene-wide buffers of shared/geometry.h. */
 #include "gpu_scene/state.h"
 #include "gpu_scene/unit_vector.h"
 
@@ -11,8 +11,8 @@
 
 struct totals {
     uint64_t triangles, vertices, spheres;
-    uint64_t close_vertices; /* behind the vertices: those of what deforms, as the shutter closes */
-    uint32_t flags;          /* GEOMETRY_HAS_*, of any mesh */
+    uint64_t close_vertices; /* behind the vertices: those of deforming geometries at shutter close */
+    uint32_t flags;          /* GEOMETRY_HAS_* of all meshes */
 };
 
 static int by_id(const void *a, const void *b)
@@ -26,7 +26,7 @@ static uint32_t mesh_flags(const struct scene_mesh *mesh)
     uint32_t flags = 0;
     if (mesh->arrays[MESH_NORMALS])
         flags |= GEOMETRY_HAS_NORMALS;
-    /* The handedness lies with the normals; and a tangent without a normal spans no frame. */
+    /* The handedness is stored with the normals; and a tangent without a normal spans no frame. */
     if (mesh->arrays[MESH_TANGENTS] && mesh->arrays[MESH_NORMALS])
         flags |= GEOMETRY_HAS_TANGENTS;
     if (mesh->arrays[MESH_TEXCOORDS_0])
@@ -40,8 +40,8 @@ static uint32_t mesh_flags(const struct scene_mesh *mesh)
     return flags;
 }
 
-/* By mesh id: those that nodes deform, and that no other node shows as they are. They have no rigid geometry
- * beside those of the nodes. */
+/* Finds meshes, by id, that nodes deform and that no other node shows undeformed. They have no rigid geometry
+ * besides those of the nodes. */
 static bool find_only_deformed(const struct gpu_scene *gpu, const struct scene *scene, struct hashmap *meshes)
 {
     const struct gpu_scene_deform *deform = &gpu->state->deform;
@@ -94,8 +94,8 @@ static void add_sphere_sets(struct gpu_scene *gpu, const struct scene *scene)
     qsort(gpu->geometries + first, gpu->geometry_count - first, sizeof(*gpu->geometries), by_id);
 }
 
-/* Meshes by id, then sphere sets by id, then deformed meshes by node: the same scene has the same order however it
- * came about. */
+/* Lists meshes by id, then sphere sets by id, then deformed meshes by node: the same scene has the same order,
+ * whatever its history. */
 static bool list_geometries(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
 {
     const struct gpu_scene_deform *deform = &gpu->state->deform;
@@ -121,7 +121,7 @@ static bool list_geometries(struct gpu_scene *gpu, const struct scene *scene, st
     return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu geometries", total);
 }
 
-/* The offset of each geometry in the buffers. */
+/* Sets the offset of each geometry in the buffers. */
 static struct totals lay_out(struct gpu_scene *gpu)
 {
     struct totals totals = {0};
@@ -198,7 +198,7 @@ static void pack_triangles(const struct gpu_scene *gpu, const struct gpu_scene_g
     }
 }
 
-/* The device computes positions, and normals and tangents if there are some, of deforming geometry. */
+/* Packs positions; for deforming geometry the device computes them, with normals and tangents if there are any. */
 static void pack_positions(const struct gpu_scene_geometry *geometry, float *out)
 {
     if (geometry->node)
@@ -211,7 +211,7 @@ static void pack_positions(const struct gpu_scene_geometry *geometry, float *out
     }
 }
 
-/* A value that is not finite would spread by averaging. */
+/* Averages would spread a value that is not finite. */
 static float finite_or_zero(float x)
 {
     return isfinite(x) ? x : 0.0f;
@@ -267,7 +267,7 @@ static void pack_texcoords(const struct gpu_scene_geometry *geometry, float *out
     }
 }
 
-/* Four of 16 bits: bytes of linear light would make steps of what is dark. */
+/* Packs colours as four 16-bit values: bytes of linear light would show steps in dark colours. */
 static void pack_colours(const struct gpu_scene_geometry *geometry, uint16_t *out)
 {
     const struct scene_mesh *mesh = geometry->mesh;
@@ -282,7 +282,7 @@ static void pack_colours(const struct gpu_scene_geometry *geometry, uint16_t *ou
             out[i] = (uint16_t)(mesh->arrays[MESH_COLOURS]->data[i] * 257);
 }
 
-/* What is written of each mesh. */
+/* Arrays written for each mesh. */
 enum packed {
     PACKED_TRIANGLES,
     PACKED_POSITIONS,
@@ -358,7 +358,7 @@ static void list_parts(struct gpu_scene *gpu, const struct totals *totals)
         struct gpu_buffer *buffer;
         enum packed packed;
         uint64_t bytes;
-        uint32_t flags; /* that any mesh has; 0: needs none */
+        uint32_t flags; /* flags of the meshes that need it; 0: always needed */
     } rows[] = {
         {&gpu->triangles, PACKED_TRIANGLES, totals->triangles * 4 * sizeof(uint32_t), 0},
         {&gpu->positions, PACKED_POSITIONS, moving * 4 * sizeof(float), 0},
@@ -385,7 +385,7 @@ static void list_parts(struct gpu_scene *gpu, const struct totals *totals)
                                                 .write = write_sphere_materials});
 }
 
-/* An edit of something else may have moved the objects in the host's memory. */
+/* Updates pointers into the host's scene: an edit of another object may have moved them. */
 static void refresh_pointers(struct gpu_scene *gpu, const struct scene *scene)
 {
     for (uint32_t i = 0; i < gpu->geometry_count; i++) {
@@ -423,7 +423,7 @@ bool gpu_scene_list_geometry(struct gpu_scene *gpu, const struct scene *scene, s
     return gpu_scene_deform_list_rest(gpu, scene, error);
 }
 
-/* The features that a material needs of the tracers, as it is when the shutter opens. */
+/* Classifies the features that a material needs of the tracers, by its state at shutter open. */
 static void classify_material(struct gpu_scene *gpu, const struct scene *scene, const struct scene_pose *pose,
                               uint32_t material_id, uint32_t *geometry_flags)
 {

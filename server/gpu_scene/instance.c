@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Visible nodes with geometry, discs, and the bounds of everything. */
+/* Lists visible nodes with geometry, and discs, and bounds all of them. */
 #include "gpu_scene/state.h"
 
 #include "scene/affine.h"
@@ -14,7 +14,7 @@ static int compare_ids(uint32_t a, uint32_t b)
     return a < b ? -1 : a > b;
 }
 
-/* Those that do not deform are sorted by id, meshes before sphere sets. */
+/* Finds a geometry that does not deform; these are sorted by id, meshes before sphere sets. */
 static bool find_rigid(const struct gpu_scene *gpu, bool is_mesh, uint32_t id, uint32_t *index)
 {
     uint32_t low = 0, high = gpu->state->rigid_count;
@@ -34,7 +34,7 @@ static bool find_rigid(const struct gpu_scene *gpu, bool is_mesh, uint32_t id, u
     return false;
 }
 
-/* Behind them, those that do, by their nodes. */
+/* Finds a geometry that deforms; these follow, sorted by node. */
 static bool find_deforming(const struct gpu_scene *gpu, uint32_t node, uint32_t *index)
 {
     uint32_t low = gpu->state->rigid_count, high = gpu->geometry_count;
@@ -59,7 +59,7 @@ static double determinant(const float m[12])
            (double)m[2] * ((double)m[4] * m[9] - (double)m[5] * m[8]);
 }
 
-/* The new instances, and their matrices over the shutter's time. */
+/* New instances, and their matrices over the shutter's time. */
 struct fresh {
     struct instance *instances;
     uint32_t count;
@@ -67,7 +67,7 @@ struct fresh {
     uint32_t motion_count;
 };
 
-/* The visible instances of one kind, in each of the poses; by node ids. */
+/* Visible instances of one kind, in each of the poses; by node ids. */
 struct posed {
     uint32_t pose_count;
     struct scene_instance *list[MOTION_POSES_MAX];
@@ -93,9 +93,8 @@ static bool posed_init(struct posed *posed, const struct scene *scene, const str
     return true;
 }
 
-/* The transform of the first pose's i-th instance in each pose; false: it is singular in one of them. An instance
- * that a later pose hides stays at its last transform: it is visible while the shutter is open if it is when it
- * opens. */
+/* Transforms in each pose of the first pose's i-th instance. False: one of them is singular. An instance that a
+ * later pose hides stays at its last transform: it is visible while the shutter is open if it is when it opens. */
 static bool matrices_of(struct posed *posed, size_t i, const float *matrices[MOTION_POSES_MAX])
 {
     const struct scene_instance *first = &posed->list[0][i];
@@ -158,7 +157,7 @@ static bool same_set(const struct gpu_scene *gpu, const struct fresh *fresh)
     return true;
 }
 
-/* Up to this number of unchanged ones between two changed ones are uploaded with them: a call costs more than
+/* Maximum of unchanged instances between two changed ones that are uploaded with them: a call costs more than
  * their bytes. */
 #define GAP_INSTANCES_MAX 4u
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Lights, environment, and what they add to the bounds of the scene. */
+/* Uploads lights and environment, and adds the lights to the bounds of the scene. */
 #include "gpu_scene/state.h"
 
 #include "base/clock.h"
@@ -28,7 +28,7 @@ static float length3(const float v[3])
     return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* A sphere stays a sphere: its radius is scaled by the mean of a non-uniform scale. */
+/* Scale of a sphere's radius: the mean of a non-uniform scale, as a sphere stays a sphere. */
 static float mean_scale(const float m[12])
 {
     double a = (double)m[0] * ((double)m[5] * m[10] - (double)m[6] * m[9]);
@@ -37,7 +37,7 @@ static float mean_scale(const float m[12])
     return (float)cbrt(fabs(a - b + c));
 }
 
-/* False: the transform leaves the light no direction, or no size. */
+/* Packs a light. False: the transform leaves it no direction, or no size. */
 static bool pack_light(const struct scene_light *in, const float world_from_light[12], struct light *out)
 {
     const float forward[3] = {0.0f, 0.0f, -1.0f};
@@ -88,7 +88,7 @@ static bool pack_lights(struct gpu_scene *gpu, const struct scene *scene, const 
     return *packed || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the lights of a scene");
 }
 
-/* All but the image, which gpu_scene_upload_environment() uploads. */
+/* Notes the environment without its image, which gpu_scene_upload_environment() uploads. */
 static void note_environment(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes)
 {
     const struct scene_environment *environment = &scene->environment;
@@ -116,7 +116,7 @@ bool gpu_scene_upload_environment(struct gpu_scene *gpu, uint64_t end_ns, bool *
     if (!gpu_texture_reserve(gpu->device, &gpu->environment, GL_RGBA16F, environment->width, environment->height,
                              error))
         return false;
-    glTextureParameteri(gpu->environment.name, GL_TEXTURE_WRAP_S, GL_REPEAT); /* all round */
+    glTextureParameteri(gpu->environment.name, GL_TEXTURE_WRAP_S, GL_REPEAT); /* columns wrap */
     const size_t row_bytes = (size_t)environment->width * ENVIRONMENT_TEXEL_BYTES;
     const uint32_t strip =
         ENVIRONMENT_STRIP_BYTES / row_bytes ? (uint32_t)(ENVIRONMENT_STRIP_BYTES / row_bytes) : 1;
@@ -152,7 +152,7 @@ static void find_bounds(struct gpu_scene *gpu, const struct light *lights)
         grow(gpu, gpu->discs[i].centre_radius, gpu->discs[i].centre_radius[3]);
     float size[3] = {0};
     for (int k = 0; k < 3; k++) {
-        if (gpu->lower_world[k] > gpu->upper_world[k]) /* nothing at all */
+        if (gpu->lower_world[k] > gpu->upper_world[k]) /* the bounds are empty */
             gpu->lower_world[k] = gpu->upper_world[k] = 0.0f;
         size[k] = gpu->upper_world[k] - gpu->lower_world[k];
     }
@@ -173,7 +173,7 @@ bool gpu_scene_upload_lights(struct gpu_scene *gpu, const struct scene *scene, c
     }
     find_bounds(gpu, packed);
     size_t bytes = gpu->light_count * sizeof(*packed);
-    /* Also after a change of geometry alone: then the lights are as they were. */
+    /* The lights may be the same also after a change of geometry alone. */
     bool same = gpu->state->any_update && gpu->light_count == count_before &&
                 memcmp(packed, gpu->state->lights, bytes) == 0;
     if (!gpu->state->any_update || gpu->lights_revision != scene->lights_revision)

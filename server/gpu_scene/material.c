@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Materials and their texture slots as shared/material.h has them. */
+/* Packs materials and their texture slots for shared/material.h. */
 #include "gpu_scene/state.h"
 
 #include "shared/material.h"
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* hashmap holds pointers and no NULL: an index is kept as itself plus one. */
+/* A hashmap holds pointers and no NULL: an index is stored as itself plus one. */
 static void *pointer_of(uint32_t index)
 {
     return (void *)((uintptr_t)index + 1);
@@ -92,7 +92,7 @@ static uint32_t add_slot(const struct gpu_scene *gpu, const struct texture_use *
     return (*slot_count)++;
 }
 
-/* That of the first texture of those which need one counts. */
+/* Flags for tangents: the first texture that needs one decides. */
 static uint32_t tangent_flags(const struct scene_material *material)
 {
     static const enum material_texture turned[] = {MATERIAL_NORMAL, MATERIAL_BUMP, MATERIAL_CLEARCOAT_NORMAL,
@@ -202,8 +202,7 @@ static bool same_textures(const struct material *a, const struct material *b)
            a->texture_transmission == b->texture_transmission && a->texture_bump == b->texture_bump;
 }
 
-/* Whether two materials are alike but for their factors; where alpha decides what is cut out it is more than one.
- */
+/* Whether two materials differ in their factors at most; where alpha cuts something out, factors matter too. */
 static bool same_surface(const struct material *a, const struct material *b)
 {
     if (((a->flags ^ b->flags) & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) != 0 || !same_textures(a, b))
@@ -212,15 +211,15 @@ static bool same_surface(const struct material *a, const struct material *b)
            (a->base_colour[3] == b->base_colour[3] && a->alpha_cutoff == b->alpha_cutoff);
 }
 
-/* Whether the slots are those of the last update. */
+/* Whether the slots equal those of the last update. */
 static bool same_slots(const struct gpu_scene_state *state, const struct texture_slot *slots, uint32_t slot_count)
 {
     return state->texture_slots && state->texture_slot_count == slot_count &&
            memcmp(slots, state->texture_slots, slot_count * sizeof(*slots)) == 0;
 }
 
-/* What differs from the last update. Materials that are new do not count as other surfaces: none that was there
- * has one. */
+/* Finds what differs from the last update. A new material does not count as a changed surface: no present
+ * surface has it. */
 static unsigned changes_of(const struct gpu_scene *gpu, const struct material *materials, uint32_t count,
                            const struct texture_slot *slots, uint32_t slot_count)
 {

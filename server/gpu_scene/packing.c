@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Steps of packing: memory is reserved, mapped, written by a thread, and unmapped. */
 #include "gpu_scene/packing.h"
 
 #include "base/clock.h"
@@ -6,7 +7,7 @@
 #include "gpu/buffer.h"
 #include "gpu_scene/scene.h"
 
-/* Less is written at once: a thread costs more. */
+/* Minimum of bytes for a thread: fewer are written at once, as a thread costs more. */
 #define THREADED_BYTES ((uint64_t)4 << 20)
 
 void packing_add(struct packing *packing, const struct packing_part *part)
@@ -22,7 +23,7 @@ uint64_t packing_bytes(const struct packing *packing)
     return bytes;
 }
 
-/* All are reserved before any is mapped: a step that is put off leaves none mapped. */
+/* Maps all parts. They are reserved first, so that a postponed step leaves none mapped. */
 static bool map_all(struct gpu_scene *gpu, struct packing *packing, struct error *error)
 {
     for (uint32_t i = 0; i < packing->part_count; i++) {

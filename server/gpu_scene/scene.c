@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Updates of the device's copy: the parts that a revision or a pose changes, in order. */
 #include "gpu_scene/scene.h"
 
 #include "base/clock.h"
@@ -16,7 +17,7 @@ void gpu_scene_init(struct gpu_scene *gpu, struct gpu_device *device)
 
 #define BUFFERS_MAX (13 + DEFORM_BUFFERS_MAX)
 
-/* All of them; returns how many. */
+/* Lists all buffers; returns their number. */
 static size_t list_buffers(struct gpu_scene *gpu, struct gpu_buffer *buffers[BUFFERS_MAX])
 {
     struct gpu_buffer *own[] = {
@@ -63,7 +64,7 @@ void gpu_scene_finish(struct gpu_scene *gpu)
     *gpu = (struct gpu_scene){.device = gpu->device, .deformed_revision = gpu->deformed_revision};
 }
 
-/* The finaliser of splitmix64. */
+/* Finaliser of splitmix64. */
 uint64_t gpu_scene_mix(uint64_t x)
 {
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -91,7 +92,7 @@ bool gpu_scene_check_texels(const struct gpu_scene *gpu, uint64_t count, const c
                      (unsigned long long)count, what, (unsigned long long)max);
 }
 
-/* What poses say anything about. */
+/* Kinds of objects that poses affect. */
 static unsigned posed_parts(const struct scene_motion *motion)
 {
     unsigned parts = 0;
@@ -110,7 +111,7 @@ static bool update_shading(struct gpu_scene *gpu, const struct scene *scene, con
     return gpu_scene_pack_materials(gpu, scene, motion, changes, error);
 }
 
-/* `posed`: the kinds that poses change, now or in the last update. */
+/* Updates the parts. `posed`: the kinds that poses change, now or in the last update. */
 static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                          unsigned posed, struct scene_changes *changes, struct error *error)
 {
@@ -134,7 +135,7 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
         geometry || nodes || shading || (changes->bits & (CHANGED_GEOMETRY | CHANGED_DEFORMED));
     if (!gpu_scene_upload_tables(gpu, changes, error))
         return false;
-    /* The bounds are of geometry, instances and lights together; lights see to them last. */
+    /* Lights come last, as they complete the bounds of geometry, instances and lights together. */
     if ((geometry || nodes || lights || (changes->bits & CHANGED_DEFORMED)) &&
         !gpu_scene_upload_lights(gpu, scene, motion, changes, error))
         return false;
@@ -148,7 +149,7 @@ bool gpu_scene_is_current(const struct gpu_scene *gpu, const struct scene *scene
            (posed_parts(motion) | gpu->state->posed_parts) == 0;
 }
 
-/* Materials first: triangles are packed with their indices. */
+/* Materials come first: triangles are packed with their indices. */
 static bool list_parts(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
 {
     const bool shading = !gpu->state->any_update || gpu->shading_revision != scene->shading_revision;
@@ -309,7 +310,7 @@ void gpu_scene_bind(struct gpu_scene *gpu)
 
 uint64_t gpu_scene_device_bytes(const struct gpu_scene *gpu)
 {
-    struct gpu_scene copy = *gpu; /* callers that change the buffers use the same list */
+    struct gpu_scene copy = *gpu; /* allows the same list for callers that change the buffers */
     struct gpu_buffer *buffers[BUFFERS_MAX];
     size_t count = list_buffers(&copy, buffers);
     uint64_t bytes = gpu->environment.size_bytes;

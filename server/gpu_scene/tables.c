@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The tables of shared/tables.h: what is small of a scene, in one buffer. */
+/* Small tables of a scene, in one buffer (shared/tables.h). */
 #include "gpu_scene/state.h"
 
 #include "shared/material.h"
@@ -25,7 +25,7 @@ static uint64_t node_count_of(const struct emitters *emitters)
     return emitters->leaf_count > 0 ? 2 * (uint64_t)emitters->leaf_count - 1 : 0;
 }
 
-/* Sets the starts; returns the texels of all. */
+/* Sets the starts; returns the texels of all tables. */
 static uint64_t lay_out(const struct gpu_scene *gpu, struct table_starts *starts,
                         struct emitter_starts *emitter_starts)
 {
@@ -51,7 +51,7 @@ static uint64_t lay_out(const struct gpu_scene *gpu, struct table_starts *starts
     return shares + (emitters->share_count + 3) / 4;
 }
 
-/* Tables that nothing is in yet may be NULL. */
+/* Copies a table; `tables` may be NULL if there are no items. */
 static void fill(char *tables, uint32_t first_texel, const void *items, size_t bytes)
 {
     if (bytes > 0)
@@ -81,7 +81,8 @@ static void pack(const struct gpu_scene *gpu, const struct table_starts *starts,
     fill(tables, starts->discs, gpu->discs, gpu->disc_count * sizeof(struct disc));
 }
 
-/* From the first texel that differs from the mirror to the last; all of them where the number is another. */
+/* Uploads from the first texel that differs from the mirror to the last; all of them if their number has
+ * changed. */
 static bool upload(struct gpu_scene *gpu, const char *now, size_t bytes, struct scene_changes *changes,
                    struct error *error)
 {
@@ -112,7 +113,7 @@ bool gpu_scene_upload_tables(struct gpu_scene *gpu, struct scene_changes *change
     if (!gpu_scene_check_texels(gpu, texels, "texels of geometries, materials, textures and discs", error))
         return false;
     size_t bytes = (size_t)texels * TEXEL_BYTES;
-    char *tables = calloc(1, bytes); /* the last texel of the shares may not be full */
+    char *tables = calloc(1, bytes); /* zeroed, as the last texel of the shares may be partly unused */
     if (!tables)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tables of a scene");
     pack(gpu, &gpu->table_starts, tables);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Textures with their mip chains into the one texel buffer of shared/material.h. */
+/* Packs textures with their mip chains into the single texel buffer of shared/material.h. */
 #include "gpu_scene/state.h"
 
 #include "base/parallel.h"
@@ -18,7 +18,7 @@ uint32_t gpu_scene_texture_index(const struct gpu_scene *gpu, uint32_t texture_i
     return value ? (uint32_t)((uintptr_t)value - 1) : 0;
 }
 
-/* Light is averaged as light: sRGB bytes are decoded to 16 bits, averaged, and coded again. */
+/* Tables for averaging sRGB as linear light: bytes are decoded to 16 bits, averaged, and encoded again. */
 struct srgb_tables {
     uint16_t linear_from_byte[256];
     uint8_t byte_from_linear[65536];
@@ -34,7 +34,7 @@ static struct srgb_tables *create_tables(void)
         tables->linear_from_byte[i] = (uint16_t)lrint(linear_from_srgb(i / 255.0) * 65535.0);
         tables->plain[i] = (uint16_t)(i * 257);
     }
-    /* Byte b is the answer from where b's own value is nearer than its predecessor's, as the eye counts. */
+    /* Byte b is the result from the point on where its value is nearer than its predecessor's, perceptually. */
     unsigned at = 0;
     for (int b = 0; b < 256; b++) {
         double edge = linear_from_srgb((b + 0.5) / 255.0);
@@ -45,7 +45,7 @@ static struct srgb_tables *create_tables(void)
     return tables;
 }
 
-/* The mean of `count` texels, from the sums of their channels in 16 bits. */
+/* Stores the mean of `count` texels, from the sums of their channels in 16 bits. */
 static void store_mean(const struct srgb_tables *tables, bool srgb, const uint32_t sum[4], uint32_t count,
                        uint8_t *out)
 {
@@ -55,7 +55,7 @@ static void store_mean(const struct srgb_tables *tables, bool srgb, const uint32
     }
 }
 
-/* Most levels are even both ways: four texels each, without a loop over them. */
+/* Halves a level that is even both ways, as most are: four texels each, without a loop over them. */
 static void halve_even(const struct srgb_tables *tables, bool srgb, const uint8_t *in, uint32_t width,
                        uint32_t height, uint8_t *out)
 {
@@ -74,7 +74,8 @@ static void halve_even(const struct srgb_tables *tables, bool srgb, const uint8_
     }
 }
 
-/* A texel of the next level covers two of this one in each direction, three at the end of an odd row. */
+/* Halves a level: a texel of the next one covers two of this one in each direction, three at the end of an odd
+ * row. */
 static void halve(const struct srgb_tables *tables, bool srgb, const uint8_t *in, uint32_t width, uint32_t height,
                   uint8_t *out)
 {
@@ -115,7 +116,7 @@ static uint64_t chain_texels(uint32_t width, uint32_t height, uint32_t *levels)
     return texels;
 }
 
-/* All levels of a texture to `out`; each is made in `chain` first, since mapped memory is slow to read. */
+/* Packs all levels of a texture into `out`; each is made in `chain` first, since mapped memory is slow to read. */
 static void pack_texture(const struct srgb_tables *tables, const struct scene_texture *texture, uint8_t *chain,
                          uint8_t *out)
 {
@@ -172,7 +173,7 @@ static bool lay_out(struct gpu_scene *gpu, const struct scene *scene, struct tex
     return true;
 }
 
-/* Textures are packed by a few threads at once: halving is arithmetic on the host. */
+/* Maximum of threads that pack textures: halving is arithmetic on the host. */
 #define PACK_THREADS_MAX 8
 
 struct texture_packing {
@@ -181,7 +182,7 @@ struct texture_packing {
     uint32_t count;
     uint64_t texel_count;
     struct srgb_tables *tables;
-    atomic_bool failed; /* no memory to halve in */
+    atomic_bool failed; /* there was no memory for halving */
 };
 
 struct texture_run {

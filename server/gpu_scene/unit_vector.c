@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* Octahedral unit vectors. */
 #include "gpu_scene/unit_vector.h"
 
 #include <math.h>
 
-/* Two snorms of so many bits each. */
+/* Packs two snorms of `bits` bits each. */
 static uint32_t pack(const float v[3], unsigned bits)
 {
     const float sum = fabsf(v[0]) + fabsf(v[1]) + fabsf(v[2]), maximum = (float)((1u << (bits - 1)) - 1);

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The C twins of pack_unit() and pack_unit_24() in shaders/common/math.glsl. */
+/* Twins in C of pack_unit() and pack_unit_24() in shaders/common/math.glsl. */
 #ifndef FARLIGHT_GPU_SCENE_UNIT_VECTOR_H
 #define FARLIGHT_GPU_SCENE_UNIT_VECTOR_H
 
 #include <stdint.h>
 
-uint32_t unit_vector_pack(const float v[3]);    /* need not be unit; 0 where it has no direction */
-uint32_t unit_vector_pack_24(const float v[3]); /* likewise */
+uint32_t unit_vector_pack(const float v[3]);    /* v need not be unit; 0 if it has no direction */
+uint32_t unit_vector_pack_24(const float v[3]); /* v need not be unit; 0 if it has no direction */
 
 #endif

@@ -228,7 +228,7 @@ vec2 exits_of(layer_walk walk)
     return (vec2((walk.cell + forward) << walk.level) - walk.s.from.xy) * walk.inverse;
 }
 
-node_passage look(layer_walk walk)
+node_passage passage_of(layer_walk walk)
 {
     node_passage p;
     p.node = texelFetch(quadtree_nodes, int(node_index(slice_of(walk), uint(walk.level), uvec2(walk.cell)))).xy;
@@ -314,7 +314,7 @@ bool walk_on(inout layer_walk walk, out node_passage p)
 {
     bool meets = false;
     for (int i = 0; i < STEPS_TOGETHER; i++) {
-        p = look(walk);
+        p = passage_of(walk);
         bool goes_down = !p.is_plane && p.gap_in == 0.0;
         bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
         // Most rays that pass an edge are far behind or before both of its sides: fewer than one in ten of them meets
