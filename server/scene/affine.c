@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Products, inverses and bounds of affine transforms. */
 #include "scene/affine.h"
 
 #include "scene/affine_double.h"
@@ -6,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Below this share of the largest determinant that rows of these lengths could have, the third direction is
- * rounding of 24-bit entries: the inverse would be noise. */
+/* Share of the largest determinant that rows of these lengths could have, below which the third direction is
+ * rounding of 24-bit entries and the inverse would be noise. */
 #define SINGULAR_SHARE 2e-7
 
 void affine_double_identity(double m[12])
@@ -124,8 +125,8 @@ void affine_point(float out[3], const float m[12], const float point[3])
     }
 }
 
-/* Arvo, Transforming axis-aligned bounding boxes, Graphics Gems 1990: each entry of the matrix adds its lesser
- * product to the lower bound and its greater one to the upper. */
+/* Bounds of a transformed box. Arvo, Transforming axis-aligned bounding boxes, Graphics Gems 1990: each entry
+ * of the matrix adds its smaller product to the lower bound and its larger one to the upper. */
 void affine_bounds(float out_lower[3], float out_upper[3], const float m[12], const float lower[3],
                    const float upper[3])
 {

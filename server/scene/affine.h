@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* 3x4 row-major affine transforms; the arithmetic is in double where it is chained. Thin over cglm. */
+/* 3x4 row-major affine transforms; chained arithmetic is in double. Thin over cglm. */
 #ifndef FARLIGHT_SCENE_AFFINE_H
 #define FARLIGHT_SCENE_AFFINE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of animated objects, each alone: weights of morph targets, skins, clips and their channels. */
+/* Checks animated objects, each alone: weights of morph targets, skins, clips and their channels. */
 #include "scene/channel.h"
 #include "scene/edit.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of all that a scene shows, and how far it reaches in given directions. */
+/* Bounds of the visible scene, and its extent in given directions. */
 #include "scene/affine.h"
 #include "scene/pose.h"
 
@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Maximum of numbers that are read for the bounds of deformed meshes: a second or two, in which no other client is
+/* Maximum of numbers read for the bounds of deformed meshes: a second or two, in which no other client is
  * served. Device memory does not hold many more; meshes beyond it count with their rest pose. */
 #define DEFORM_NUMBERS_MAX (UINT64_C(1) << 30)
 
@@ -24,8 +24,8 @@ static bool is_finite(const float point[3])
     return isfinite(point[0]) && isfinite(point[1]) && isfinite(point[2]);
 }
 
-/* Of the vertices that triangles use, where the pose puts them; one that leaves the floats is left out. False:
- * none is left, or out of memory. */
+/* Extends a box by the vertices that triangles use, deformed by the pose, except those that leave the range of
+ * floats. False: none is left, or out of memory. */
 static bool extend_by_deformed(const struct scene *scene, const struct scene_pose *pose,
                                const struct scene_instance *instance, float lower[3], float upper[3])
 {
@@ -58,7 +58,7 @@ static bool afford(const struct scene_mesh *mesh, uint64_t *left)
     return true;
 }
 
-/* Also the root itself; 0: everything is below it. */
+/* Whether a node is the root or below it; root 0: everything is below it. */
 static bool is_below(const struct scene *scene, const struct scene_node *node, uint32_t root)
 {
     while (node && root != 0 && node->base.id != root)
@@ -143,21 +143,22 @@ bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, floa
 /* ---- supports ----------------------------------------------------------------------------------- */
 
 struct direction {
-    double object[3]; /* its dot product with a point in object space, plus the offset, is that in world space */
+    double object[3]; /* its dot product with a point in object space, plus the offset, is the one in world
+                         space */
     double offset;
 };
 
-/* What is looked for: the greatest dot products so far. */
+/* State of the search: the maximum dot products so far. */
 struct reach {
     const struct scene *scene;
     const struct scene_pose *pose;
     const double (*directions)[3];
-    const double *axis; /* NULL, or x and z of the vertical about which all turns */
+    const double *axis; /* NULL, or x and z of the vertical about which everything turns */
     double *supports;
     size_t count;
-    uint64_t left; /* of the budget for deformed meshes */
+    uint64_t left; /* rest of the budget for deformed meshes */
     bool found;
-    /* The instance at hand: its place, and the directions in its own space. */
+    /* Current instance: its place, and the directions in its own space. */
     const float *world_from_object;
     struct direction own[SCENE_SUPPORTS_MAX];
 };
@@ -194,7 +195,7 @@ static void to_world(const struct reach *reach, const float place[3], double wor
                      (double)m[4 * row + 2] * (double)place[2] + (double)m[4 * row + 3];
 }
 
-/* Of a ball all the way round the axis. */
+/* Support of a ball on its way round the axis. */
 static double turning_support(const struct reach *reach, size_t i, const double centre_world[3], double radius)
 {
     const double *d = reach->directions[i], *axis = reach->axis, level = hypot(d[0], d[2]);
@@ -210,7 +211,7 @@ static void note_turning(struct reach *reach, const float place[3])
         note(reach, i, turning_support(reach, i, world, 0.0));
 }
 
-/* One direction after the other: the loops are short enough for vectors of the processor. */
+/* Processes one direction after the other: the loops are short enough to be vectorised. */
 static void reach_points(struct reach *reach, const float *positions, const uint32_t *indices, size_t count)
 {
     const struct direction *own = reach->own;
@@ -223,13 +224,13 @@ static void reach_points(struct reach *reach, const float *positions, const uint
         double most = -INFINITY;
         for (size_t k = 0; k < count; k++) {
             const double at = dot(d, positions + 3 * (indices ? (size_t)indices[k] : k));
-            most = at > most ? at : most; /* not of a place that is not finite */
+            most = at > most ? at : most; /* false for a place that is not finite */
         }
         note(reach, i, most + own[i].offset);
     }
 }
 
-/* The vertices between the bounds, of which those beyond belong to other meshes. */
+/* Processes the vertices within the bounds; those outside belong to other meshes. */
 static void reach_vertices(struct reach *reach, const struct scene_mesh *mesh)
 {
     const struct direction *own = reach->own;
@@ -255,7 +256,7 @@ static void reach_vertices(struct reach *reach, const struct scene_mesh *mesh)
         note(reach, i, most[i] + own[i].offset);
 }
 
-/* False: out of memory. */
+/* Processes a deforming mesh. False: out of memory. */
 static bool reach_deformed(struct reach *reach, const struct scene_instance *instance)
 {
     const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->object);
@@ -286,7 +287,8 @@ static void reach_spheres(struct reach *reach, const struct scene_spheres *spher
 {
     const float *sphere = (const float *)(const void *)spheres->centres_radii->data, *m = reach->world_from_object;
     const struct direction *own = reach->own;
-    const double scale = sqrt((double)(m[0] * m[0] + m[1] * m[1] + m[2] * m[2])); /* spheres stay spheres */
+    /* spheres stay spheres */
+    const double scale = sqrt((double)(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]));
     for (uint32_t k = 0; reach->axis && k < spheres->sphere_count; k++) {
         double world[3];
         to_world(reach, sphere + 4 * k, world);
@@ -302,7 +304,7 @@ static void reach_spheres(struct reach *reach, const struct scene_spheres *spher
     }
 }
 
-/* Whether the box of an instance goes beyond what was found; that of a deforming mesh may. */
+/* Whether an instance's box extends beyond the supports so far; a deforming mesh's may. */
 static bool goes_beyond(const struct reach *reach, const float lower[3], const float upper[3])
 {
     const struct direction *own = reach->own;
@@ -352,7 +354,8 @@ static void reach_kind(struct reach *reach, enum node_kind kind, uint32_t root)
     free(instances);
 }
 
-/* Its rim: between two places of it the rim reaches a thousandth of its radius farther. */
+/* Processes places of a disc's rim as it turns; between two of them the rim reaches a thousandth of its radius
+ * farther. */
 static void turn_disc(struct reach *reach, const struct scene_disc *disc)
 {
     const float *n = disc->normal_world;

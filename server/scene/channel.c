@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Table of channel paths. */
 #include "scene/channel.h"
 
 #define PLACE_MAX 1e12

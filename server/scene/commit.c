@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A transaction: everything that can fail is done on a draft, then the scene is changed in steps that cannot. */
+/* Commits a transaction: everything that can fail is done on a draft, then the scene is changed in steps that
+ * cannot. */
 #include "scene/draft.h"
 
 #include <stdlib.h>
@@ -7,7 +8,7 @@
 #include <xxhash.h>
 
 #define NODES_MAX_DEFAULT (4u << 20)
-/* Of a transaction that takes about a millisecond: what it has, and what the scene has. */
+/* Limits of a transaction that takes about a millisecond: its edits, and the scene's objects. */
 #define SHORT_EDITS 256
 #define SHORT_OBJECTS 8192
 #define SHORT_BYTES (UINT64_C(1) << 20)
@@ -54,7 +55,7 @@ static bool is_same_content(const struct scene_mesh *a, const struct scene_mesh 
            a->target_count == b->target_count;
 }
 
-/* Arrays that several meshes share are looked through once. */
+/* Checks a mesh's arrays; those that several meshes share are read once. */
 static bool mesh_content_check(struct draft *draft, struct scene_mesh *mesh, const struct edit_place *place)
 {
     const uint64_t key = XXH3_64bits(mesh->arrays, sizeof(mesh->arrays));
@@ -67,13 +68,13 @@ static bool mesh_content_check(struct draft *draft, struct scene_mesh *mesh, con
     }
     if (!mesh_check_content(mesh, place))
         return false;
-    hashmap_put(&draft->checked_meshes, key, mesh); /* without memory, the next is looked through again */
+    hashmap_put(&draft->checked_meshes, key, mesh); /* without memory, the next mesh is read again */
     return true;
 }
 
 static bool content_check(struct draft *draft, struct scene_edit *edit, const struct edit_place *place)
 {
-    if (edit->kind == EDIT_SET_ENVIRONMENT) /* the image of the scene has been looked through */
+    if (edit->kind == EDIT_SET_ENVIRONMENT) /* the image of the scene has been checked */
         return edit->set.environment.texels == draft->scene->environment.texels ||
                environment_check_content(&edit->set.environment, place);
     switch (edit->object) {
@@ -99,7 +100,7 @@ static bool content_check(struct draft *draft, struct scene_edit *edit, const st
     return true;
 }
 
-/* The image that is there is that of the edit before, if there is one. */
+/* Keeps the present image: the previous edit's, if there is one. */
 static void keep_image(const struct draft *draft, struct scene_environment *environment)
 {
     const struct scene_environment *before =
@@ -111,7 +112,7 @@ static void keep_image(const struct draft *draft, struct scene_environment *envi
     environment->height = before->height;
 }
 
-/* Makes an edit the last of its object. */
+/* Makes an edit the last one of its object. */
 static bool take_edit(struct draft *draft, struct scene_edit *edit)
 {
     struct edit_place place = draft_place(draft, edit);
@@ -184,7 +185,7 @@ static void take_object(struct size *size, enum object_kind kind, const void *ob
     size->nodes -= kind == OBJECT_NODE;
 }
 
-/* After the transaction. */
+/* Size of the scene after the transaction. */
 static struct size draft_size(const struct draft *draft)
 {
     const struct scene *scene = draft->scene;
@@ -213,8 +214,8 @@ static struct size draft_size(const struct draft *draft)
     return size;
 }
 
-/* Limits of host memory and nodes after the transaction. A transaction that makes the scene smaller is always
- * allowed. */
+/* Checks the limits of host memory and nodes after the transaction. A transaction that makes the scene smaller
+ * is always allowed. */
 static bool limits_check(const struct draft *draft, const struct size *size)
 {
     const struct scene *scene = draft->scene;
@@ -236,7 +237,7 @@ static bool limits_check(const struct draft *draft, const struct size *size)
                   "the scene's tables would take %.1f MiB of the host's memory; other scenes leave %.1f MiB",
                   (double)size->table_bytes / 0x1p20, (double)limits->table_bytes / 0x1p20);
         if (draft->error)
-            draft->error->retryable = true; /* when others have ended */
+            draft->error->retryable = true; /* others may end meanwhile */
         return error_remedy(draft->error, "remove objects, close scenes, or raise memory.scene in the daemon's "
                                           "configuration");
     }
@@ -245,8 +246,8 @@ static bool limits_check(const struct draft *draft, const struct size *size)
 
 /* ---- application -------------------------------------------------------------------------------- */
 
-/* Puts an empty object of revision 0 into the scene for each that does not exist yet. */
-static bool make_room(struct draft *draft)
+/* Adds an empty object of revision 0 for each that does not exist yet. */
+static bool add_missing_objects(struct draft *draft)
 {
     for (size_t i = 0; i < draft->edit_count; i++) {
         const struct scene_edit *edit = &draft->edits[i];
@@ -279,8 +280,8 @@ static void give_room_back(struct draft *draft)
     }
 }
 
-/* Notes that a node of that kind appears, moves or is removed. With children, everything counts as moved. Any node
- * may be the joint of a skin, which moves meshes. */
+/* Notes that a node of that kind appears, moves or is removed. If it has children, everything counts as moved.
+ * Any node may be the joint of a skin, which moves meshes. */
 static void touch_node(struct scene *scene, const struct scene_node *node)
 {
     bool alone = node->child_count == 0;
@@ -302,7 +303,7 @@ static void touch_kind(struct scene *scene, enum object_kind kind)
         scene->instances_revision = scene->revision;
 }
 
-/* Nodes that show a mesh may deform from now on, or no more. */
+/* Notes that nodes with this mesh may begin or cease to deform. */
 static void touch_mesh(struct scene *scene, const struct scene_mesh *mesh)
 {
     if (mesh->influence_count || mesh->target_count)
@@ -337,7 +338,7 @@ static void apply_set(struct scene *scene, struct scene_edit *edit)
     memcpy(object, &edit->set, object_struct_bytes(edit->object));
     object->revision = scene->revision;
     touch_kind(scene, edit->object);
-    /* The scene owns the blobs and ranges now. */
+    /* The scene owns the blobs and ranges from here on. */
     memset(&edit->set, 0, sizeof(edit->set));
 }
 
@@ -345,7 +346,7 @@ static void apply_remove(struct scene *scene, enum object_kind kind, uint32_t id
 {
     struct scene_object *object = hashmap_remove(&scene->objects[kind], id);
     if (!object)
-        return; /* made and removed by the same transaction */
+        return; /* made and removed by this transaction */
     if (kind == OBJECT_NODE) {
         const struct scene_node *node = (const struct scene_node *)object;
         touch_node(scene, node);
@@ -384,10 +385,11 @@ static void apply(struct draft *draft, const struct size *size)
     }
 }
 
-/* Edits that others replace are not looked at, and nothing large is before the limits are known to hold. */
+/* Checks the transaction. Edits that others replace are skipped, and large data is checked only after the
+ * limits. */
 static bool is_sound(struct draft *draft, struct size *size)
 {
-    if (!take_edits(draft) || !shapes_check(draft) || !structure_check(draft) || !companions_check(draft))
+    if (!take_edits(draft) || !shapes_check(draft) || !structure_check(draft) || !dependents_check(draft))
         return false;
     *size = draft_size(draft);
     return limits_check(draft, size) && contents_check(draft) && references_check(draft) && links_check(draft);
@@ -400,7 +402,7 @@ bool scene_commit_unless(struct scene *scene, struct scene_edit *edits, size_t e
         .scene = scene, .edits = edits, .edit_count = edit_count, .abandoned = abandoned, .error = error};
     struct size size = {0};
     bool sound = is_sound(&draft, &size);
-    if (sound && !make_room(&draft)) {
+    if (sound && !add_missing_objects(&draft)) {
         give_room_back(&draft);
         sound = false;
     }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Interpolation between keys: steps, lines, splines and rotations. */
 #include "scene/curve.h"
 
 #include <math.h>
@@ -14,7 +15,7 @@ static bool has_controls(const struct curve *curve)
     return curve->interpolation == INTERPOLATION_CUBIC_SPLINE || curve->interpolation == INTERPOLATION_BEZIER;
 }
 
-/* A key's own value; of those with controls the one before it comes in, the one behind it goes out. */
+/* Own value of a key. In curves with controls the incoming one precedes it and the outgoing one follows. */
 static const float *value_at(const struct curve *curve, uint32_t key)
 {
     return curve->values + key * curve->key_stride + (has_controls(curve) ? curve->width : 0);
@@ -27,7 +28,7 @@ static void copy(const struct curve *curve, uint32_t key, double *value)
         value[i] = (double)from[i];
 }
 
-/* The key at or before a time that lies between the first and the last. */
+/* Key at or before a time between the first and the last. */
 static uint32_t key_before(const struct curve *curve, double time_s)
 {
     uint32_t low = 0, high = curve->key_count - 1;
@@ -41,13 +42,13 @@ static uint32_t key_before(const struct curve *curve, double time_s)
     return low;
 }
 
-/* Where between two keys a time lies. */
+/* Place of a time between two keys. */
 struct span {
-    uint32_t key; /* the one before */
+    uint32_t key; /* key before it */
     double seconds, share;
 };
 
-/* False: the value is that of one key, which is copied. */
+/* Finds the span of a time. False: the value is that of a single key, which is copied. */
 static bool find_span(const struct curve *curve, double time_s, struct span *span, double *value)
 {
     uint32_t last = curve->key_count - 1;
@@ -65,7 +66,7 @@ static bool find_span(const struct curve *curve, double time_s, struct span *spa
     return false;
 }
 
-/* Two values, and the slopes there times the length of the span. */
+/* Interpolates between two values, with their slopes times the length of the span. */
 static double hermite(double from, double slope_from, double to, double slope_to, double t)
 {
     double t2 = t * t, t3 = t2 * t;
@@ -79,7 +80,7 @@ static double bezier(double from, double leaving, double arriving, double to, do
     return u * u * u * from + 3 * u * u * t * leaving + 3 * u * t * t * arriving + t * t * t * to;
 }
 
-/* Slope at a key: that of the line between its neighbours, at the ends of that to the only one. With keys at
+/* Slope at a key: that of the line between its neighbours; at the ends, to the only neighbour. With keys at
  * equal distances this is the spline of Catmull and Rom (1974). */
 static double slope_at(const struct curve *curve, uint32_t key, double before, double after)
 {
@@ -87,7 +88,8 @@ static double slope_at(const struct curve *curve, uint32_t key, double before, d
     return (after - before) / (time_at(curve, next) - time_at(curve, previous));
 }
 
-/* One number between two keys; `sign` turns the four keys about them, at the ends of the curve the same twice. */
+/* Interpolates a number between two keys; `sign` flips the four keys around them, the outer ones repeated at
+ * the ends of the curve. */
 static double catmull_rom(const struct curve *curve, const struct span *span, const double sign[4], uint32_t i)
 {
     uint32_t key = span->key, last = curve->key_count - 1;
@@ -136,7 +138,7 @@ void curve_at(const struct curve *curve, double time_s, double *value)
 
 /* ---- rotations ---------------------------------------------------------------------------------- */
 
-/* Of no direction: no rotation. */
+/* Normalises a quaternion; one of length 0 becomes no rotation. */
 static void make_unit(double q[4])
 {
     double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -159,8 +161,8 @@ static double dot(const double a[4], const double b[4])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
 }
 
-/* The angle between two unit quaternions along the shorter arc: half the angle of the rotation. Computed from the
- * lengths of sum and difference, which is exact for small angles too. */
+/* Angle between two unit quaternions along the shorter arc: half the angle of the rotation. It is computed from
+ * the lengths of sum and difference, which is exact for small angles too. */
 static double arc_between(const double from[4], const double to[4], double sign)
 {
     double sum = 0.0, difference = 0.0;
@@ -189,7 +191,8 @@ static void slerp(const double from[4], const double to[4], double share, double
         q[i] = of_from * from[i] + of_to * sign * to[i];
 }
 
-/* q and -q are the same rotation: each key's sign follows its neighbour's, seen from the key before. */
+/* Signs of the four keys: q and -q are the same rotation, so each key's sign follows its neighbour's, beginning
+ * at the key before. */
 static void near_signs(const struct curve *curve, uint32_t key, double sign[4])
 {
     uint32_t last = curve->key_count - 1;

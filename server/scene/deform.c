@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Deformation of meshes: morph targets, then joints (glTF 2.0, sections 3.7.2.2 and 3.7.3). Sums are in double;
- * tests compare the GPU's results with these. */
+/* Deforms meshes: morph targets, then joints (glTF 2.0, sections 3.7.2.2 and 3.7.3). Sums are in double; tests
+ * compare the GPU's results with these. */
 #include "scene/affine.h"
 #include "scene/pose.h"
 
@@ -21,7 +21,7 @@ static bool normalise(double v[3])
     return length > 0.0 && isfinite(length);
 }
 
-/* Adds the targets' share to the vertices that the mesh has. */
+/* Adds the targets' offsets to the mesh's vertices. */
 static void morph(const struct scene_mesh *mesh, enum mesh_array base, enum mesh_array added, const float *weights,
                   float *out)
 {
@@ -35,7 +35,7 @@ static void morph(const struct scene_mesh *mesh, enum mesh_array base, enum mesh
     }
 }
 
-/* The mean of the joints' matrices by the vertex's weights; false: it has none, and stays as it is given. */
+/* Mean of the joints' matrices, weighted for the vertex. False: it has no weights, and stays unchanged. */
 static bool blend(const struct scene_mesh *mesh, const float *world_from_mesh, size_t vertex, double m[12])
 {
     uint32_t count = mesh->influence_count;
@@ -72,7 +72,8 @@ static void move_point(const double m[12], float point[3])
         point[row] = (float)(m[4 * row] * x + m[4 * row + 1] * y + m[4 * row + 2] * z + m[4 * row + 3]);
 }
 
-/* By the cofactors, which are the inverse transpose but for a factor; its sign keeps a mirrored normal outside. */
+/* Transforms a normal by the cofactors, which are the inverse transpose up to a factor; its sign keeps a
+ * mirrored normal outside. */
 static void move_normal(const double m[12], float normal[3])
 {
     double out[3], determinant = 0.0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Objects that are removed together with others: a channel with its clip or its target, a skin with any of its
- * joints. A client that removes a model removes its nodes, and need not know what animates them. */
+/* Removes objects together with others: a channel with its clip or its target, a skin with any of its joints. A
+ * client that removes a model removes its nodes, and need not know their animation. */
 #include "scene/channel.h"
 #include "scene/draft.h"
 
@@ -26,7 +26,7 @@ static bool channels_fall(struct draft *draft)
     return true;
 }
 
-/* Place of the first joint that goes; joint_count: all remain. */
+/* Place of the first joint that is removed; joint_count: all remain. */
 static uint32_t first_gone(const struct draft *draft, const struct scene_skin *skin)
 {
     const uint32_t *joints = (const uint32_t *)(const void *)skin->joints->data;
@@ -51,7 +51,7 @@ static bool skins_fall(struct draft *draft, struct hashmap *falling)
     return true;
 }
 
-/* The edit that removes a node or one above it. */
+/* Finds the edit that removes a node or an ancestor. */
 static const struct scene_edit *removal_of(const struct draft *draft, uint32_t node)
 {
     const struct scene_edit *edit = hashmap_get(&draft->last[OBJECT_NODE], node);
@@ -94,7 +94,7 @@ static bool users_check(struct draft *draft, const struct hashmap *falling)
     return true;
 }
 
-bool companions_check(struct draft *draft)
+bool dependents_check(struct draft *draft)
 {
     bool nodes = removes_nodes(draft);
     if ((nodes || draft_removes_any(draft, OBJECT_LIGHT) || draft_removes_any(draft, OBJECT_MATERIAL) ||

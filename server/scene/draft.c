@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Look-ups in a draft: the last edit of each object, or the scene's own. */
 #include "scene/draft.h"
 
 #include <stdlib.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Names of edits, checks of arrays, and memory of objects. */
 #include "scene/edit.h"
 
 #include "scene/channel.h"
@@ -24,7 +25,7 @@ uint32_t edit_object_id(const struct scene_edit *edit)
 {
     if (edit->kind == EDIT_SET_ENVIRONMENT)
         return 0;
-    /* All objects begin with a scene_object, so any member of the union shows it. */
+    /* Every object begins with a scene_object, so any member of the union gives access to it. */
     return edit->kind == EDIT_REMOVE ? edit->id : edit->set.node.base.id;
 }
 
@@ -54,14 +55,15 @@ bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_
     return true;
 }
 
-/* A block has a constant length and no exit inside, so that the compiler does several numbers at a time. */
+/* Length of a block: it is constant, without an exit inside, so that the compiler processes several numbers at
+ * a time. */
 #define FLOAT_BLOCK 1024
 
 static bool block_is_fine(const float *values, float maximum)
 {
     unsigned bad = 0;
     for (size_t i = 0; i < FLOAT_BLOCK; i++)
-        bad |= (unsigned)!(fabsf(values[i]) <= maximum); /* true for a NaN too */
+        bad |= (unsigned)!(fabsf(values[i]) <= maximum); /* true for NaN too */
     return !bad;
 }
 
@@ -115,8 +117,8 @@ static uint64_t blob_bytes(const struct blob *blob)
     return blob ? blob->size_bytes : 0;
 }
 
-/* A channel counts with its memory in the poses of a frame: many channels may read the same few numbers of a clip,
- * and their poses are large all the same. */
+/* Bytes of a channel in the poses of a frame, which count too: many channels may read the same few numbers of a
+ * clip, and their poses are large all the same. */
 static uint64_t channel_pose_bytes(const struct scene_channel *channel)
 {
     const struct channel_row *row = channel_row(channel->path);
@@ -144,7 +146,7 @@ static uint64_t channel_pose_bytes(const struct scene_channel *channel)
 
 uint64_t object_table_bytes(enum object_kind kind, const void *object)
 {
-    /* Its slot in the table, at the table's usual load. */
+    /* Slot of an object in the table, at the table's usual load. */
     const uint64_t slot_bytes = 32;
     uint64_t range_count = 0, weight_count = 0, pose_bytes = 0;
     if (kind == OBJECT_MESH) {

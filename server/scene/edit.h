@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of one edit by itself, and how their errors name it. Private to scene/. */
+/* Checks of single edits, and the names of edits in errors. Private to scene/. */
 #ifndef FARLIGHT_SCENE_EDIT_H
 #define FARLIGHT_SCENE_EDIT_H
 
 #include "scene/scene.h"
 
-/* Which edit an error is about: "edits[17] (mesh 3)". */
+/* Edit that an error is about: "edits[17] (mesh 3)". */
 struct edit_place {
     size_t index;
     const struct scene_edit *edit;
@@ -13,14 +13,14 @@ struct edit_place {
 };
 
 const char *object_kind_name(enum object_kind kind);
-/* Identifier of what the edit sets or removes; 0 for the environment. */
+/* Identifier of the object that the edit sets or removes; 0 for the environment. */
 uint32_t edit_object_id(const struct scene_edit *edit);
 /* `path` names the part of the edit: ".ranges[2].material", or "" for the whole edit. Returns false. */
 bool edit_error(const struct edit_place *place, enum error_code kind, const char *path, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
-/* Each looks at one object alone, without references. A shape is what takes a moment to see: counts, which arrays
- * there are, their sizes. */
+/* Check the shape of one object, without references: counts, the presence of arrays, and their sizes. They are
+ * quick. */
 bool mesh_check_shape(const struct scene_mesh *mesh, const struct edit_place *place);
 bool spheres_check_shape(const struct scene_spheres *spheres, const struct edit_place *place);
 bool texture_check(const struct scene_texture *texture, const struct edit_place *place);
@@ -32,7 +32,7 @@ bool skin_check_shape(const struct scene_skin *skin, const struct edit_place *pl
 bool clip_check_shape(const struct scene_clip *clip, const struct edit_place *place);
 bool channel_check(const struct scene_channel *channel, const struct edit_place *place);
 bool environment_check_shape(const struct scene_environment *environment, const struct edit_place *place);
-/* The contents of arrays whose sizes are right, which may take a second; bounds are filled in. */
+/* Check the contents of arrays with the right sizes, which may take a second; they fill in bounds. */
 bool mesh_check_content(struct scene_mesh *mesh, const struct edit_place *place);
 bool spheres_check_content(struct scene_spheres *spheres, const struct edit_place *place);
 bool skin_check_content(const struct scene_skin *skin, const struct edit_place *place);
@@ -45,7 +45,7 @@ bool ranges_check(const struct material_range *ranges, uint32_t range_count, uin
                   const struct edit_place *place);
 /* Weights of morph targets. */
 bool weights_check(const float *weights, uint32_t count, const struct edit_place *place);
-/* The blob holds `count` elements of `element_bytes`, neither more nor less. */
+/* Checks that the blob holds `count` elements of `element_bytes`, neither more nor less. */
 bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_bytes, const char *path,
                       const struct edit_place *place);
 /* Index of the first float that is not finite, or whose magnitude is above `maximum`; `count` if there is none.
@@ -54,11 +54,11 @@ size_t first_bad_float(const float *values, size_t count, float maximum);
 
 /* Host memory that an object counts for. */
 uint64_t object_bytes(enum object_kind kind, const void *object);
-uint64_t object_table_bytes(enum object_kind kind, const void *object); /* of them: without blobs */
+uint64_t object_table_bytes(enum object_kind kind, const void *object); /* without its blobs */
 uint64_t environment_bytes(const struct scene_environment *environment);
 /* Size of the struct of a kind. */
 size_t object_struct_bytes(enum object_kind kind);
-/* Releases blobs and ranges of an object and forgets them, not the struct. */
+/* Releases blobs and ranges of an object and clears them, not the struct. */
 void object_release(enum object_kind kind, void *object);
 
 #endif

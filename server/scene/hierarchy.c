@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Sorted nodes, and positions of their parents. */
 #include "scene/hierarchy.h"
 
 #include <stdlib.h>
@@ -22,7 +23,7 @@ static bool is_sorted(const struct scene_node *const *nodes, size_t count)
 static uint32_t position_of(const struct hierarchy *hierarchy, uint32_t id)
 {
     const struct scene_node **nodes = hierarchy->nodes;
-    /* Most clients count their nodes from 1 without gaps. */
+    /* The guess is usually right: most clients number their nodes from 1 without gaps. */
     size_t guess = (size_t)id - nodes[0]->base.id;
     if (id >= nodes[0]->base.id && guess < hierarchy->count && nodes[guess]->base.id == id)
         return (uint32_t)guess;

@@ -7,17 +7,18 @@
 
 #define HIERARCHY_NONE UINT32_MAX
 
-/* All-zero is the valid empty hierarchy. */
+/* A hierarchy; all-zero is empty. */
 struct hierarchy {
     const struct scene_node **nodes; /* owned array of borrowed nodes */
-    uint32_t *parents; /* position of the parent; HIERARCHY_NONE: the root, or a parent that is not there */
+    uint32_t *parents;               /* position of the parent; HIERARCHY_NONE: the root, or a missing parent */
     size_t count;
 };
 
-/* Takes over `nodes` (malloc'ed), sorts it and finds the parents. False: out of memory; `nodes` is freed. */
+/* Takes ownership of `nodes` (malloc'ed), sorts it and finds the parents. False: out of memory; `nodes` is
+ * freed. */
 bool hierarchy_init(struct hierarchy *hierarchy, const struct scene_node **nodes, size_t count);
 void hierarchy_finish(struct hierarchy *hierarchy);
-/* All nodes of a scene. */
+/* Makes the hierarchy of a scene's nodes. */
 bool hierarchy_of_scene(struct hierarchy *hierarchy, const struct scene *scene);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of lights, cameras, textures and environments that depend on more than one field. The decoder has checked
- * every field alone. */
+/* Checks lights, cameras, textures and environments for conditions on more than one field. The decoder has
+ * checked every field alone. */
 #include "scene/edit.h"
 
 bool light_check(const struct scene_light *light, const struct edit_place *place)
@@ -62,9 +62,9 @@ bool environment_check_content(const struct scene_environment *environment, cons
         return true;
     uint64_t texels = (uint64_t)environment->width * environment->height;
     const uint16_t *halves = (const uint16_t *)(const void *)environment->texels->data;
-    const uint16_t exponent = 0x7c00; /* all ones: infinity or NaN */
+    const uint16_t exponent = 0x7c00; /* exponent with every bit set: infinity or NaN */
     for (uint64_t i = 0; i < texels * 4; i++) {
-        /* The fourth half of a texel is not used. */
+        /* The fourth half of a texel is unused. */
         if ((halves[i] & exponent) == exponent && i % 4 != 3)
             return edit_error(place, ERROR_INVALID, texels_path, "texel %llu of row %llu is not finite",
                               (unsigned long long)(i / 4 % environment->width),

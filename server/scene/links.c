@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks between two objects: the numbers of channels lie in their clips, the joints of meshes in skins. They must
+/* Checks pairs of objects: the numbers of channels lie in their clips, the joints of meshes in skins. They must
  * hold after an edit of either object. */
 #include "scene/channel.h"
 #include "scene/draft.h"
@@ -16,7 +16,7 @@
 
 struct ascents {
     uint64_t compared;
-    struct hashmap clips; /* by identifier: for each number, how many from it on ascend; owned u32s */
+    struct hashmap clips; /* by identifier: the number of ascending values from each one on; owned u32s */
 };
 
 static void ascents_finish(struct ascents *ascents)
@@ -28,7 +28,7 @@ static void ascents_finish(struct ascents *ascents)
     hashmap_finish(&ascents->clips);
 }
 
-/* NULL: out of memory. */
+/* Ascending runs of a clip; NULL: out of memory. */
 static const uint32_t *ascents_of(struct ascents *ascents, const struct scene_clip *clip)
 {
     uint32_t *lengths = hashmap_get(&ascents->clips, clip->base.id);
@@ -47,14 +47,14 @@ static const uint32_t *ascents_of(struct ascents *ascents, const struct scene_cl
     return lengths;
 }
 
-/* `count` numbers from `first` on are there. */
+/* Whether the clip has `count` numbers from `first` on. */
 static bool has_numbers(const struct scene_clip *clip, uint64_t first, uint64_t count)
 {
     uint64_t floats = clip->floats->size_bytes / sizeof(float);
     return first <= floats && count <= floats - first;
 }
 
-/* *key: the first whose time is not after that of the one before; key_count: all ascend. False: out of memory. */
+/* Finds the first key whose time is not after its predecessor's; key_count: all ascend. False: out of memory. */
 static bool first_unordered(struct ascents *ascents, const struct scene_channel *channel,
                             const struct scene_clip *clip, uint32_t *key)
 {
@@ -71,7 +71,7 @@ static bool first_unordered(struct ascents *ascents, const struct scene_channel 
     return true;
 }
 
-/* `whose` is the channel's own edit, or that of its clip. */
+/* Whether a channel fits its clip. `whose` is the channel's own edit, or that of its clip. */
 static bool channel_fits(struct ascents *ascents, const struct scene_channel *channel,
                          const struct scene_clip *clip, const struct edit_place *whose)
 {

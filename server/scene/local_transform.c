@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Decomposition and composition of matrices. */
 #include "scene/local_transform.h"
 
 #include <math.h>
@@ -22,7 +23,7 @@ static double normalise(double v[3])
     return length;
 }
 
-/* A column of length 0 has no direction of its own: it gets one at right angles to the others. */
+/* Completes the columns: one of length 0 has no direction, and gets one at right angles to the others. */
 static void complete(double column[3][3], const double length[3])
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of triangle meshes. They run over every element: a loop per array and nothing else in it. */
+/* Checks triangle meshes. Each check runs over every element: a loop per array and nothing else in it. */
 #include "scene/edit.h"
 
 #include "base/parallel.h"
@@ -8,12 +8,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* The kinds of counts that arrays depend on. */
+/* Counts that the sizes of arrays depend on. */
 enum array_of { PER_VERTEX, PER_TRIANGLE, PER_INFLUENCE, PER_TARGET };
 
 struct array_row {
     const char *path;
-    unsigned components; /* 4 bytes each, floats but for the indices; 0: `bytes` an element, no floats */
+    unsigned components; /* 4 bytes each, floats except for the indices; 0: `bytes` per element, no floats */
     unsigned bytes;
     enum array_of of;
     bool required;
@@ -55,7 +55,7 @@ bool mesh_has_wide_colours(const struct scene_mesh *mesh)
            mesh->arrays[MESH_COLOURS]->size_bytes == 4 * sizeof(uint16_t) * (uint64_t)mesh->vertex_count;
 }
 
-/* Elements of an array; neither product leaves 64 bits. */
+/* Elements of an array; neither product overflows 64 bits. */
 static uint64_t element_count(const struct scene_mesh *mesh, const struct array_row *row)
 {
     switch (row->of) {
@@ -113,7 +113,7 @@ static bool sizes_check(const struct scene_mesh *mesh, const struct edit_place *
     return true;
 }
 
-/* "vertex 7", of a target "vertex 7 of target 2" */
+/* Names an element: "vertex 7", in a target "vertex 7 of target 2". */
 static void name_element(const struct scene_mesh *mesh, const struct array_row *row, size_t element, char name[64])
 {
     if (row->of == PER_TARGET)
@@ -143,7 +143,7 @@ static bool floats_check(const struct scene_mesh *mesh, const struct edit_place 
     return true;
 }
 
-/* Weights are not negative; how far the joints reach is noted, as a skin must have that many. */
+/* Checks that weights are not negative, and notes the greatest joint, as a skin must have that many. */
 static bool influences_check(struct scene_mesh *mesh, const struct edit_place *place)
 {
     mesh->joint_places = 0;
@@ -168,7 +168,7 @@ static bool influences_check(struct scene_mesh *mesh, const struct edit_place *p
                       bad / mesh->influence_count, (double)weights[bad]);
 }
 
-/* A block has a constant length, so that the compiler does several indices at a time. */
+/* Length of a block: it is constant, so that the compiler processes several indices at a time. */
 #define INDEX_BLOCK 1536
 
 static uint32_t max_index(const uint32_t *indices, size_t count)
@@ -203,12 +203,12 @@ static void extend(struct bounds *bounds, const float *positions, const uint32_t
     *bounds = b;
 }
 
-/* Of large meshes, several threads look at a part each. */
+/* Part of a large mesh that a thread checks. */
 #define PART (128u * INDEX_BLOCK)
 
 struct part {
     struct bounds bounds;
-    size_t bad; /* the first index out of range; SIZE_MAX: none is */
+    size_t bad; /* first index out of range; SIZE_MAX: none */
 };
 
 struct parts {
@@ -247,8 +247,8 @@ static void unite(struct scene_mesh *mesh, const struct bounds *bounds)
     }
 }
 
-/* The indices' range check and the bounds of the vertices that triangles use: arrays may be shared between
- * meshes, so that most vertices belong to others. */
+/* Checks the range of indices, and finds the bounds of the vertices that triangles use: arrays may be shared
+ * between meshes, so that most vertices belong to others. */
 static bool indices_check(struct scene_mesh *mesh, const struct edit_place *place)
 {
     struct parts parts = {.indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data,

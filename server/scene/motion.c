@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where things are while a shutter is open. */
+/* Poses of objects while a shutter is open. */
 #include "scene/pose.h"
 
 #include "scene/hierarchy.h"
@@ -22,9 +22,9 @@ void scene_motion_finish(struct scene_motion *motion)
     *motion = (struct scene_motion){0};
 }
 
-/* ---- how far things turn ------------------------------------------------------------------------ */
+/* ---- bounds of turns ---------------------------------------------------------------------------- */
 
-/* Radians between the directions of a column in two matrices; of a column without length: 0. */
+/* Angle in radians between the directions of a column in two matrices; 0 for a column without length. */
 static double column_turn(const float *from, const float *to)
 {
     double along = 0.0, across = 0.0;
@@ -45,7 +45,7 @@ static double matrix_turn(const float from[12], const float to[12])
     return turn;
 }
 
-/* By posed node and interval; all poses list the same nodes. */
+/* Turns by posed node and interval; all poses list the same nodes. */
 typedef double interval_turns[INTERVALS];
 
 static void posed_turns(const struct scene_motion *motion, interval_turns *turns)
@@ -57,11 +57,11 @@ static void posed_turns(const struct scene_motion *motion, interval_turns *turns
     }
 }
 
-/* Of each node, by its position in the hierarchy: the turns of all from it up to the root, which is as far as it
- * can turn in the world. */
+/* Sums of turns for each node, by its position in the hierarchy: over all nodes from it up to the root, which
+ * bounds its turn in the world. */
 struct turn_sums {
     const struct scene_pose *pose;
-    const interval_turns *turns; /* of posed nodes */
+    const interval_turns *turns; /* turns of posed nodes */
     struct hierarchy hierarchy;
     interval_turns *sums;
     bool *known;
@@ -85,7 +85,7 @@ static void turn_sums_finish(struct turn_sums *sums)
     free(sums->known);
 }
 
-/* Goes up to a node that is known, then down again. */
+/* Sums up to the nearest ancestor with a known sum, then back down. */
 static void turn_sums_resolve(struct turn_sums *sums, uint32_t start)
 {
     uint32_t chain[SCENE_DEPTH_MAX], above = start;
@@ -105,7 +105,7 @@ static void turn_sums_resolve(struct turn_sums *sums, uint32_t start)
     }
 }
 
-/* Intervals that may be one without a turn beyond the limit, from `maximum` down. */
+/* Number of intervals that may be joined without a turn beyond the limit, from `maximum` down. */
 static int joinable(const interval_turns sum, int maximum)
 {
     for (int together = maximum; together > 1; together /= 2) {
@@ -128,7 +128,7 @@ static bool is_drawn_rigid(const struct scene *scene, const struct scene_node *n
     return node->kind == NODE_SPHERES || (mesh && !(node->skin && mesh->influence_count));
 }
 
-/* How many of the finest intervals may be one: 8, 4, 2 or 1; 0: out of memory. */
+/* Number of the finest intervals that may be joined: 8, 4, 2 or 1; 0: out of memory. */
 static int intervals_together(const struct scene *scene, const struct scene_motion *motion,
                               const interval_turns *turns)
 {
@@ -140,7 +140,7 @@ static int intervals_together(const struct scene *scene, const struct scene_moti
     }
     int together = INTERVALS;
     if (joinable(all, together) == together)
-        return together; /* even if everything hung below one another */
+        return together; /* even for nodes in a single chain */
     struct turn_sums sums;
     if (!turn_sums_init(&sums, scene, pose, turns))
         together = 0;
@@ -171,7 +171,7 @@ static bool same_weights(const struct scene_pose *a, const struct scene_pose *b)
     return !a->weight_count || memcmp(a->weights, b->weights, a->weight_count * sizeof(*a->weights)) == 0;
 }
 
-/* Only nodes and weights move within a frame. */
+/* Whether nothing moves; within a frame only nodes and weights do. */
 static bool stands_still(const struct scene_motion *motion)
 {
     for (uint32_t i = 1; i < motion->pose_count; i++) {
@@ -207,7 +207,7 @@ static bool add_poses(struct scene_motion *motion, struct player *player, double
     return true;
 }
 
-/* An upper bound of the rotations without the poses between: all of it counts in the first interval. */
+/* Upper bound of the rotations without the poses in between: all of it counts in the first interval. */
 static void bound_turns(struct player *player, uint32_t node_count, double open_s, double shutter_s,
                         double *bounds, interval_turns *turns)
 {
@@ -217,7 +217,7 @@ static void bound_turns(struct player *player, uint32_t node_count, double open_
         turns[node][0] = bounds[node];
 }
 
-/* Of two poses, the ends, to as many as are needed; false: out of memory. */
+/* Adds as many poses as needed between the two ends. False: out of memory. */
 static bool fill_in(struct scene_motion *motion, struct player *player, double open_s, double shutter_s,
                     interval_turns *turns, double *bounds, struct error *error)
 {

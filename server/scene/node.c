@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The visible part of the hierarchy: nodes with their world transforms, and its bounds. */
+/* Visible part of the hierarchy: nodes with their world transforms, and its bounds. */
 #include "scene/affine.h"
 #include "scene/affine_double.h"
 #include "scene/hierarchy.h"
@@ -9,12 +9,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* World transforms that were worked out so far, by position in the hierarchy. */
+/* World transforms computed so far, by position in the hierarchy. */
 struct world {
     const struct scene_pose *pose;
     double (*world_from_node)[12];
     enum { WORLD_UNKNOWN, WORLD_VISIBLE, WORLD_HIDDEN } * state;
-    uint8_t *light_groups; /* a node's own, or the nearest above it; 0: none */
+    uint8_t *light_groups; /* the node's own, or the nearest ancestor's; 0: none */
 };
 
 static bool world_init(struct world *world, const struct scene_pose *pose, size_t count)
@@ -33,7 +33,8 @@ static void world_finish(struct world *world)
     free(world->light_groups);
 }
 
-/* Goes up to an ancestor that is known, then down again; a chain has at most SCENE_DEPTH_MAX nodes. */
+/* Resolves a node: goes up to the nearest known ancestor, then back down; a chain has at most SCENE_DEPTH_MAX
+ * nodes. */
 static void world_resolve(struct world *world, const struct hierarchy *hierarchy, uint32_t start)
 {
     uint32_t chain[SCENE_DEPTH_MAX];
@@ -63,7 +64,7 @@ static void world_resolve(struct world *world, const struct hierarchy *hierarchy
     }
 }
 
-/* Whether joints put the vertices in their places, in world space. */
+/* Whether joints place the vertices, in world space. */
 static bool is_skinned(const struct scene *scene, const struct scene_node *node)
 {
     const struct scene_mesh *mesh = node->skin && node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Evaluation of a job's clips: tracks of each object, in order. */
 #include "scene/player.h"
 
 #include "scene/local_transform.h"
@@ -8,10 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The minimum size of an area light: with an area of 0, divisions by it give NaN. */
+/* Minimum size of an area light: divisions by an area of 0 would give NaN. */
 #define LIGHT_SIZE_MIN 1e-6f
 
-/* ---- which channels play ------------------------------------------------------------------------ */
+/* ---- tracks ------------------------------------------------------------------------------------- */
 
 static int compare_tracks(const void *a, const void *b)
 {
@@ -35,7 +36,7 @@ static bool is_sorted(const struct player *player)
     return true;
 }
 
-/* Behind the tracks that change the same object as the one at `first`. */
+/* End of the tracks that change the same object as the one at `first`. */
 static size_t group_end(const struct player *player, size_t first)
 {
     const struct player_track *track = &player->tracks[first];
@@ -52,7 +53,7 @@ static double last_key_s(const struct scene_channel *channel, const struct scene
     return (double)floats[(size_t)channel->first_time + channel->key_count - 1];
 }
 
-/* Of the uses of a clip the last one, as it changes all that the ones before it change. */
+/* Finds the last use of a clip, which overrides all earlier ones. */
 static bool last_use(const struct player *player, uint32_t clip, uint32_t *use)
 {
     for (uint32_t i = player->use_count; i-- > 0;) {
@@ -149,7 +150,7 @@ static void set_times(struct player *player, double time_s)
     }
 }
 
-/* The value of a track, within what the protocol allows. */
+/* Evaluates a track, clamped to the protocol's range. */
 static void evaluate(const struct player *player, const struct player_track *track, float *out)
 {
     const struct channel_row *row = channel_row(track->channel->path);
@@ -175,7 +176,7 @@ static void change_transform(const struct player *player, const struct player_tr
            3 * sizeof(*value));
 }
 
-/* `tracks` to `count` are those of one object. */
+/* Poses a node by `count` tracks of one object. */
 static void pose_node(const struct player *player, const struct player_track *tracks, size_t count,
                       struct scene_pose *pose)
 {
@@ -330,7 +331,7 @@ bool player_pose(struct player *player, double time_s, struct scene_pose *pose, 
     return true;
 }
 
-/* Of the last track that turns the node, which is the one that counts. */
+/* Turn bound of the last track that rotates the node, as it overrides the others. */
 static double track_turn_bound(struct player *player, const struct player_track *tracks, size_t count,
                                double from_s, double to_s)
 {
@@ -342,7 +343,7 @@ static double track_turn_bound(struct player *player, const struct player_track 
         double clip_from_s = player->times_s[tracks[i].use];
         set_times(player, to_s);
         double clip_to_s = player->times_s[tracks[i].use];
-        /* A clip that begins again jumps. */
+        /* A clip jumps where it begins again. */
         bool jumps = clip_to_s < clip_from_s || (player->uses[tracks[i].use].loop &&
                                                  (to_s - from_s) * (double)player->uses[tracks[i].use].speed >=
                                                      player->durations_s[tracks[i].use]);

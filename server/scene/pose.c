@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Poses: their evaluation, and look-ups in them. */
 #include "scene/pose.h"
 
 #include "scene/player.h"
@@ -26,8 +27,8 @@ void scene_pose_finish(struct scene_pose *pose)
     *pose = (struct scene_pose){0};
 }
 
-/* Position of an identifier in a list that ascends by it; `count` if it is not there. The identifier is the u32 at
- * the start of each element. */
+/* Position of an identifier in a list that ascends by it; `count` if it is missing. The identifier is the u32
+ * at the start of each element. */
 static size_t find(const void *list, size_t count, size_t element_bytes, uint32_t id)
 {
     size_t low = 0, high = count;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* References between objects: nodes to their objects, primitives to materials, materials to textures, skins to
- * nodes, channels to their targets. */
+/* Checks references between objects: nodes to their objects, primitives to materials, materials to textures,
+ * skins to nodes, channels to their targets. */
 #include "scene/channel.h"
 #include "scene/draft.h"
 
 #include <stdio.h>
 
-/* One reference of an object, in the order that next_reference() gives. */
+/* A reference of an object, in the order of next_reference(). */
 struct reference {
-    enum object_kind kind; /* of what is referred to */
+    enum object_kind kind; /* kind of the object referred to */
     uint32_t id;           /* never 0 */
     char path[48];
 };
@@ -96,7 +96,7 @@ static bool next_in_channel(const struct scene_channel *channel, uint32_t *curso
     return *cursor == 2 && row && channel_object_kind(row->target, &reference->kind);
 }
 
-/* *cursor starts at 0. False: no more references. */
+/* Iterates over references; *cursor starts at 0. False: no more. */
 static bool next_reference(enum object_kind kind, const void *object, uint32_t *cursor,
                            struct reference *reference)
 {
@@ -149,7 +149,7 @@ static bool set_check(struct draft *draft, const struct scene_edit *edit)
     return true;
 }
 
-/* All remaining objects of `user` are asked whether they refer to something that this transaction removes. */
+/* Checks that no remaining object of kind `user` refers to one that this transaction removes. */
 static bool users_check(struct draft *draft, enum object_kind user)
 {
     size_t cursor = 0;

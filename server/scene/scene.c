@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The scene's life, look-ups, and reading of its objects. */
 #include "scene/scene.h"
 
 #include "scene/edit.h"
@@ -94,9 +95,9 @@ const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id)
     return hashmap_get(&scene->objects[OBJECT_CLIP], id);
 }
 
-/* ---- edits that change what is there ------------------------------------------------------------ */
+/* ---- edits of present objects ------------------------------------------------------------------ */
 
-/* Without its image, which another client may not know: an edit leaves that as it is. */
+/* Reads the environment without its image, which another client may not have: an edit leaves that unchanged. */
 static void read_environment(const struct scene *scene, struct scene_edit *edit)
 {
     edit->kind = EDIT_SET_ENVIRONMENT;
@@ -134,7 +135,7 @@ bool scene_read_object(const struct scene *scene, enum object_kind kind, uint32_
     return true;
 }
 
-/* 0: it is not there. */
+/* Revision of the edit's object; 0: it does not exist. */
 static uint64_t revision_of(const struct scene *scene, const struct scene_edit *edit)
 {
     if (edit->kind == EDIT_SET_ENVIRONMENT)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where joints are. Each node above them is placed once, however many joints hang below it and however deep. */
+/* Transforms of joints. Each node above them is placed once, however many joints are below it and however deep. */
 #include "scene/affine_double.h"
 #include "scene/pose.h"
 
@@ -30,13 +30,13 @@ static double *add(struct placed_nodes *placed, uint32_t node)
         placed->world_from_node = grown;
         placed->capacity = capacity;
     }
-    /* The map's pointers hold numbers here. */
+    /* The map's pointers are numbers. */
     if (!hashmap_put(&placed->places, node, (void *)(uintptr_t)(placed->count + 1)))
         return NULL;
     return placed->world_from_node[placed->count++];
 }
 
-/* Goes up to a node that is placed, or to the root, then down again. */
+/* Places a joint: goes up to the nearest placed node or the root, then back down. */
 static bool place(struct placed_nodes *placed, const struct scene *scene, const struct scene_pose *pose,
                   uint32_t joint, double world_from_joint[12], struct error *error)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of spheres and discs. */
+/* Checks spheres and discs. */
 #include "scene/edit.h"
 
 #include <float.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of the node hierarchy as it would be after a transaction. */
+/* Checks the node hierarchy in its state after a transaction. */
 #include "scene/draft.h"
 
 #include <stdio.h>
@@ -22,7 +22,7 @@ static struct scene_edit *node_edit(const struct draft *draft, uint32_t id)
     return hashmap_get(&draft->last[OBJECT_NODE], id);
 }
 
-/* Whether nodes appear, disappear or change their parent; if not, the hierarchy is as sound as it was. */
+/* Whether nodes appear, disappear or change their parent; if not, the hierarchy stays sound. */
 static bool is_restructured(const struct draft *draft)
 {
     size_t cursor = 0;
@@ -61,8 +61,8 @@ static bool collect(struct traversal *traversal)
     return hierarchy_init(&traversal->hierarchy, nodes, count) && traversal->state;
 }
 
-/* An error about the current chain. The hierarchy was valid before, so an edit in the chain or above is at fault:
- * the one nearest to the start of the traversal is named. */
+/* Reports an error about the current chain. The hierarchy was valid before, so an edit in the chain or above is
+ * at fault: the one nearest to the start of the traversal is named. */
 static bool chain_error(struct traversal *traversal, enum error_code kind, const char *what)
 {
     uint32_t position = traversal->chain[0];
@@ -114,7 +114,7 @@ static bool fallen_parent(struct traversal *traversal, const struct scene_node *
     return error_remedy(traversal->draft->error, "give it a parent that remains");
 }
 
-/* Goes up from a node to one whose state is known, or to a root, then gives states down the chain. */
+/* Resolves a node: goes up to one with a known state, or to a root, then assigns states down the chain. */
 static bool resolve(struct traversal *traversal, uint32_t start)
 {
     const struct hierarchy *hierarchy = &traversal->hierarchy;
