@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /* Options of jemalloc. Software GL allocates memory for each buffer, and each frame allocates its pixels: large
- * blocks, again and again. Freed memory keeps its pages for ten seconds (jemalloc's default, here for the largest
+ * blocks, repeatedly. Freed memory keeps its pages for ten seconds (jemalloc's default, here for the largest
  * blocks too) for whichever thread allocates next (one arena). New memory comes in huge pages, as small ones cost
  * 3 to 30 times as much. */
 #include "base/allocator.h"
 
 #include <jemalloc/jemalloc.h>
 
-/* Read by jemalloc when it starts, by this name, which -fvisibility=hidden would hide. */
+/* Options that jemalloc reads at its start, by this name, which -fvisibility=hidden would hide. */
 __attribute__((visibility("default"))) const char *malloc_conf = "thp:always,oversize_threshold:0,narenas:1";
 
-/* NULL where the sanitizers are linked in place of jemalloc. */
+/* NULL if the sanitizers are linked instead of jemalloc. */
 #pragma weak mallctl
 
-/* jemalloc makes the first arena before it reads the options, and that arena would return large blocks to the
- * kernel at once. */
+/* Sets the options of the first arena, which jemalloc makes before it reads them: it would return large blocks
+ * to the kernel at once. */
 __attribute__((constructor)) static void keep_large_blocks(void)
 {
     size_t never = (size_t)1 << 50;

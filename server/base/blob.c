@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
+/* Memory and references of blobs. */
 #include "base/blob.h"
 
 #include <stdlib.h>
 #include <sys/mman.h>
 
-/* From here on memory comes from mmap, which grows without copying (mremap moves pages, not bytes). */
+/* Size from which memory comes from mmap, which grows without copying (mremap moves pages, not bytes). */
 #define MAPPED_BYTES_MIN ((size_t)256 << 10)
 #define ALIGNMENT_BYTES ((size_t)64)
 #define PAGE_ROUND_BYTES ((size_t)4096)
-/* From here on in huge pages where there are some, which take a third of the time to be there. */
+/* Size from which memory is in huge pages if there are some, which take a third of the time to be provided. */
 #define HUGE_BYTES_MIN ((size_t)8 << 20)
 
 static bool is_mapped(const struct blob *blob)
@@ -30,7 +31,7 @@ struct blob *blob_create_empty(size_t size_bytes)
 
 static bool map_at_least(struct blob *blob, size_t needed_bytes)
 {
-    /* Doubling keeps the number of calls small; the end is known, so nothing beyond it is asked for. */
+    /* Doubling keeps the number of calls small; the size is known, so nothing beyond it is allocated. */
     size_t capacity_bytes = blob->capacity_bytes * 2;
     if (capacity_bytes < needed_bytes)
         capacity_bytes = needed_bytes;
@@ -44,7 +45,8 @@ static bool map_at_least(struct blob *blob, size_t needed_bytes)
                      : mmap(NULL, capacity_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (data == MAP_FAILED)
         return false;
-    /* Half of it is about to be there: a sender of little does not make it take a huge page. */
+    /* The condition is that half of it is about to arrive: a sender of few bytes does not make it use a huge
+     * page. */
     if (capacity_bytes >= HUGE_BYTES_MIN)
         (void)madvise(data, capacity_bytes, MADV_HUGEPAGE);
     blob->data = data;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Reads the limits of control groups. */
 #include "base/cgroup.h"
 
 #include <errno.h>
@@ -13,7 +14,7 @@ static uint64_t lower(uint64_t a, uint64_t b)
     return a < b ? a : b;
 }
 
-/* "max" is none. Version 1 writes a number near 2^63, which is more than any host has. */
+/* Reads a limit; "max" is none. Version 1 writes a number near 2^63, which is more than any host has. */
 static uint64_t read_limit(const char *folder, const char *name)
 {
     char path[PATH_MAX], text[32], *end;
@@ -30,8 +31,8 @@ static uint64_t read_limit(const char *folder, const char *name)
     return errno || (*end && *end != '\n') ? UINT64_MAX : bytes;
 }
 
-/* Within a container the mount may begin at the container's group, whose path is that of the host: folders that
- * are not there are passed over, up to the mount itself. */
+/* Minimum of the limits on a path. Within a container the mount may begin at the container's group, while the
+ * path is the host's: missing folders are skipped, up to the mount itself. */
 static uint64_t lowest_of_branch(const char *mount, const char *path)
 {
     char folder[PATH_MAX];
@@ -50,7 +51,7 @@ static uint64_t lowest_of_branch(const char *mount, const char *path)
     }
 }
 
-/* Whether a list separated by commas has the word. */
+/* Whether a comma-separated list has the word. */
 static bool has_word(const char *list, const char *word)
 {
     const size_t bytes = strlen(word);
@@ -60,7 +61,7 @@ static bool has_word(const char *list, const char *word)
     return false;
 }
 
-/* "NUMBER:CONTROLLERS:PATH"; version 2 has the number 0 and no controllers. */
+/* Limit of a line "NUMBER:CONTROLLERS:PATH"; version 2 has the number 0 and no controllers. */
 static uint64_t limit_of_line(char *line, const char *root)
 {
     char mount[PATH_MAX], *controllers = strchr(line, ':'),

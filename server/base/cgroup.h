@@ -6,9 +6,9 @@
 
 #include <stdint.h>
 
-/* The lowest limit of the groups that a file names, and of the groups above them; UINT64_MAX: there is none.
- * `groups_file`: as /proc/self/cgroup; `root`: where the groups are mounted, as /sys/fs/cgroup. A limit below
- * which the kernel only slows a process (memory.high) counts as well. */
+/* Minimum of the limits of the groups that a file names, and of their ancestors; UINT64_MAX: no limit.
+ * `groups_file`: /proc/self/cgroup, for example; `root`: the mount of the groups, /sys/fs/cgroup for example. A
+ * limit above which the kernel only slows a process (memory.high) counts as well. */
 uint64_t cgroup_memory_limit_bytes(const char *groups_file, const char *root);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Monotonic clock, and waits on it. */
 #include "base/clock.h"
 
 #include "protocol/common/clock.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Setting of errors and remedies. */
 #include "base/error.h"
 
 #include <stdarg.h>

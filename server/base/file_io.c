@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Complete reads and writes. */
 #include "base/file_io.h"
 
 #include <errno.h>

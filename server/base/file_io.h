@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads and writes that go on until all bytes are through. Any thread. */
+/* Reads and writes that continue until all bytes are transferred. Any thread. */
 #ifndef FARLIGHT_BASE_FILE_IO_H
 #define FARLIGHT_BASE_FILE_IO_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-/* False: the file ends before, or cannot be read. */
+/* Reads exactly `bytes`. False: the file ends before, or cannot be read. */
 bool file_read_all(int file, void *data, size_t bytes);
-/* False: errno says why. */
+/* Writes all bytes. False: errno says why. */
 bool file_write_all(int file, const void *data, size_t bytes);
 
 #endif

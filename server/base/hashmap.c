@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Hash map with linear probing and dense pairs. */
 #include "base/hashmap.h"
 
 #include <stdatomic.h>
@@ -25,8 +26,8 @@ void hashmap_finish(struct hashmap *map)
     *map = (struct hashmap){0};
 }
 
-/* Clients choose the keys: without a secret, one could choose thousands that all fall on the same place, and every
- * search among them would be long. */
+/* Random number that scatters keys. Clients choose the keys: without a secret, one could choose thousands that
+ * share a place, and every search among them would be long. */
 static uint64_t secret(void)
 {
     static atomic_uint_fast64_t value; /* 0: not chosen yet */
@@ -40,7 +41,8 @@ static uint64_t secret(void)
     return atomic_compare_exchange_strong(&value, &other, chosen) ? chosen : other;
 }
 
-/* Finaliser of splitmix64: identifiers are mostly 1, 2, 3, .., and must spread. */
+/* Preferred place of a key, by the finaliser of splitmix64: identifiers are mostly 1, 2, 3, .., and must
+ * spread. */
 static size_t home_of(const struct hashmap *map, uint64_t key)
 {
     key ^= secret();
@@ -49,7 +51,7 @@ static size_t home_of(const struct hashmap *map, uint64_t key)
     return (size_t)(key ^ (key >> 31)) & (map->capacity - 1);
 }
 
-/* Place in the index of a key, or the free place where it would go. */
+/* Place of a key in the index, or the free place for it. */
 static size_t find(const struct hashmap *map, uint64_t key)
 {
     size_t place = home_of(map, key);
@@ -150,7 +152,7 @@ void hashmap_unchain(struct hashmap *map, uint64_t key, struct hashmap_link *lin
 {
     struct hashmap_link *before = hashmap_get(map, key);
     if (before == link && link->next) {
-        hashmap_put(map, key, link->next); /* replaces: needs no memory */
+        hashmap_put(map, key, link->next); /* a replacement needs no memory */
     } else if (before == link) {
         hashmap_remove(map, key);
     } else {

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Pairs lie densely in `slots`; `index` finds them, by linear probing. */
+/* A map. Pairs are dense in `slots`; `index` finds them, by linear probing. */
 struct hashmap {
     struct hashmap_slot *slots; /* `count` pairs, at most half of `capacity` */
     uint32_t *index;            /* `capacity` positions in `slots`, plus 1; 0: free */
@@ -19,17 +19,19 @@ struct hashmap {
 void hashmap_init(struct hashmap *map);   /* all-zero is the same */
 void hashmap_finish(struct hashmap *map); /* frees the table, not the values */
 void *hashmap_get(const struct hashmap *map, uint64_t key);
-/* Replaces; value not NULL; false: out of memory, or more than 2^31 pairs. */
+/* Sets the value of a key, which must not be NULL. False: out of memory, or more than 2^31 pairs. */
 bool hashmap_put(struct hashmap *map, uint64_t key, void *value);
 void *hashmap_remove(struct hashmap *map, uint64_t key); /* the value, or NULL */
-/* Several values under one key, for keys that are shorter than what they stand for: each begins with a link, and
+/* Link of a value in a chain, for keys shorter than the values' identities: each value begins with a link, and
  * the map has the first. */
 struct hashmap_link {
     struct hashmap_link *next;
 };
-bool hashmap_chain(struct hashmap *map, uint64_t key, struct hashmap_link *link);   /* false: as hashmap_put() */
-void hashmap_unchain(struct hashmap *map, uint64_t key, struct hashmap_link *link); /* it is there */
-/* *cursor starts at 0; false at the end. The map must not change in between. */
+/* false: see hashmap_put() */
+bool hashmap_chain(struct hashmap *map, uint64_t key, struct hashmap_link *link);
+/* the link must be in the chain */
+void hashmap_unchain(struct hashmap *map, uint64_t key, struct hashmap_link *link);
+/* Iterates; *cursor starts at 0; false at the end. The map must not change in between. */
 bool hashmap_next(const struct hashmap *map, size_t *cursor, uint64_t *key, void **value);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Folders, memory and threads of the machine. */
 #include "base/host.h"
 
 #include "base/cgroup.h"
@@ -33,7 +34,7 @@ void host_thread_gives_way(void)
     setpriority(PRIO_PROCESS, 0, NICENESS);
 }
 
-/* What the system tells of a thread in a line; false: nothing. */
+/* Reads the system's line about a thread. False: there is none. */
 static bool read_thread(int thread, const char *what, char *line, size_t size)
 {
     char path[64];
@@ -51,7 +52,7 @@ size_t host_threads_find(const char *name_part, int *threads, size_t max)
     size_t count = 0;
     DIR *folder = opendir("/proc/self/task");
     for (struct dirent *entry; folder && count < max && (entry = readdir(folder));) {
-        const int thread = atoi(entry->d_name); /* 0: the folder itself, and the one above */
+        const int thread = atoi(entry->d_name); /* 0: the folder itself, and its parent */
         if (thread && read_thread(thread, "comm", name, sizeof(name)) && strstr(name, name_part))
             threads[count++] = thread;
     }
@@ -64,7 +65,7 @@ bool host_threads_sleep(const int *threads, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
         char line[256];
-        /* "number (name) S ..", and a name may hold anything. One that has ended has no work. */
+        /* The line is "number (name) S ..", where the name may hold anything. An ended thread has no work. */
         const char *name_end = read_thread(threads[i], "stat", line, sizeof(line)) ? strrchr(line, ')') : NULL;
         if (name_end && strncmp(name_end, ") S", 3) != 0)
             return false;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Lines of the log on stderr. */
 #include "base/log.h"
 
 #include <stdarg.h>
@@ -8,7 +9,8 @@
 
 #include "protocol/plain_text.h"
 
-/* Longer lines are cut: a line must leave in one write to stay whole beside other threads' lines. */
+/* Maximum length; longer lines are cut: a line must be written in one call to stay whole beside other threads'
+ * lines. */
 #define LINE_BYTES_MAX 1024
 
 static atomic_int current_level = LOG_INFO;
@@ -44,7 +46,7 @@ void log_write(enum log_level level, const char *module, const char *format, ...
     va_end(arguments);
     if (tail < 0)
         line[used] = '\0';
-    /* Text from outside may be in the line: nothing in it may control a terminal or fake a line. */
+    /* The line may contain text from outside, which must not control a terminal or fake a line. */
     used = plain_text_copy(line, sizeof(line) - 1, line);
     line[used++] = '\n';
     /* A failure of standard error cannot be reported anywhere. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Counts of recent lines by source and kind. */
 #include "base/log_rate.h"
 
 #include "base/clock.h"
@@ -11,7 +12,7 @@
 #define INTERVAL_NS UINT64_C(10000000000)
 #define ENTRIES 256
 
-/* Of all pairs of source and kind that have this place: few lines are enough where two meet. */
+/* Entry for the pairs of source and kind that share this place: few lines are enough where two collide. */
 struct entry {
     uint64_t began_ns; /* 0: none yet */
     uint32_t written, left_out;

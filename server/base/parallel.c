@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Threads of a parallel loop. */
 #include "base/parallel.h"
 
 #include "base/progress.h"
@@ -47,7 +48,7 @@ void parallel_run(unsigned threads, uint32_t count, void (*work)(void *context, 
 unsigned parallel_processors(void)
 {
     cpu_set_t set;
-    if (sched_getaffinity(0, sizeof(set), &set) != 0) /* there are more than a set has room for */
+    if (sched_getaffinity(0, sizeof(set), &set) != 0) /* there are more processors than a set holds */
         return (unsigned)sysconf(_SC_NPROCESSORS_ONLN);
     return (unsigned)CPU_COUNT(&set);
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Counter of progress. */
 #include "base/progress.h"
 
 #include <stdatomic.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Progress of long uninterrupted work, such as the build of a tree over a hundred million triangles: a watchdog
- * can tell such a thread from one that hangs in a driver. */
+ * can distinguish such a thread from one that hangs in a driver. */
 #ifndef FARLIGHT_BASE_PROGRESS_H
 #define FARLIGHT_BASE_PROGRESS_H
 
@@ -8,7 +8,7 @@
 
 /* Reports progress. Call it from time to time, on any thread. */
 void progress_tell(void);
-/* How often it was told, by all threads of the process. */
+/* Number of reports so far, by all threads of the process. */
 uint64_t progress_told(void);
 
 #endif

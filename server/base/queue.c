@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Bounded queue with a lock and an eventfd. */
 #include "base/queue.h"
 
 #include "base/clock.h"

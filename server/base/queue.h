@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A bounded queue of pointers between threads. Any thread may push or pop. */
+/* Bounded queue of pointers between threads. Any thread may push or pop. */
 #ifndef FARLIGHT_BASE_QUEUE_H
 #define FARLIGHT_BASE_QUEUE_H
 
@@ -9,10 +9,10 @@
 
 struct queue;
 
-/* `event_fd`: make an eventfd that is readable while the queue holds something, for an epoll loop.
- * NULL when out of memory or descriptors. */
+/* Creates a queue. `event_fd`: with an eventfd that is readable while the queue is not empty, for an epoll
+ * loop. NULL when out of memory or descriptors. */
 struct queue *queue_create(size_t capacity, bool event_fd);
-/* Drops what is left through `drop` (may be NULL). Accepts NULL. No thread may still wait on it. */
+/* Destroys a queue; drops its items through `drop` (may be NULL). Accepts NULL. No thread may still wait on it. */
 void queue_destroy(struct queue *queue, void (*drop)(void *item));
 
 bool queue_try_push(struct queue *queue, void *item); /* false: full or closed */

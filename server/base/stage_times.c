@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Spans of a frame's stages. */
 #include "base/stage_times.h"
 
 #include "base/clock.h"
@@ -20,9 +21,8 @@ static struct stage_span *last_of(struct stage_times *times, uint32_t count, enu
     return NULL;
 }
 
-/* Merges the last span of a repeated kind into the span before it. There is such a kind, as there are few kinds.
- */
-static void make_room(struct stage_times *times)
+/* Merges the last span of a repeated kind into the span before it. There is one, as there are few kinds. */
+static void merge_last(struct stage_times *times)
 {
     for (uint32_t i = times->count; i-- > 0;) {
         struct stage_span *span = &times->spans[i];
@@ -46,7 +46,7 @@ void stage_times_add(struct stage_times *times, enum stage stage, enum clock clo
             last->duration_ns += duration_ns;
             return;
         }
-        make_room(times);
+        merge_last(times);
     }
     /* Spans from before the frame's start (edits that it waited for) begin at its origin. */
     uint64_t since_origin_ns = start_ns > times->origin_ns ? start_ns - times->origin_ns : 0;

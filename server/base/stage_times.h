@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a frame's time goes. Every stage of the way of the data reports here. */
+/* Stage times of a frame. Every stage of the pipeline reports here. */
 #ifndef FARLIGHT_BASE_STAGE_TIMES_H
 #define FARLIGHT_BASE_STAGE_TIMES_H
 
@@ -12,14 +12,15 @@
 struct stage_span {
     enum stage stage;
     enum clock clock;
-    /* Of trace and shade: number of the wave in its frame. Of a build by `ldc`: which cube, 0 the static one, 1
-     * the dynamic one; on the GPU's clock these are all that there are of a build. */
+    /* Number of the wave in its frame, for trace and shade. For a build by `ldc`: the cube, 0 the static one, 1
+     * the dynamic one; on the GPU's clock a build has no other spans. */
     uint32_t wave;
     uint64_t start_ns; /* since `origin_ns` */
     uint64_t duration_ns;
 };
 
-/* 512 spans reach the wire; spans beyond are added to the last of the same stage and clock. */
+/* Maximum of spans, as the wire carries 512; further spans are added to the last one of the same stage and
+ * clock. */
 #define STAGE_SPANS_MAX 512
 
 struct stage_times {
@@ -29,7 +30,7 @@ struct stage_times {
 };
 
 void stage_times_begin(struct stage_times *times); /* empties it, sets the origin to now */
-/* `start_ns` by clock_now_ns(). `times` may be NULL: nothing happens. */
+/* Adds a span; `start_ns` by clock_now_ns(). `times` may be NULL: nothing happens. */
 void stage_times_add(struct stage_times *times, enum stage stage, enum clock clock, uint32_t wave,
                      uint64_t start_ns, uint64_t duration_ns);
 uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage stage, enum clock clock);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Table of system calls. */
 #include "base/sys.h"
 
 #include <errno.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The system calls that the network side makes, in one table, so that a test can shorten, interrupt and
- * fail each. Production code never writes it. */
+/* System calls of the network side in one table, so that a test can shorten, interrupt and fail each.
+ * Production code never writes it. */
 #ifndef FARLIGHT_BASE_SYS_H
 #define FARLIGHT_BASE_SYS_H
 
@@ -20,7 +20,7 @@ struct sys_calls {
 };
 extern struct sys_calls sys;
 
-/* The same, called again when a signal interrupted them. */
+/* System calls that are repeated when a signal interrupts them. */
 ssize_t sys_read(int fd, void *data, size_t bytes);
 ssize_t sys_sendmsg(int fd, const struct msghdr *message, int flags);
 int sys_accept(int fd, struct sockaddr *address, socklen_t *address_bytes, int flags);

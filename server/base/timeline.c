@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Writer of trace events, in a thread of its own. */
 #include "base/timeline.h"
 
 #include "base/file_io.h"
@@ -15,7 +16,7 @@
 #include <unistd.h>
 
 #define WAITING_MAX_BYTES (8u << 20)
-#define JOBS_MAX 64u /* whose tracks are remembered; the one unused for longest gets new ones */
+#define JOBS_MAX 64u /* jobs with remembered tracks; the one unused for longest gets new ones */
 
 static const char head[] = TRACE_FILE_BEGIN, separator[] = TRACE_FILE_SEPARATOR, tail[] = TRACE_FILE_END;
 
@@ -33,11 +34,11 @@ struct timeline {
     pthread_mutex_t mutex;
     pthread_cond_t changed;
     uint64_t limit_bytes;
-    /* Under the mutex. */
+    /* Guarded by the mutex. */
     char *waiting; /* WAITING_MAX_BYTES */
     size_t waiting_bytes;
     bool stopping, failed;
-    /* Of the thread that reports. */
+    /* Used by the reporting thread alone. */
     uint64_t accepted_bytes, left_out, threads, uses;
     bool full;
     struct job_tracks jobs[JOBS_MAX];
@@ -75,7 +76,7 @@ static void *write_waiting(void *context)
     return NULL;
 }
 
-/* A block is one or more events, separated. */
+/* Accepts a block of one or more events, separated. */
 static void accept(struct timeline *timeline, const char *block, size_t count)
 {
     size_t separator_bytes = timeline->accepted_bytes > 0 ? sizeof(separator) - 1 : 0;
@@ -144,7 +145,7 @@ static void print_frame(struct timeline *timeline, const struct timeline_frame *
         events[i] = (struct trace_event){
             .name = stage_name(span->stage),
             .gpu = span->clock == CLOCK_GPU,
-            .rank = span->stage, /* frame contains its one stage */
+            .rank = span->stage, /* the frame encloses its only stage */
             .process = frame->client,
             .start_ns = times->origin_ns + span->start_ns,
             .duration_ns = span->duration_ns,
@@ -190,7 +191,7 @@ struct timeline *timeline_create(const char *path, uint64_t limit_bytes, struct 
     timeline->limit_bytes = limit_bytes;
     pthread_mutex_init(&timeline->mutex, NULL);
     pthread_cond_init(&timeline->changed, NULL);
-    /* Not blocking: a FIFO without a reader is an error and not a daemon that never starts. */
+    /* O_NONBLOCK: a FIFO without a reader is an error and not a daemon that never starts. */
     timeline->fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
     int failure = timeline->fd < 0 ? errno : 0;
     if (!failure && !file_write_all(timeline->fd, head, sizeof(head) - 1))

@@ -18,11 +18,11 @@ struct timeline_frame {
     const struct stage_times *times;
 };
 
-/* Replaces the file at `path`. It gets no larger than `limit_bytes`: then nothing more is written, and the log
- * says so once. */
+/* Creates a timeline; replaces the file at `path`. When it would exceed `limit_bytes`, nothing more is written,
+ * with a single line in the log. */
 struct timeline *timeline_create(const char *path, uint64_t limit_bytes, struct error *error);
-/* Copies what it needs. From one thread. `timeline` may be NULL. A frame is left out, and counted, where the disk
- * is so slow that 8 MiB wait for it. */
+/* Adds a frame; copies its data. From one thread. `timeline` may be NULL. A frame is left out, and counted, if
+ * the disk is so slow that 8 MiB wait for it. */
 void timeline_frame(struct timeline *timeline, const struct timeline_frame *frame);
 /* Writes the waiting events and the end of the array. */
 void timeline_destroy(struct timeline *timeline);

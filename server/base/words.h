@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The enumerations of protocol/words.def under the server's names: enum stage, STAGE_BUILD, STAGE_COUNT. The
+/* Enumerations of protocol/words.def under the server's names: enum stage, STAGE_BUILD, STAGE_COUNT. The
  * numbers are those of the wire, so that sessions may cast. */
 #ifndef FARLIGHT_BASE_WORDS_H
 #define FARLIGHT_BASE_WORDS_H
 
-/* Where a struct of the server has the word, the enumeration is that of its kinds. */
+/* Enumerations whose word is a struct of the server get the suffix _kind. */
 #define integrator integrator_kind
 #define ldc_levels ldc_levels_kind
 #define primary primary_kind

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The order of the checks, and those that need no frame. */
+/* Runs the checks in order, and those that need no frame. */
 #include "check/check.h"
 
 #include "base/host.h"
@@ -125,7 +125,7 @@ static int slowest_first(const void *a, const void *b)
     return (one->build_ns < other->build_ns) - (one->build_ns > other->build_ns);
 }
 
-/* A failure to compile one is the failure of what needed it. */
+/* A failure to compile a program is reported by the check that needed it. */
 static void report_programs(struct check_report *report, const struct gpu_device *device)
 {
     static struct gpu_program_stat stats[512];

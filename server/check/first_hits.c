@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Measures first hits both ways, and derives the limit between them. */
 #include "check/first_hits.h"
 
 #include "base/log.h"
@@ -13,18 +14,21 @@
 #define AROUND_FEW 16u
 #define ACROSS_FEW 8u
 #define SAMPLES_SEVERAL 16u
-#define REPEATS 4u /* of which the first compiles; the fastest counts, as others may use the device too */
-/* Of depths that are the same: some roundings of a distance. */
+#define REPEATS                                                                                                   \
+    4u /* frames per measurement: the first compiles; the fastest counts, as others may use the                   \
+          device too */
+/* Relative difference of depths that count as the same: some roundings of a distance. */
 #define DEPTH_SHARE 1e-4f
-/* Tracing must be clearly faster: devices of a kind decide the same, though measures differ from run to run. */
+/* Share of the time at which tracing counts as faster: clearly, so that devices of a kind decide the same,
+ * though measurements differ from run to run. */
 #define TRACED_SHARE 0.8
 #define NEVER 1e9 /* primitives a pixel */
 
-/* Nothing but first hits, and their depth. */
+/* Request for first hits and their depth only. */
 static struct frame_request request_of(const struct gpu_device *device, bool several, enum first_hits_way way)
 {
     const uint32_t side =
-        (uint32_t)sqrt(device->facts.slice_rays_max) / 2; /* a quarter of a slice: what fills the device */
+        (uint32_t)sqrt(device->facts.slice_rays_max) / 2; /* a quarter of a slice, which fills the device */
     struct frame_request request = check_request(TRACER_BVH, side, side);
     request.samples = several ? SAMPLES_SEVERAL : 1;
     request.primary = way == FIRST_HITS_TRACED ? PRIMARY_TRACE : PRIMARY_RASTER;
@@ -38,7 +42,7 @@ static uint64_t time_of(const struct frame_result *result)
            stage_times_sum_ns(&result->times, STAGE_TRACE, CLOCK_GPU);
 }
 
-/* *result is that of the last frame. */
+/* Measures a request; *result is that of the last frame. */
 static bool measure(struct check_frames *frames, const struct frame_request *request, uint64_t *best_ns,
                     struct frame_result *result, struct error *error)
 {
@@ -64,7 +68,7 @@ static double agreement(const struct frame_result *a, const struct frame_result 
     return (double)same / pixels;
 }
 
-/* Both ways, with one sample a pixel or several. */
+/* Measures both ways, with one sample per pixel or several. */
 static bool measure_ways(struct check_frames *frames, bool several, struct first_hits *measured,
                          struct error *error)
 {
@@ -76,7 +80,7 @@ static bool measure_ways(struct check_frames *frames, bool several, struct first
         measured->ns[several][way] /= request.samples;
         measured->pixels = (uint64_t)request.width * request.height;
     }
-    if (ok && !several) /* several samples are elsewhere in their pixels either way */
+    if (ok && !several) /* with several samples the places in the pixels differ */
         measured->agree = agreement(&results[0], &results[1]);
     for (int way = 0; way < 2; way++)
         frame_result_finish(&results[way]);
@@ -105,8 +109,9 @@ bool first_hits_measure(struct gpu_device *device, struct first_hits *measured, 
     return ok;
 }
 
-/* Rasterising takes a time for each pixel, as of few primitives, and one for each primitive; tracing a time for
- * each pixel. Where rasterising is as fast for many primitives as for few, it always is the faster way. */
+/* Primitives per pixel from which tracing is faster. Rasterising takes a time for each pixel, measured with few
+ * primitives, and one for each primitive; tracing a time for each pixel. If rasterising is as fast for many
+ * primitives as for few, it always is the faster way. */
 struct gpu_measured first_hits_limits(const struct first_hits *measured)
 {
     struct gpu_measured limits = {.known = measured->few_ns > 0};

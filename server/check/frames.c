@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Renders frames of a generated scene. */
 #include "check/frames.h"
 
 #include "render/context/camera.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Prints rows as a table or as JSON. */
 #include "check/report.h"
 
 #include "protocol/plain_text.h"
@@ -10,7 +11,7 @@
 static const char *const verdict_texts[] = {"ok", "note", "FAILED"};
 static const char *const verdict_words[] = {"ok", "note", "failed"};
 
-/* Names come from drivers: only plain characters are left of them. */
+/* Writes a string; names come from drivers, so only plain characters are kept. */
 static void put_string(FILE *stream, const char *text)
 {
     char shown[UTF8_BYTES_MAX];
@@ -80,7 +81,7 @@ void check_report_row(struct check_report *report, const struct check_row *row, 
         put_json(report->stream, row, text);
     else
         put_line(report->stream, row, text);
-    fflush(report->stream); /* what comes next may take seconds, or be the end of a driver */
+    fflush(report->stream); /* the next check may take seconds, or crash the driver */
 }
 
 void check_report_error(struct check_report *report, const char *check, const char *name,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What was found, row by row, as it is found: a table for people, or JSON, one object a line. */
+/* Report of the checks, row by row as they finish: a table for people, or JSON, one object per line. */
 #ifndef FARLIGHT_CHECK_REPORT_H
 #define FARLIGHT_CHECK_REPORT_H
 
@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-enum check_verdict { CHECK_OK, CHECK_NOTE, CHECK_FAILED }; /* a note is a fact that nothing is asked of */
+enum check_verdict { CHECK_OK, CHECK_NOTE, CHECK_FAILED }; /* a note is a fact without a requirement */
 
 struct check_report {
     FILE *stream;
@@ -16,23 +16,23 @@ struct check_report {
     unsigned rows, failed;
 };
 
-/* A number beside what it must be. */
+/* A row: a number beside its bound. */
 struct check_row {
     enum check_verdict verdict;
     const char *check, *name; /* "limit", "storage bindings" */
-    const char *unit;         /* "" for plain numbers; NULL: there is no number, the text says all */
+    const char *unit;         /* "" for plain numbers; NULL: no number, only text */
     double value;
     double bound;       /* NAN: none */
-    const char *remedy; /* of one that failed; may be NULL */
+    const char *remedy; /* for a failed row; may be NULL */
 };
 
-/* `format` is what people read in the last column. */
+/* Writes a row; `format` is the last column for people. */
 void check_report_row(struct check_report *report, const struct check_row *row, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-/* One that failed with an error. */
+/* Writes a failed row with an error. */
 void check_report_error(struct check_report *report, const char *check, const char *name,
                         const struct error *error);
-/* The sum. False: the stream fails. */
+/* Writes the summary. False: the stream fails. */
 bool check_report_end(struct check_report *report);
 
 #endif

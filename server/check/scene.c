@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Builds the generated scenes. */
 #include "check/scene.h"
 
 #include <math.h>
@@ -8,12 +9,12 @@
 #define EDITS_MAX 32
 #define PI 3.14159265358979
 
-/* Objects are named by kind and number; a node has the number of what it shows, and 100 times its kind. */
+/* Numbers of objects, by kind; a node has the number of its object, plus 100 times its kind. */
 enum material { MATTE = 1, METAL, GLASS, HOLED };
 enum { TORUS = 1, FLOOR, SCREEN };
 static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/* Edits of one transaction. What is missing of memory is noted, and nothing is committed. */
+/* Edits of one transaction. A lack of memory is noted, and nothing is committed. */
 struct builder {
     struct scene_edit edits[EDITS_MAX];
     size_t count;
@@ -105,7 +106,7 @@ static struct scene_mesh *add_mesh(struct builder *builder, uint32_t id, const s
     return mesh;
 }
 
-/* Round the y axis. */
+/* Makes a torus round the y axis. */
 static void fill_torus(const struct arrays *arrays, uint32_t around, uint32_t across)
 {
     for (uint32_t i = 0; i < around; i++)
@@ -140,7 +141,7 @@ static void add_torus(struct builder *builder, uint32_t around, uint32_t across)
     free(arrays.indices);
 }
 
-/* In the plane z = 0 of its node. */
+/* Adds a square in the plane z = 0 of its node. */
 static void add_square(struct builder *builder, uint32_t id, float half, enum material material,
                        const float placed[12])
 {
@@ -166,7 +167,7 @@ static void add_spheres(struct builder *builder)
     add_node(builder, NODE_SPHERES, 1, identity);
 }
 
-/* Every second texel is open. */
+/* Adds a texture whose every second texel is open. */
 static void add_holes(struct builder *builder)
 {
     uint8_t texels[4][4][4];
@@ -210,7 +211,7 @@ static struct scene *commit(struct builder *builder, struct error *error)
     if (committed)
         return scene;
     scene_destroy(scene);
-    error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene"); /* unless a reason stands there */
+    error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene"); /* unless a reason is set already */
     return NULL;
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Compares tracers with the reference, and measures dispatches. */
 #include "check/tracers.h"
 
 #include "check/first_hits.h"
@@ -13,21 +14,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Pictures whose rays are compared, and those of which the device's time is taken: more work at once on a GPU. */
+/* Sizes of pictures whose rays are compared, and of those whose dispatches are measured: more work at once on a
+ * GPU. */
 #define COMPARED_WIDTH 160u
 #define COMPARED_HEIGHT 120u
 #define TIMED_WIDTH_HARDWARE 1920u
 #define TIMED_HEIGHT_HARDWARE 1080u
 #define TIMED_WIDTH_SOFTWARE 128u
 #define TIMED_HEIGHT_SOFTWARE 96u
-/* Waves of fewer hits say little of a median. */
+/* Minimum number of hits in a wave for its median to be meaningful. */
 #define HITS_MIN 200u
-/* A cancel is answered within this time, and a driver ends the process of a dispatch of some seconds. */
+/* Maximum of a dispatch: a cancel must be answered within this time, and a driver ends the process of a
+ * dispatch of some seconds. */
 #define DISPATCH_NS_MAX UINT64_C(50000000)
 
-/* What a tracer must reach. Of exact ones: shares of the rays that are on no edge, and distances within some
- * roundings of a float's 24 bits. Of those that sample: shares of all rays for which both hit or both miss, and
- * distances in cells. The figures are those of the tests of accuracy. */
+/* Requirements for a tracer. Exact ones: shares of the rays that are on no edge, and distances within some
+ * roundings of a float's 24 bits. Sampled ones: shares of all rays for which both hit or both miss, and
+ * distances in cells. The figures are those of the accuracy tests. */
 struct promise {
     bool samples;
     double agree_min, median_max;
@@ -37,8 +40,7 @@ static const struct promise *promise_of(unsigned tracer)
 {
     static const struct promise exact = {false, 0.9999, 1e-6}, ldc = {true, 0.99, 0.25},
                                 abuffer = {true, 0.995, 0.1};
-    /* Its distances are exact, but texels decide what is met, and some rays come to where the view sees nothing.
-     */
+    /* Distances are exact, but texels decide which surface is met, and some rays reach unknown space. */
     static const struct promise quadtree = {false, 0.99, 1e-6};
     return tracer == TRACER_LDC        ? &ldc
            : tracer == TRACER_ABUFFER  ? &abuffer
@@ -68,14 +70,14 @@ struct checking {
     struct longest {
         uint64_t ns;
         unsigned program; /* its GL name */
-    } longest[2];         /* dispatch of all tracers but brute force; of that */
+    } longest[2];         /* dispatch of all tracers but brute force; of brute force */
 };
 
 /* ---- rays ---- */
 
 struct agreement {
     uint64_t rays, agreed, edges;
-    double median; /* of the worst wave, in the units of the promise */
+    double median; /* median of the worst wave, in the units of the requirement */
 };
 
 static struct agreement agreement_of(const struct frame_result *result, bool samples, double cells_a_diagonal)
@@ -133,8 +135,8 @@ static unsigned reference_tracer(void)
     return tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : TRACER_NAIVE;
 }
 
-/* The rays are those of exact hits: a ray from one that lies a part of a cell off a surface may meet that again.
- */
+/* Request whose rays begin at exact hits: a ray from one that lies a part of a cell off a surface may meet that
+ * again. */
 static struct frame_request compared_request(unsigned tracer, bool samples)
 {
     struct frame_request request =
@@ -164,7 +166,7 @@ bool check_rays(struct check_report *report, struct check_frames *frames, unsign
 
 /* ---- pictures ---- */
 
-/* One whose dispatches are watched. */
+/* Renders a frame whose dispatches are measured. */
 static bool watched_frame(struct checking *checking, const struct frame_request *request,
                           struct frame_result *result, struct error *error)
 {
@@ -185,7 +187,7 @@ static struct frame_request timed_request(const struct checking *checking, unsig
                          software ? TIMED_HEIGHT_SOFTWARE : TIMED_HEIGHT_HARDWARE);
 }
 
-/* Twice the same request: the first compiles, and of the second the dispatches are watched. */
+/* Renders the same request twice: the first time compiles, and the second measures the dispatches. */
 static void render_twice(struct checking *checking, const struct frame_request *request, const char *name)
 {
     struct frame_result first, second = {0};
@@ -250,13 +252,13 @@ static void check_integrators(struct checking *checking)
     render_twice(checking, &layers, "all layers");
 }
 
-/* ---- what comes of all of them ---- */
+/* ---- results over all tracers ---- */
 
 static void report_ways(struct check_report *report, struct gpu_device *device, const struct first_hits *measured)
 {
     static const char *const sample_texts[] = {"of one sample a pixel", "of several samples a pixel, each"};
     const struct gpu_measured limits = first_hits_limits(measured);
-    (void)first_hits_keep(device, measured); /* a service to the next start, which measures else */
+    (void)first_hits_keep(device, measured); /* spares the next start the measurement */
     for (int several = 0; several < 2; several++) {
         char choice[96] = "rasterised";
         if (device->measured.known)
@@ -284,7 +286,7 @@ static void check_first_hits(struct checking *checking)
         check_report_error(checking->report, "first hits", "rasterised and traced", &error);
         return;
     }
-    /* Either may see another surface where rounding decides, along edges alone. */
+    /* Along edges, rounding may decide for another surface. */
     const double agree_min = 0.998;
     check_report_row(checking->report,
                      &(struct check_row){.verdict = measured.agree >= agree_min ? CHECK_OK : CHECK_FAILED,
@@ -306,7 +308,8 @@ static const char *program_key(const struct gpu_device *device, unsigned name)
     return "none";
 }
 
-/* Dispatches of software GL share the processor with everything else that runs: nothing is asked of them. */
+/* Reports dispatches. Those of software GL share the processor with everything else that runs: no requirement
+ * applies. */
 static void report_dispatch(const struct checking *checking, const char *name, const struct longest *longest)
 {
     const struct gpu_device *device = checking->frames.device;

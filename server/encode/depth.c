@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Encoders of depth. */
 #include "encode/depth.h"
 
 #include "protocol/pixels/coarse_depth.h"

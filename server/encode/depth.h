@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Depths as they travel: rounded inverses, within a bound in pixels (protocol/pixels/inverse_depth.h). */
+/* Depths for the wire: rounded inverses, within a bound in pixels (protocol/pixels/inverse_depth.h). */
 #ifndef FARLIGHT_ENCODE_DEPTH_H
 #define FARLIGHT_ENCODE_DEPTH_H
 
@@ -9,17 +9,17 @@
 #include <stdint.h>
 
 struct depth_picture {
-    const float *depths; /* metres; 0: nothing is there */
+    const float *depths; /* metres; 0: no surface */
     uint32_t width, height;
     float fov_y;          /* 0: orthographic */
-    float pixels, radius; /* the bound */
+    float pixels, radius; /* bound of the error */
 };
 
-/* *rounded: malloc'ed, multiples of *step, 1 / metres; NULL: such a picture cannot have that, and has metres.
- * False: there is no memory. */
+/* Rounds depths. *rounded: malloc'ed, multiples of *step, 1 / metres; NULL: this picture cannot be rounded, and
+ * is sent in metres. False: there is no memory. */
 bool depth_round(const struct depth_picture *picture, uint16_t **rounded, float *step, struct error *error);
 
-/* *out: malloc'ed, what protocol/pixels/coarse_depth.h makes of rounded depths. */
+/* Encodes rounded depths as protocol/pixels/coarse_depth.h describes. *out: malloc'ed. */
 bool depth_encode_coarse(const uint16_t *rounded, uint32_t width, uint32_t height, uint8_t **out,
                          size_t *out_bytes, struct error *error);
 

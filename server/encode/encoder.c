@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* Choice of an encoder by its number. */
 #include "encode/encoder.h"
 
 #include <stdlib.h>
 
-/* The protocol's number is the index; this is the only caller of the implementations. */
+/* Implementations by the protocol's number; all their callers are in this file. */
 static const struct encoder_impl *const impls[ENCODING_COUNT] = {
     [ENCODING_RAW] = &encoder_raw_impl,
     [ENCODING_ZSTD] = &encoder_zstd_impl,
@@ -72,10 +73,10 @@ bool encoder_encode(enum encoding encoding, const struct picture *picture, unsig
     size_t used = impl->encode(picture, quality, bytes, capacity, error);
     if (!used) {
         free(bytes);
-        /* An implementation that fails says why; this one only wins where it did not. */
+        /* An implementation that fails says why; this error only stands where it did not. */
         return error_set(error, ERROR_INTERNAL, "encoding", "%s gave no bytes", impl->name);
     }
-    /* A compressed frame is usually far below its bound, and it may wait in a queue for a while. */
+    /* Trims the bytes: a compressed frame is usually far below its bound, and may wait in a queue for a while. */
     uint8_t *trimmed = used < capacity / 2 ? realloc(bytes, used) : NULL;
     *out = trimmed ? trimmed : bytes;
     *out_bytes = used;

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* H.264 through libavcodec: an access unit a picture, in Annex B form, parameter sets before each key frame.
+/* H.264 through libavcodec: an access unit per picture, in Annex B form, parameter sets before each key frame.
  *
- * What a person moves is to be seen at once: no picture waits for a later one (no B-frames, no lookahead, threads
- * share a picture instead of taking turns), and none takes longer on the link than its share of time: with a
- * buffer of one picture, the rate control of the encoder keeps each to the bytes that it may have. Key frames come
- * on request alone. */
+ * Motion must be visible at once: no picture waits for a later one (no B-frames, no lookahead, threads share a
+ * picture instead of taking turns), and none takes longer on the link than its share of time: with a buffer of one
+ * picture, the rate control of the encoder keeps each within its bytes. Key frames come on request only. */
 #include "encode/stream.h"
 
 #include "base/parallel.h"
@@ -18,28 +17,29 @@
 #include <string.h>
 
 #define EDGE_MAX 8192u
-#define RATE_DENOMINATOR 1000 /* of pictures per second */
-/* A picture is divided among threads in parts that are worth it. */
+#define RATE_DENOMINATOR 1000 /* denominator of pictures per second */
+/* Minimum part of a picture that is worth a thread. */
 #define PIXELS_PER_THREAD (512u * 512u)
 #define THREADS_MAX 4u
-#define KEY_FRAMES_NEVER (1 << 30) /* x264's word for it */
-/* "No limit" must be one for x264, which cannot be given one later else: what an uncompressed picture takes. */
+#define KEY_FRAMES_NEVER (1 << 30) /* x264's value for that */
+/* Bytes per pixel of an uncompressed picture, which stand for no limit: x264 accepts a limit later only if it
+ * began with one. */
 #define BYTES_PER_PIXEL_UNLIMITED 3u
-#define BYTES_MIN 1000u /* of a picture: x264 counts in kilobits */
+#define BYTES_MIN 1000u /* per picture: x264 counts in kilobits */
 #define BITS_MAX ((int64_t)1 << 30)
 
-/* Those that the library may have, the best first: the hardware's, where there is some. */
+/* Codecs that the library may have, the best first: hardware, if there is any. */
 enum codec { CODEC_NVENC, CODEC_X264, CODEC_COUNT };
 static const char *const codec_names[CODEC_COUNT] = {"h264_nvenc", "libx264"};
-/* One whose device refuses it is not tried again: there is no such device. Memory that was short once says nothing
- * of that. */
+/* Codecs whose device refuses them, which are not tried again, as there is no such device. A lack of memory
+ * does not count. */
 static atomic_bool codec_fails[CODEC_COUNT];
 enum outcome { OUTCOME_DONE, OUTCOME_NO_MEMORY, OUTCOME_REFUSED };
 
 struct encoder_stream {
     const struct libav *av;
     int rate_numerator;
-    /* Of the size and the encoder that are open; NULL: none. */
+    /* Open codec for the present size; NULL: none is open. */
     enum codec which;
     AVCodecContext *codec;
     AVFrame *frame;
@@ -51,7 +51,7 @@ struct encoder_stream {
 
 /* ---- settings ----------------------------------------------------------------------------------- */
 
-/* The constant rate factor that looks like a JPEG of that quality: 23, x264's default, at 75, and a step of 6,
+/* Constant rate factor that looks like a JPEG of that quality: 23, x264's default, at 75, and a step of 6,
  * which halves the rate, for 18. */
 static double rate_factor(unsigned quality)
 {
@@ -59,7 +59,7 @@ static double rate_factor(unsigned quality)
     return 48 - clamped / 3.0;
 }
 
-/* The encoder looks at them before each picture. */
+/* Sets the rate, which the encoder reads before each picture. */
 static void set_rate(struct encoder_stream *stream, const struct encoder_wish *wish)
 {
     AVCodecContext *codec = stream->codec;
@@ -111,7 +111,7 @@ static void set_latency(struct encoder_stream *stream, AVDictionary **options)
     } else {
         av->av_dict_set(options, "preset", "superfast", 0);
         av->av_dict_set(options, "tune", "zerolatency", 0);
-        av->av_dict_set(options, "sc_threshold", "0", 0); /* no key frames of its own */
+        av->av_dict_set(options, "sc_threshold", "0", 0); /* no key frames on its own */
     }
 }
 
@@ -175,7 +175,7 @@ static bool stream_open(struct encoder_stream *stream, const struct picture *pic
         if (outcome == OUTCOME_DONE)
             return true;
         stream_close(stream);
-        /* The last one has no other to make way for. */
+        /* The last codec has no successor. */
         if (outcome == OUTCOME_REFUSED && which + 1 < CODEC_COUNT)
             atomic_store(&codec_fails[which], true);
     }
@@ -190,7 +190,7 @@ static void copy_plane(uint8_t *to, int to_stride, const uint8_t *from, size_t f
         memcpy(to + (ptrdiff_t)row * to_stride, from + (size_t)row * from_stride, (size_t)width);
 }
 
-/* What the device has converted. */
+/* Copies planes that the device has converted. */
 static void copy_planes(AVFrame *frame, const struct ycbcr_planes *from)
 {
     int width = frame->width / 2, rows = frame->height / 2;
@@ -202,7 +202,7 @@ static void copy_planes(AVFrame *frame, const struct ycbcr_planes *from)
 static bool fill_frame(struct encoder_stream *stream, const struct picture *picture)
 {
     AVFrame *frame = stream->frame;
-    if (stream->av->av_frame_make_writable(frame) < 0) /* an encoder may still look at the one before */
+    if (stream->av->av_frame_make_writable(frame) < 0) /* the encoder may still use the previous picture */
         return false;
     if (picture->ycbcr != YCBCR_NONE) {
         copy_planes(frame, &picture->planes);
@@ -222,7 +222,7 @@ static bool fill_frame(struct encoder_stream *stream, const struct picture *pict
     return true;
 }
 
-/* One picture in, one packet out. */
+/* Encodes one picture into one packet. */
 static enum outcome encode_picture(struct encoder_stream *stream, const struct picture *picture,
                                    const struct encoder_wish *wish, struct encoded_picture *out)
 {

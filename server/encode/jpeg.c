@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* JPEG, baseline or progressive, through libjpeg-turbo. Alpha is dropped. Planes, which have half the chroma, are
- * taken where that is all that the JPEG will have. */
+ * accepted where the JPEG has no more. */
 #include "encode/encoder.h"
 
 #include <limits.h>
 #include <turbojpeg.h>
 
-/* From here on a person asks for fine detail, which halved chroma blurs. */
+/* Quality from which fine detail matters, which halved chroma blurs. */
 #define QUALITY_FULL_CHROMA 90
-/* The format's own limit for an edge. */
+/* Limit of the format for an edge. */
 #define EDGE_MAX 65500
 
 static int subsampling(unsigned quality)
@@ -25,14 +25,14 @@ static size_t jpeg_bound(const struct picture *picture)
 {
     if (picture->bytes_per_pixel != 4 || picture->width > EDGE_MAX || picture->height > EDGE_MAX)
         return 0;
-    /* The greater of the two, whatever the quality will be: tiny pictures are padded more where chroma is halved.
-     */
+    /* Maximum over both kinds of chroma, whatever the quality: tiny pictures have more padding where chroma is
+     * halved. */
     unsigned long full = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_444);
     unsigned long halved = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_420);
     return full == ULONG_MAX || halved == ULONG_MAX ? 0 : full > halved ? full : halved;
 }
 
-/* As libjpeg-turbo says it: 0 is success. */
+/* Compresses a picture; returns libjpeg-turbo's result, 0 for success. */
 static int compress(tjhandle handle, const struct picture *picture, uint8_t *out, unsigned long *bytes,
                     int quality)
 {

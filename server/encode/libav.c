@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Symbols of libavcodec, loaded once. */
 #include "encode/libav.h"
 
 #include "base/log.h"
@@ -7,7 +8,7 @@
 #include <pthread.h>
 #include <string.h>
 
-/* Of the version whose structs the headers describe. */
+/* Name of a library in the version whose structs the headers describe. */
 #define NAME_OF(library, version) library ".so." AV_STRINGIFY(version)
 
 static struct libav functions;
@@ -16,7 +17,7 @@ static bool loaded;
 static bool find(void *library, const char *name, void *function)
 {
     void *address = library ? dlsym(library, name) : NULL;
-    /* Through bytes, as a pointer to data is no pointer to a function in C. */
+    /* Copies bytes, as in C a data pointer does not convert to a function pointer. */
     memcpy(function, &address, sizeof(address));
     return address != NULL;
 }
@@ -33,7 +34,7 @@ static void load(void)
     LIBAVCODEC_FUNCTIONS(FUNCTION)
 #undef FUNCTION
     if (good)
-        functions.av_log_set_level(AV_LOG_QUIET); /* what fails comes back as a number */
+        functions.av_log_set_level(AV_LOG_QUIET); /* failures are returned as numbers */
     else
         log_write(LOG_INFO, "encode", "no video: %s", dlerror());
     loaded = good;

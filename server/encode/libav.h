@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* libavcodec, loaded when it is first asked for: linked, it and what it draws in would cost every start of the
- * daemon 20 to 60 ms, where few of them ever encode video. */
+/* Loader of libavcodec on first use: linked, it and its dependencies would cost every start of the daemon 20 to
+ * 60 ms, though few ever encode video. */
 #ifndef FARLIGHT_ENCODE_LIBAV_H
 #define FARLIGHT_ENCODE_LIBAV_H
 
@@ -35,7 +35,7 @@ struct libav {
 #undef FUNCTION
 };
 
-/* Stays loaded. NULL: it is not there in the version that this was built for. Any thread. */
+/* Loads the library for good. NULL: the version that this was built for is missing. Any thread. */
 const struct libav *libav_load(void);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Cuts of encoded data: scans of a JPEG, and colours before depth. */
 #include "encode/parts.h"
 
 #include <stdbool.h>
@@ -9,14 +10,14 @@
 #define MARKER 0xff
 #define START_OF_SCAN 0xda
 
-/* libjpeg's progression for Y'CbCr: means and the lowest frequencies of luma; then all chroma and the other
- * frequencies, without their last bits; then those. Of rendered pictures at quality 75 the first two parts are 25
- * and 10 % of the bytes, and 32 and 35 dB where all are 39. */
+/* Scans of libjpeg's progression for Y'CbCr: means and the lowest frequencies of luma; then all chroma and the
+ * other frequencies, without their last bits; then those bits. In rendered pictures at quality 75 the first two
+ * parts are 25 and 10 % of the bytes, and give 32 and 35 dB where the whole gives 39. */
 #define SCANS 10u
 #define COLOURS_MAX 3u
 static const unsigned scans_of_parts[COLOURS_MAX - 1] = {2, 5};
 
-/* From a marker or the bytes of a scan to the next marker that begins a segment. */
+/* Skips from a marker or the bytes of a scan to the next marker that begins a segment. */
 static size_t next_segment(const uint8_t *bytes, size_t size_bytes, size_t at)
 {
     while (at + 1 < size_bytes) {
@@ -32,7 +33,7 @@ static size_t next_segment(const uint8_t *bytes, size_t size_bytes, size_t at)
     return size_bytes;
 }
 
-/* Where scans end, but for the last one, which all ends with; how many there are. */
+/* Finds the ends of scans, except the last one, which ends the file; returns their number. */
 static unsigned find_scans(const uint8_t *bytes, size_t size_bytes, size_t ends[SCANS])
 {
     unsigned count = 0;
@@ -47,7 +48,7 @@ static unsigned find_scans(const uint8_t *bytes, size_t size_bytes, size_t ends[
     return count + in_scan;
 }
 
-/* Where the colours may be cut; how many parts they make. */
+/* Finds where the colours may be cut; returns the number of parts. */
 static unsigned cut_colours(const struct parts_source *source, size_t ends[COLOURS_MAX])
 {
     const uint8_t *bytes = source->bytes[FRAME_PART_COLOURS];

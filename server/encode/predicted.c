@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Lossless pictures by prediction from neighbours (protocol/pixels). */
 #include "encode/encoder.h"
 #include "protocol/pixels/predicted.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Pictures without compression. */
 #include "encode/encoder.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Colours for empty pixels, block by block. */
 #include "encode/sparse.h"
 
 #include <stddef.h>
@@ -12,7 +13,7 @@ struct block {
     uint32_t stride, width, height; /* pixels */
 };
 
-/* As it was where nothing is there. */
+/* Mean over a block; the previous mean stays if the block is empty. */
 static void mean_of(const struct block *block, uint8_t mean[4])
 {
     uint32_t sums[4] = {0}, count = 0;

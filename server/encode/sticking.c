@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
+/* Encoder of the shares that depend on the eye. */
 #include "encode/sticking.h"
 
 #include "protocol/pixels/sticking.h"
 
 #include <stdlib.h>
 
-#define LEVEL 9 /* of 57600 blocks a third of a millisecond, and up to a tenth less than at level 1 */
+/* Level of zstd: 57600 blocks take a third of a millisecond, and up to a tenth less than at level 1. */
+#define LEVEL 9
 
 bool sticking_encode(const uint8_t *shares, size_t apart, uint32_t width, uint32_t height, uint8_t **out,
                      size_t *out_bytes, struct error *error)

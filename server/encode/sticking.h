@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What of a picture follows the eye, as it travels (protocol/pixels/sticking.h). */
+/* Shares of a picture that depend on the eye, for the wire (protocol/pixels/sticking.h). */
 #ifndef FARLIGHT_ENCODE_STICKING_H
 #define FARLIGHT_ENCODE_STICKING_H
 
 #include "encode/encoder.h"
 
-/* Of 255 times the share of each pixel, one every `apart` bytes. *out: malloc'ed. */
+/* Encodes 255 times the share of each pixel, one every `apart` bytes. *out: malloc'ed. */
 bool sticking_encode(const uint8_t *shares, size_t apart, uint32_t width, uint32_t height, uint8_t **out,
                      size_t *out_bytes, struct error *error);
 

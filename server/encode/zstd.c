@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* One Zstandard frame over the pixels as they are, which names its decoded size. */
+/* A single Zstandard frame of the unchanged pixels, which includes its decoded size. */
 #include "encode/encoder.h"
 
 #include <zstd.h>
 
-/* Higher levels need more than a second a megapixel. */
+/* Maximum level: higher ones need more than a second per megapixel. */
 #define LEVEL_MAX 19
 
 static size_t zstd_bound(const struct picture *picture)
@@ -16,13 +16,13 @@ static size_t zstd_bound(const struct picture *picture)
     return ZSTD_isError(bound) ? 0 : bound;
 }
 
-/* Some milliseconds at the highest level. */
+/* Bytes of a step: some milliseconds at the highest level. */
 #define STEP_BYTES ((size_t)64 << 10)
-/* Less than that, or at a low level, takes no time worth asking within. */
+/* Limits below which encoding is too quick to be abandoned. */
 #define WHOLE_BYTES ((size_t)4 << 20)
 #define WHOLE_LEVEL_MAX 5
 
-/* Returns the size, an error of zstd's, or 0: it was given up. */
+/* Encodes in steps. Returns the size, an error of zstd's, or 0: it was abandoned. */
 static size_t encode_in_steps(ZSTD_CCtx *context, const struct picture *picture, uint8_t *out, size_t capacity)
 {
     const size_t bytes = picture_bytes(picture);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compaction by the host, which would take longer to compile its shaders than they run for. */
+/* Compaction on the host, where compiling the shaders would take longer than running them. */
 #include "host_passes/host_passes.h"
 
 #include "shared/path.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Environment variables of socket activation. */
 #include "net/activation.h"
 
 #include <errno.h>
@@ -23,7 +24,7 @@ static unsigned long number_of(const char *name)
 
 size_t activation_take(void)
 {
-    /* The variables may be meant for the parent process, which passed its environment on. */
+    /* The variables may be meant for the parent process, which passed on its environment. */
     bool ours = number_of("LISTEN_PID") == (unsigned long)getpid();
     unsigned long count = ours ? number_of("LISTEN_FDS") : 0;
     unsetenv("LISTEN_PID");

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Parsing and printing of addresses. */
 #include "net/address.h"
 
 #include <arpa/inet.h>
@@ -68,7 +69,7 @@ bool address_is_unix(const struct address *address)
     return address->storage.ss_family == AF_UNIX;
 }
 
-/* The address of the socket's own family, copied out of the storage so that no pointer is cast. */
+/* Address in the socket's own family, copied from the storage so that no pointer is cast. */
 static struct sockaddr_in as_ipv4(const struct address *address)
 {
     struct sockaddr_in ipv4;

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* Rate of handshakes by network. */
 #include "net/attempts.h"
 
 #define SECOND_NS UINT64_C(1000000000)
 
-/* The network's entry, or the one that has been quiet for longest, which it replaces. */
+/* Entry of a network; it replaces the one that has been quiet for longest, if it is new. */
 static struct attempts_network *place_of(struct attempts *attempts, uint64_t network)
 {
     struct attempts_network *quietest = &attempts->networks[0];
@@ -18,7 +19,7 @@ static struct attempts_network *place_of(struct attempts *attempts, uint64_t net
     return quietest;
 }
 
-/* The generic cell rate algorithm (ITU-T I.371) with a tolerance of a second. */
+/* Generic cell rate algorithm (ITU-T I.371) with a tolerance of a second. */
 uint64_t attempts_wait_ns(struct attempts *attempts, uint64_t network, uint32_t per_second, uint64_t now_ns)
 {
     struct attempts_network *place = place_of(attempts, network);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Key files, and identities of clients. */
 #include "net/auth.h"
 
 #include "base/log.h"
@@ -88,7 +89,7 @@ bool auth_numbers_have(const struct auth_key_numbers *keys, const struct auth_id
     return false;
 }
 
-/* Users are 32-bit numbers, keys have the top bit set, networks the next. */
+/* Bit of networks in owner numbers. Users are 32-bit numbers, keys have the top bit set. */
 #define NETWORK_BIT (UINT64_C(1) << 62)
 
 uint64_t auth_owner_number(const struct auth_identity *identity, const struct address *peer)

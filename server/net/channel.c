@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Packets with descriptors over a pair of sockets. */
 #include "net/channel.h"
 
 #include <errno.h>
@@ -32,10 +33,10 @@ static void destroy_packet(struct channel_packet *packet)
 
 /* ---- sending ---- */
 
-/* False with EAGAIN: later. */
+/* Sends a packet. False with EAGAIN: not yet. */
 static bool send_parts(int fd, uint32_t kind, const void *payload, size_t bytes, const int *fds)
 {
-    /* sendmsg() does not write; iovec just has no const. */
+    /* The const is cast away for struct iovec; sendmsg() does not write. */
     struct iovec parts[2] = {{&kind, sizeof(kind)}, {(void *)(uintptr_t)payload, bytes}};
     union {
         struct cmsghdr header;
@@ -72,7 +73,7 @@ static void end(struct channel *channel)
     channel->closed(channel->context);
 }
 
-/* Sends what the other end takes. False: it is gone. */
+/* Sends as much as the other end accepts. False: it is gone. */
 static bool flush(struct channel *channel)
 {
     while (channel->first && send_packet(channel->fd, channel->first)) {
@@ -104,7 +105,7 @@ bool channel_send(struct channel *channel, enum channel_kind kind, const void *p
         memcpy(packet->payload, payload, bytes);
     *channel->end = packet;
     channel->end = &packet->next;
-    flush(channel); /* a failure is seen by the watch too, outside of this call */
+    flush(channel); /* the watch reports a failure too, outside of this call */
     return true;
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* State of a connection, and its turns in the loop. */
 #include "net/connection.h"
 
 #include "base/clock.h"
@@ -14,12 +15,12 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What may go to one client, and come from it, before others get their turn. Messages are counted together for
- * those that share a turn. */
+/* Limits of bytes sent to one client, and received from it, before others get their turn. Connections that
+ * share a turn share a count of messages. */
 #define SENT_BYTES_A_TURN ((size_t)2 << 20)
 #define RECEIVED_BYTES_A_TURN ((size_t)256 << 10)
 #define MESSAGES_A_TURN 64
-/* Maximum of queued bulk: a cancel, and another job's frame, wait behind it. */
+/* Maximum of queued bulk, which a cancel, and another job's frame, have to wait for. */
 #define BULK_QUEUED_BYTES ((size_t)512 << 10)
 #define PARTS_A_CALL 64
 
@@ -34,7 +35,7 @@ static unsigned messages_a_turn(const struct connection *connection)
     return share ? share : 1;
 }
 
-/* Whether there is no link, or it could be restored. */
+/* Restores the link, if there is one. False: it could not be restored. */
 static bool restore_link(struct sealed_link **link, const struct connection_saved *saved)
 {
     *link =
@@ -87,8 +88,8 @@ struct connection *connection_create(struct loop *loop, int fd, const struct con
     out_queue_init(&connection->out);
     if (saved && saved->is_open) {
         connection->state = CONNECTION_OPEN;
-        if (!greeting_make_room(connection))
-            connection->state = CONNECTION_CLOSED; /* as if its client had gone at once */
+        if (!greeting_reserve_input(connection))
+            connection->state = CONNECTION_CLOSED; /* the client counts as gone */
     }
     loop_defer(loop, &connection->turn_end);
     return connection;
@@ -147,7 +148,7 @@ void connection_finish(struct connection *connection, enum protocol_error_code c
 {
     if (connection->state == CONNECTION_HELLO || connection->state == CONNECTION_WRONG_KEY ||
         connection->state == CONNECTION_ROUTED) {
-        /* Before this state, no message may be sent. */
+        /* No message may be sent in an earlier state. */
         connection_close(connection);
         return;
     }
@@ -231,7 +232,7 @@ static void flush(struct connection *connection)
         if (!message.msg_iovlen || connection->state == CONNECTION_CLOSED)
             return;
         ssize_t sent = sys_sendmsg(connection->fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
-        connection->write_blocked = true; /* or more waits than one turn may send */
+        connection->write_blocked = true; /* the socket is full, or more waits than one turn may send */
         if (sent < 0) {
             if (errno != EAGAIN && errno != EWOULDBLOCK)
                 connection_close(connection);
@@ -305,7 +306,7 @@ static void process_messages(struct connection *connection)
     connection->in_used -= offset;
     memmove(connection->in, connection->in + offset, connection->in_used);
     if (!connection_incoming_bytes(connection) || !connection->messages_left)
-        connection->message_began_ns = 0; /* what is left may be whole messages */
+        connection->message_began_ns = 0; /* the rest may be whole messages */
     else if (!connection->message_began_ns)
         connection->message_began_ns = clock_now_ns();
 }
@@ -336,7 +337,7 @@ static bool may_read(const struct connection *connection)
     return false;
 }
 
-/* Records that arrived while reading was off: the socket does not announce them again. */
+/* Whether records arrived while reading was off: the socket does not announce them again. */
 static bool has_waiting_records(const struct connection *connection)
 {
     return connection->link && may_read(connection) && sealed_link_has_record(connection->link);
@@ -359,7 +360,7 @@ static void receive(struct connection *connection)
 {
     size_t received_bytes = 0;
     if (has_waiting_records(connection))
-        process(connection); /* they release space */
+        process(connection); /* messages release space */
     while (may_read(connection) && connection->messages_left && received_bytes < RECEIVED_BYTES_A_TURN) {
         size_t free_bytes = connection->in_capacity - connection->in_used;
         uint8_t *space = connection->in + connection->in_used;
@@ -386,7 +387,7 @@ static void receive(struct connection *connection)
     }
 }
 
-/* ---- the loop's calls ------------------------------------------------------------------------------- */
+/* ---- callbacks of the loop -------------------------------------------------------------------------- */
 
 static void on_ready(void *context, uint32_t epoll_events)
 {
@@ -413,13 +414,14 @@ static bool has_flushed(const struct connection *connection)
     return !connection->out.queued_bytes && (!connection->link || sealing_is_done(connection));
 }
 
-/* At the end of a turn: sends, sets what to wait for, or releases the connection. */
+/* Ends a turn: sends, sets the events to wait for, or releases the connection. */
 static void turn_end(void *context)
 {
     struct connection *connection = context;
     bool was_held = connection->in_used && !connection->message_began_ns;
     connection->messages_left = messages_a_turn(connection);
-    /* Messages that arrived before it was held or had had its turn, or a hello that another process has read. */
+    /* Messages may have arrived before the connection was held or its turn ended, or another process has read a
+     * hello. */
     if (connection->state == CONNECTION_HELLO
             ? connection->in_used > 0
             : may_process(connection) && (was_held || has_waiting_records(connection)))
@@ -429,7 +431,7 @@ static void turn_end(void *context)
         linger(connection);
     if (connection->state == CONNECTION_CLOSED) {
         if (connection->turn_end.waiting)
-            return; /* closed by the lines above: the next turn releases it */
+            return; /* the lines above have closed it: the next turn releases it */
         connection->handler->closed(connection->context);
         destroy(connection);
         return;
@@ -440,7 +442,7 @@ static void turn_end(void *context)
     } else if (!over_soft && connection->over_soft_since_ns) {
         connection->over_soft_since_ns = 0;
         if (connection->message_began_ns)
-            connection->message_began_ns = clock_now_ns(); /* it was blocked until now */
+            connection->message_began_ns = clock_now_ns(); /* blocked until now */
     }
     if (has_waiting_records(connection) || !connection->messages_left)
         loop_defer(connection->loop, &connection->turn_end);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Answers to a client's hello, and to its sealed handshake. */
 #include "net/greeting.h"
 
 #include "base/clock.h"
@@ -56,12 +57,12 @@ void greeting_turn_away(int fd, const char *why, uint64_t capabilities)
     struct iovec part = {.iov_base = bytes, .iov_len = handshake_reply_encode(bytes, &reply)};
     struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1};
     ssize_t sent = sys_sendmsg(fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
-    (void)sent; /* a peer that cannot hear it sees the end */
+    (void)sent; /* a peer that cannot receive it sees the end */
 }
 
-bool greeting_make_room(struct connection *connection)
+bool greeting_reserve_input(struct connection *connection)
 {
-    /* Of a sealed connection, space for a record of any size behind the start of any message. */
+    /* A sealed connection needs space for a record of any size behind the start of any message. */
     const size_t room_bytes = FRAMING_MESSAGE_MAX_BYTES + (connection->link ? SEALED_PLAIN_MAX_BYTES : 0);
     const size_t capacity_bytes = room_bytes > connection->in_used ? room_bytes : connection->in_used;
     if (connection->scratch_data)
@@ -102,7 +103,7 @@ static void begin_seal(struct connection *connection)
     uint64_t wait_ns = connection->handler->seal_wait_ns(connection->context);
     connection->seal_due_ns = wait_ns ? clock_now_ns() + wait_ns : 0;
     if (wait_ns)
-        return; /* timeouts_check() comes back to it */
+        return; /* timeouts_check() continues */
     struct sealed_link *link = sealed_link_server(entry->keys, entry->key_count);
     if (!link) {
         log_write(LOG_ERROR, "net", "cannot accept a client: out of memory, or no random numbers");
@@ -116,7 +117,7 @@ static void begin_seal(struct connection *connection)
     connection->link = link;
 }
 
-/* With the reason that the link gives. */
+/* Refuses with the reason that the link gives. */
 static void refuse_link(struct connection *connection)
 {
     sealed_link_refuse(connection->link);
@@ -134,7 +135,7 @@ static void go_on_with_seal(struct connection *connection)
     switch (sealed_link_handshake(connection->link, &error)) {
     case SEALED_CONSUMED:
         connection->handler->key_proved(connection->context, sealed_key_index(connection->link->sealed));
-        if (!greeting_make_room(connection))
+        if (!greeting_reserve_input(connection))
             connection_close(connection);
         return;
     case SEALED_NEED_MORE:
@@ -189,7 +190,7 @@ static void answer_hello(struct connection *connection)
         refuse_hello(connection, &reply);
         return;
     }
-    if (!greeting_make_room(connection)) {
+    if (!greeting_reserve_input(connection)) {
         connection_close(connection);
         return;
     }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Handover of a connection by a packet and a memory file. */
 #include "net/handover.h"
 
 #include <errno.h>
@@ -8,7 +9,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-/* More than an input buffer, and than a link's two. */
+/* Limit above the size of an input buffer and a link's two. */
 #define SAVED_MAX_BYTES ((size_t)1 << 20)
 
 static bool write_all(int fd, const uint8_t *bytes, size_t count)
@@ -67,7 +68,7 @@ bool handover_send(struct channel *channel, const struct connection *connection,
            error_set(error, ERROR_OUT_OF_MEMORY, NULL, "cannot hand a client over: its worker is gone");
 }
 
-/* A packet may come from another worker. */
+/* Whether the packet is valid; it may come from another worker. */
 static bool is_valid(struct handover *handover)
 {
     const struct connection_saved *saved = &handover->saved;
@@ -87,7 +88,7 @@ bool handover_take(struct handover *handover, const void *payload, size_t bytes,
     }
     if (ok) {
         const size_t count = handover->saved.in_bytes + handover->saved.link_bytes;
-        handover->saved.bytes = malloc(count + 1); /* of a client that has said nothing yet there are none */
+        handover->saved.bytes = malloc(count + 1); /* a silent client has no bytes */
         ok = handover->saved.bytes && read_all(bytes_fd, handover->saved.bytes, count);
         if (!ok)
             free(handover->saved.bytes);

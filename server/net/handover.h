@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A client on its way from the front, which knows who it is and has read its hello, to the worker that answers. */
+/* Handover of a client from the front, which has identified it and read its hello, to the worker that serves
+ * it. */
 #ifndef FARLIGHT_NET_HANDOVER_H
 #define FARLIGHT_NET_HANDOVER_H
 
@@ -11,20 +12,20 @@
 struct handover {
     struct auth_identity identity;
     struct address peer;
-    struct connection_saved saved; /* its `bytes` are NULL in the packet */
-    bool is_owner;                 /* the worker, and the daemon, end with it */
-    uint32_t to_worker;            /* for the front: number of the worker that is to serve it */
-    bool is_open;                  /* its hello was answered, as follows: messages are next */
+    struct connection_saved saved; /* `bytes` is NULL in the packet */
+    bool is_owner;                 /* the worker, and the daemon, end with this client */
+    uint32_t to_worker;            /* for the front: number of the worker that should serve it */
+    bool is_open;                  /* its hello was answered with the values below: messages are next */
     bool can_h264, can_abandon;
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
 };
 
-/* Sends a connection, and whose it is; `message` was read of it already, and is to be read first (NULL: nothing
- * is). See connection_save(). It is the caller's still: connection_close() is next. False and *error: it has not
- * gone. */
+/* Sends a connection with its identity; `message` was read from it already, and is to be read first (NULL:
+ * none). See connection_save(). The caller still owns the connection and must close it next. False and *error:
+ * it was not sent. */
 bool handover_send(struct channel *channel, const struct connection *connection, const struct handover *handover,
                    const uint8_t *message, size_t message_bytes, struct error *error);
-/* Reads the packet; takes over the descriptor of the bytes. The caller frees handover->saved.bytes. */
+/* Reads the packet; owns the descriptor of the bytes. The caller frees handover->saved.bytes. */
 bool handover_take(struct handover *handover, const void *payload, size_t bytes, int bytes_fd,
                    struct error *error);
 

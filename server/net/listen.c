@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Unix and TCP listeners, and the sockets of accepted clients. */
 #include "net/listen.h"
 
 #include "base/host.h"
@@ -17,16 +18,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A client whose host answers nothing for two minutes is lost. */
+/* Probes of TCP: a client whose host is silent for two minutes is lost. */
 #define PROBE_AFTER_S 60
 #define PROBE_EVERY_S 15
 #define PROBES 4
-/* Unsent bytes that the kernel may hold: few, as a frame that motion overtakes cannot be taken back from there,
- * and enough to keep a local network busy. */
+/* Unsent bytes that the kernel may hold: few, as a frame that motion overtakes cannot be withdrawn from it, and
+ * enough to keep a local network busy. */
 #define UNSENT_BYTES (32 << 10)
-#define BACKLOG                                                                                                   \
-    SOMAXCONN /* the nodes of a farm connect at once; a non-blocking connect fails when it is full                \
-               */
+/* Nodes of a farm connect at once, and a non-blocking connect fails while the backlog is full. */
+#define BACKLOG SOMAXCONN
 
 static const struct sockaddr *raw(const struct address *address)
 {
@@ -48,7 +48,7 @@ static bool make_folder(const char *path, struct error *error)
     struct stat status;
     if (stat(folder, &status) == 0)
         return true;
-    /* Any other one is more likely misspelt than missing. */
+    /* Any other missing folder is more likely a misspelling. */
     if (!is_runtime_folder(folder)) {
         error_set(error, ERROR_INVALID, path, "the folder %s cannot be used: %s", folder, strerror(errno));
         return error_remedy(error, "correct the address, or make the folder");
@@ -59,7 +59,7 @@ static bool make_folder(const char *path, struct error *error)
     return error_remedy(error, "give --listen unix:/PATH, or set XDG_RUNTIME_DIR to a folder of yours");
 }
 
-/* A live daemon answers a connect; a refusal shows that the file is stale. */
+/* Removes a stale file: a live daemon answers a connect; a refusal shows that the file is stale. */
 static bool clear_path(const struct address *address, struct error *error)
 {
     const char *path = address_path(address);
@@ -112,7 +112,7 @@ static bool bind_and_listen(struct listener *listener, const struct address *add
         setsockopt(listener->fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
     if (address->storage.ss_family == AF_INET6)
         setsockopt(listener->fd, IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof(on));
-    /* Other users must never be able to connect, not even before the chmod: the mask applies at creation. */
+    /* The mask applies at creation, so that other users cannot connect even before the chmod. */
     mode_t mask = umask(0117);
     int result = sys.bind(listener->fd, raw(address), address->storage_bytes);
     int why = errno;
@@ -204,9 +204,9 @@ int listener_accept(const struct listener *listener, struct address *peer, bool 
     if (!address_is_unix(peer)) {
         int on = 1; /* answers are small and urgent; frames are large in any case */
         setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-        /* Bytes in the kernel can be neither withdrawn nor overtaken. */
+        /* The kernel gets few bytes, as they can be neither withdrawn nor overtaken. */
         setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &(int){UNSENT_BYTES}, sizeof(int));
-        /* A client that waits for frames may be silent for ever, and vanish without notice. */
+        /* Keep-alive finds a client that waits for frames, and may be silent for ever, after it has vanished. */
         setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof(on));
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &(int){PROBE_AFTER_S}, sizeof(int));
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &(int){PROBE_EVERY_S}, sizeof(int));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Listening sockets. */
+/* Sockets that accept clients. */
 #ifndef FARLIGHT_NET_LISTEN_H
 #define FARLIGHT_NET_LISTEN_H
 
@@ -10,13 +10,13 @@
 
 struct listener {
     int fd;                 /* non-blocking */
-    struct address address; /* with the port that the kernel chose, if it was 0 */
-    bool owns_path;         /* the socket file is ours to remove */
+    struct address address; /* includes the port that the kernel chose, if it was 0 */
+    bool owns_path;         /* close removes the socket file */
 };
 
-/* Unix: the file gets mode 0660; its folder must be there, except one of base/host.h, which is made with mode
- * 0750; a stale socket file is removed, a live daemon there is an error. TCP: loopback only, unless
- * `beyond_loopback` says that a key protects the address, or that none is wanted. */
+/* Opens a listener. Unix: the file gets mode 0660; its folder must exist, except one of base/host.h, which is
+ * made with mode 0750; a stale socket file is removed, a live daemon there is an error. TCP: loopback only,
+ * unless `beyond_loopback` says that a key protects the address, or that none is wanted. */
 bool listener_open(struct listener *listener, const struct address *address, bool beyond_loopback,
                    struct error *error);
 /* Adopts a listening socket of the service manager, whose file is left in place; `name` is for messages. On
@@ -25,12 +25,12 @@ bool listener_adopt(struct listener *listener, int fd, const char *name, bool be
                     struct error *error);
 void listener_close(struct listener *listener); /* removes the socket file */
 
-/* The next client, non-blocking; -1 if none waits. *peer: its address. *retry_later: the process is out of
- * descriptors, so the listener stays readable and accepts no client. */
+/* Accepts the next client, non-blocking; -1 if none waits. *peer: its address. *retry_later: the process is out
+ * of descriptors, so the listener stays readable and accepts no client. */
 int listener_accept(const struct listener *listener, struct address *peer, bool *retry_later);
 
-/* Takes a connected socket that another program has opened, as --fd names it: who is at its other end. It does not
- * block from then on, and programs that are started do not have it. */
+/* Adopts a connected socket that another program has opened (--fd), and finds its peer. It becomes non-blocking
+ * and close-on-exec. */
 bool listen_take_connected(int fd, struct address *peer, struct error *error);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Event loop over epoll, with timers and deferred calls. */
 #include "net/loop.h"
 
 #include "base/clock.h"
@@ -24,9 +25,9 @@ struct loop_watch {
 struct loop {
     int epoll_fd;
     bool stopped;
-    struct loop_timer *timers; /* unsorted: there is one a connection, and few connections */
+    struct loop_timer *timers; /* unsorted: there is one per connection, and few connections */
     struct loop_deferred *deferred;
-    struct loop_watch *removed; /* freed when no event of this turn can name them */
+    struct loop_watch *removed; /* freed once no event of this turn can refer to them */
 };
 
 struct loop *loop_create(struct error *error)
@@ -54,7 +55,8 @@ static void free_removed(struct loop *loop)
     }
 }
 
-/* Work that these calls defer belongs to the next turn, so that descriptors and timers are served in between. */
+/* Runs deferred calls. Work that these defer belongs to the next turn, so that descriptors and timers are
+ * served in between. */
 static void run_deferred(struct loop *loop)
 {
     struct loop_deferred *waiting = loop->deferred;
@@ -108,7 +110,7 @@ void loop_watch_change(struct loop_watch *watch, uint32_t epoll_events)
         return;
     watch->epoll_events = epoll_events;
     struct epoll_event event = {.events = epoll_events, .data.ptr = watch};
-    /* Cannot fail for a descriptor that was added and is open. */
+    /* The call cannot fail for a descriptor that was added and is open. */
     epoll_ctl(watch->loop->epoll_fd, EPOLL_CTL_MOD, watch->fd, &event);
 }
 
@@ -167,8 +169,8 @@ static struct loop_timer *first_due(const struct loop *loop)
     return first;
 }
 
-/* A call may start and stop any timer, so the list is searched again after each; a timer that a call starts is due
- * in the next turn at the earliest. */
+/* Runs timers. A call may start and stop any timer, so the list is searched again after each; a timer that a
+ * call starts is due in the next turn at the earliest. */
 static void run_timers(struct loop *loop)
 {
     uint64_t now_ns = clock_now_ns();
@@ -189,7 +191,7 @@ static int timeout_ms(const struct loop *loop)
     uint64_t now_ns = clock_now_ns();
     if (timer->due_ns <= now_ns)
         return 0;
-    uint64_t wait_ms = (timer->due_ns - now_ns + 999999) / 1000000; /* up: not a turn too early */
+    uint64_t wait_ms = (timer->due_ns - now_ns + 999999) / 1000000; /* rounded up: never a turn too early */
     return wait_ms > 60000 ? 60000 : (int)wait_ms;
 }
 
@@ -216,7 +218,7 @@ bool loop_run(struct loop *loop, struct error *error)
         if (!loop_turn(loop, error))
             return false;
     }
-    loop->stopped = false; /* it may be run again */
+    loop->stopped = false; /* allows another run */
     return true;
 }
 

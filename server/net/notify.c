@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Messages to the service manager. */
 #include "net/notify.h"
 
 #include "base/log.h"
@@ -26,7 +27,7 @@ void notify_manager(const char *state)
         return;
     memcpy(address.sun_path, path, bytes);
     if (path[0] == '@')
-        address.sun_path[0] = '\0'; /* an abstract name: no file, and no NUL at its end */
+        address.sun_path[0] = '\0'; /* abstract name: no file, and no NUL at its end */
     int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     socklen_t address_bytes = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + bytes);
     const struct timeval wait = {.tv_usec = WAIT_US};
@@ -40,7 +41,7 @@ void notify_manager(const char *state)
 uint64_t notify_watchdog_ns(void)
 {
     const char *usec = getenv("WATCHDOG_USEC"), *pid = getenv("WATCHDOG_PID");
-    /* Without $WATCHDOG_PID it is meant for any process. */
+    /* Without $WATCHDOG_PID the watchdog is meant for any process. */
     if (!usec || (pid && strtoull(pid, NULL, 10) != (unsigned long long)getpid()))
         return 0;
     unsigned long long interval_us = strtoull(usec, NULL, 10);

@@ -5,10 +5,10 @@
 
 #include <stdint.h>
 
-/* "READY=1", "STOPPING=1", "RELOADING=1", one assignment a line. Does nothing without $NOTIFY_SOCKET. */
+/* Sends "READY=1", "STOPPING=1", "RELOADING=1", one assignment per line. Does nothing without $NOTIFY_SOCKET. */
 void notify_manager(const char *state);
 
-/* The longest time between two "WATCHDOG=1" of this process that the service manager accepts, in ns; 0: no
+/* Maximum time between two "WATCHDOG=1" of this process that the service manager accepts, in ns; 0: no
  * watchdog. */
 uint64_t notify_watchdog_ns(void);
 

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* Queue of messages: their order, parts and removal. */
 #include "net/out_queue.h"
 
 #include <stdlib.h>
 
-/* Bytes that are queued for one system call; a control message waits behind at most these. */
+/* Maximum of bytes queued for one system call; a control message waits behind at most these. */
 #define LINED_UP_BYTES ((size_t)512 << 10)
 
 void out_chunk_ref(struct out_chunk *chunk)
@@ -115,7 +116,7 @@ static size_t add_part(struct iovec *part, const uint8_t *data, size_t bytes, si
         *skip_bytes -= bytes;
         return 0;
     }
-    /* sendmsg() does not write; iovec just has no const. */
+    /* The const is cast away for struct iovec; sendmsg() does not write. */
     *part = (struct iovec){.iov_base = (void *)(uintptr_t)(data + *skip_bytes), .iov_len = bytes - *skip_bytes};
     *skip_bytes = 0;
     return 1;
@@ -151,7 +152,7 @@ void out_queue_take(struct out_queue *queue, size_t bytes)
 
 void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns, uint64_t now_ns)
 {
-    /* Updates the queue before the calls, which may push or drop messages. */
+    /* The queue is updated before the calls, which may push or drop messages. */
     struct out_list complete;
     list_init(&complete);
     queue->queued_bytes -= bytes;
@@ -179,7 +180,7 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
 enum drop_kind {
     DROP_OF_ALL,
     DROP_OF_REQUEST,
-    DROP_UNBEGUN_OF_REQUEST, /* a begun message is kept */
+    DROP_UNBEGUN_OF_REQUEST, /* keeps a begun message */
 };
 
 struct drop {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The messages that wait to be sent on one connection. Bodies are shared chunks with a reference count and are
- * never copied or changed; each message keeps an offset instead. Control messages go before bulk ones; a message
- * that was begun is finished first. One thread, no system calls. */
+/* Queue of messages to be sent on a connection. Bodies are shared chunks with a reference count and are never
+ * copied or changed; each message keeps an offset instead. Control messages go before bulk ones, but a begun
+ * message is finished first. One thread, no system calls. */
 #ifndef FARLIGHT_NET_OUT_QUEUE_H
 #define FARLIGHT_NET_OUT_QUEUE_H
 
@@ -10,18 +10,18 @@
 #include <stdint.h>
 #include <sys/uio.h>
 
-/* Bytes that several messages refer to; embedded in what owns them. */
+/* Bytes that several messages refer to; embedded in their owner. */
 struct out_chunk {
     uint32_t references;
     const uint8_t *data;
     size_t size_bytes;
-    void (*release)(struct out_chunk *chunk); /* when the last reference is gone */
+    void (*release)(struct out_chunk *chunk); /* called after the last reference is gone */
 };
 void out_chunk_ref(struct out_chunk *chunk);
 void out_chunk_unref(struct out_chunk *chunk); /* accepts NULL */
 
-/* The last byte was handed to the kernel by `now_ns`; the call that took the first one began at `begun_ns`. Not
- * called for a message that is dropped. */
+/* Called when the kernel has accepted the last byte, at `now_ns`; the call that took the first one began at
+ * `begun_ns`. Not called for a message that is dropped. */
 typedef void out_sent_fn(void *context, uint64_t begun_ns, uint64_t now_ns);
 
 struct out_message {
@@ -32,8 +32,8 @@ struct out_message {
     struct out_chunk *body; /* may be NULL; the message holds a reference */
     size_t body_offset_bytes, body_bytes;
     size_t padding_bytes; /* zeros after the body, at most 7 */
-    size_t sent_bytes;    /* of head, body and padding together */
-    uint64_t begun_ns;    /* when the first of them was about to go; 0: not yet */
+    size_t sent_bytes;    /* sent so far of head, body and padding together */
+    uint64_t begun_ns;    /* beginning of the call for its first bytes; 0: not yet */
     size_t head_bytes;
     uint8_t head[];
 };
@@ -44,18 +44,18 @@ struct out_list {
 };
 
 struct out_queue {
-    struct out_list sending; /* in the order of sending; filled from the two below */
+    struct out_list sending; /* in the order of sending; filled from the two lists below */
     struct out_list control, bulk;
-    size_t queued_bytes;      /* not handed to the kernel yet, all lists */
-    size_t queued_bulk_bytes; /* of them in `bulk` */
-    size_t sending_bytes;     /* of them in `sending` */
-    size_t taken_bytes;       /* of those, from their start: copied, not yet with the kernel */
+    size_t queued_bytes;      /* in all lists, not yet accepted by the kernel */
+    size_t queued_bulk_bytes; /* those in `bulk` */
+    size_t sending_bytes;     /* those in `sending` */
+    size_t taken_bytes;       /* part of those, from their start: copied, not yet accepted by the kernel */
 };
 
 void out_queue_init(struct out_queue *queue);
 void out_queue_finish(struct out_queue *queue); /* drops everything */
 void out_queue_push(struct out_queue *queue, struct out_message *message, bool bulk);
-/* Gives the next bytes to send, in at most `parts_max` (at least 3) parts. Returns the number of parts, 0: none
+/* Gets the next bytes to send, in at most `parts_max` (at least 3) parts. Returns the number of parts; 0: none
  * wait. */
 size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t parts_max);
 /* Marks gathered bytes as copied: they are not gathered again, and their messages count as begun.
@@ -67,10 +67,10 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
 /* Drops the request's messages that were not begun, and the `sent` call of one that was. Control messages stay. */
 void out_queue_drop_bulk(struct out_queue *queue, uint32_t request);
 void out_queue_drop_all_bulk(struct out_queue *queue);
-/* As above, but only those whose body begins at `from_bytes` or behind, and a begun message keeps its `sent`.
- * Returns the number of dropped bytes. */
+/* Drops only messages whose body begins at or after `from_bytes`, and a begun message keeps its `sent`. Returns
+ * the number of dropped bytes. */
 size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request, size_t from_bytes);
-/* Where the body of the request's last begun message ends; 0: none of its messages here was begun. */
+/* End of the body of the request's last begun message; 0: none of its messages here was begun. */
 size_t out_queue_begun_end(const struct out_queue *queue, uint32_t request);
 
 #endif

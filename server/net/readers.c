@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* List of read-only users. */
 #include "net/readers.h"
 
 #include <errno.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Users of the Unix socket that may look at scenes and not change them. */
+/* Users of the Unix socket who may view scenes and not change them. */
 #ifndef FARLIGHT_NET_READERS_H
 #define FARLIGHT_NET_READERS_H
 
@@ -16,8 +16,8 @@ struct readers {
     size_t count;
 };
 
-/* Reads names and numbers, separated by blanks. False with ERROR_INVALID: one is unknown, or there are too many;
- * `field` is the error's field. */
+/* Parses names and numbers, separated by blanks. False with ERROR_INVALID: one is unknown, or there are too
+ * many; `field` is the error's field. */
 bool readers_parse(struct readers *readers, const char *text, const char *field, struct error *error);
 /* Reads a user's name or number; false: there is no such user. */
 bool readers_parse_user(const char *text, uint32_t *user);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Bytes of a connection through its sealed link. */
 #include "net/sealing.h"
 
 #include "net/connection.h"
@@ -6,15 +7,14 @@
 #include <string.h>
 #include <sys/uio.h>
 
-/* Smaller parts are copied into one record; larger ones are sealed in place.
- */
+/* Size below which parts are copied into one record; larger ones are sealed in place. */
 #define TOGETHER_BYTES ((size_t)16 << 10)
 #define PARTS_A_CALL 64
 /* Maximum of bytes that are sealed before they can be sent: sealed bytes can be neither withdrawn nor overtaken.
  */
 #define AHEAD_BYTES ((size_t)64 << 10)
 
-/* Copies from small parts, which shrink by the copied bytes, up to `maximum` bytes or the first large part. */
+/* Copies small parts, which shrink by the copied bytes, up to `maximum` bytes or the first large part. */
 static size_t put_together(uint8_t *to, size_t maximum, struct iovec **parts, const struct iovec *end)
 {
     size_t used_bytes = 0;
@@ -49,7 +49,7 @@ static size_t seal_parts(struct sealed_link *link, struct iovec *parts, const st
     return sealed_bytes;
 }
 
-/* Cuts the parts to at most that many bytes. Returns their number. */
+/* Cuts the parts to at most `max_bytes`. Returns their number. */
 static size_t cut_parts(struct iovec *parts, size_t count, size_t max_bytes)
 {
     size_t used = 0;
@@ -61,7 +61,7 @@ static size_t cut_parts(struct iovec *parts, size_t count, size_t max_bytes)
     return used;
 }
 
-/* Bytes that are sealed and not yet with the kernel. */
+/* Bytes that are sealed and not yet accepted by the kernel. */
 static size_t waiting_bytes(const struct sealed_link *link)
 {
     size_t bytes;
@@ -91,7 +91,7 @@ size_t sealing_gather(struct connection *connection, struct iovec *part)
         sealed_link_seal_last(link);
     size_t bytes;
     const uint8_t *waiting = sealed_link_waiting(link, &bytes);
-    /* sendmsg() does not write; iovec just has no const. */
+    /* The const is cast away for struct iovec; sendmsg() does not write. */
     *part = (struct iovec){.iov_base = (void *)(uintptr_t)waiting, .iov_len = bytes};
     return waiting != NULL;
 }

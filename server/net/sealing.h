@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The bytes of a sealed connection, through its link. */
+/* Sealing and opening of a connection's bytes, through its link. */
 #ifndef FARLIGHT_NET_SEALING_H
 #define FARLIGHT_NET_SEALING_H
 
@@ -9,7 +9,7 @@
 struct connection;
 struct iovec;
 
-/* Seals as many waiting bytes as fit, and gives the next bytes to send. Returns the number of parts: 1, or 0 for
+/* Seals as many waiting bytes as fit, and gets the next bytes to send. Returns the number of parts: 1, or 0 for
  * none. */
 size_t sealing_gather(struct connection *connection, struct iovec *part);
 /* Whether everything is sent, the final record included if one is due. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Checks of time limits, and pings. */
 #include "net/timeouts.h"
 
 #include "base/log.h"
@@ -12,11 +13,11 @@
 #define NS_PER_S UINT64_C(1000000000)
 /* Timeout for the delivery of a goodbye. */
 #define GOODBYE_NS (2 * NS_PER_S)
-/* A client that waits hears a ping after each third of the time after which it counts as lost. */
+/* Number of pings: a waiting client gets one after each third of the time after which it counts as lost. */
 #define PINGS 2u
-/* One that is not read from cannot be answered: it hears so often that the daemon is there. */
+/* Interval of pings to a client that is not read from, whose answers cannot arrive. */
 #define HELD_PING_NS NS_PER_S
-/* Shortest interval between two checks; the longest is a minute. */
+/* Minimum interval between two checks; the maximum is a minute. */
 #define CHECK_MIN_NS (10 * NS_PER_MS)
 #define CHECK_MAX_NS (60 * NS_PER_S)
 
@@ -48,7 +49,7 @@ static uint64_t later(uint64_t a_ns, uint64_t b_ns)
     return a_ns > b_ns ? a_ns : b_ns;
 }
 
-/* UINT64_MAX: never. */
+/* Interval of pings; UINT64_MAX: never. */
 static uint64_t ping_interval_ns(const struct connection *connection)
 {
     if (connection->held)
@@ -64,15 +65,15 @@ static void send_ping(struct connection *connection, uint64_t now_ns)
     connection_send(connection, 0, 0, &message);
 }
 
-/* Pings a client that waits for something, or finds that it has answered none. Pings are counted, not time: when
- * this process was stopped, what the client said meanwhile is read before the next one is due. */
+/* Pings a client that waits for something, or ends it if it has answered none. Pings are counted, not time:
+ * after a pause of this process, messages that the client sent meanwhile are read before the next ping is due. */
 static void check_answers(struct connection *connection, uint64_t now_ns)
 {
-    uint64_t last_ns = later(connection->last_received_ns, connection->looked_ns);
+    uint64_t last_ns = later(connection->last_received_ns, connection->checked_ns);
     char text[128];
     if (since(last_ns, now_ns) < ping_interval_ns(connection))
         return;
-    connection->looked_ns = now_ns;
+    connection->checked_ns = now_ns;
     if (connection->held || connection->over_soft_since_ns) {
         connection->unanswered = 0;
         if (!connection->out.queued_bytes)
@@ -145,7 +146,7 @@ void timeouts_check(struct connection *connection, uint64_t now_ns)
         if (since(connection->closing_since_ns, now_ns) >= GOODBYE_NS)
             connection_close(connection);
         return;
-    case CONNECTION_ROUTED: /* whoever routes it knows how long that may take */
+    case CONNECTION_ROUTED: /* the router limits the time */
     case CONNECTION_CLOSED:
         return;
     }
@@ -185,7 +186,7 @@ uint64_t timeouts_next_check_ns(const struct connection *connection, uint64_t no
             no_later(&wait_ns, last_ns, idle_ns, now_ns);
         else if (idle_ns)
             no_later(&wait_ns, now_ns, NS_PER_S, now_ns);
-        no_later(&wait_ns, later(connection->last_received_ns, connection->looked_ns),
+        no_later(&wait_ns, later(connection->last_received_ns, connection->checked_ns),
                  ping_interval_ns(connection), now_ns);
     }
     return wait_ns < CHECK_MIN_NS ? CHECK_MIN_NS : wait_ns;

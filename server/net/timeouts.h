@@ -9,7 +9,7 @@ struct connection;
 
 /* Ends the connection if its client has passed a limit. */
 void timeouts_check(struct connection *connection, uint64_t now_ns);
-/* The time until the next check, in nanoseconds. */
+/* Time until the next check, in nanoseconds. */
 uint64_t timeouts_next_check_ns(const struct connection *connection, uint64_t now_ns);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Files of a private folder: complete writes, verified reads, and a lock. */
 #include "store/files.h"
 
 #include "base/file_io.h"
@@ -14,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Between two looks at whether the work was abandoned. */
+/* Bytes between two checks whether the work was abandoned. */
 #define CHUNK_BYTES ((size_t)4 << 20)
 
 static bool is_own_alone(int folder, const char *path, struct error *error)
@@ -92,7 +93,7 @@ bool store_file_size(int folder, const char *name, uint64_t *size_bytes)
 
 bool store_file_read(int folder, const char *name, void *data, size_t size_bytes, struct error *error)
 {
-    /* Nobody waits for a pipe that was put there. */
+    /* O_NONBLOCK: opening a pipe of that name must not wait. */
     int fd = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0)
         return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The folder of a daemon: a store of each owner, named by 16 digits. */
+/* Folder of a daemon: a store for each owner, named by 16 digits. */
 #include "store/store.h"
 
 #include "store/files.h"
@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #define DIGITS 16
-#define TRIES 40 /* for a folder whose former process ends, .. */
+#define TRIES 40 /* for a folder whose former process is ending, .. */
 #define TRY_US 50000
 
 struct store_folder {
@@ -46,7 +46,7 @@ void store_release(struct store_folder *folder)
     free(folder);
 }
 
-/* ---- who has something ---- */
+/* ---- owners with records ---- */
 
 struct listing {
     int fd;
@@ -88,7 +88,7 @@ size_t store_owners(const struct store_folder *folder, uint64_t *owners, size_t 
     return store_folder_each(folder->fd, list_owner, &listing, NULL) ? listing.count : 0;
 }
 
-/* ---- one of them ---- */
+/* ---- single owners ---- */
 
 bool store_owner_path(char path[PATH_MAX], const char *folder, uint64_t owner, struct error *error)
 {

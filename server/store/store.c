@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Records and blobs in memory and on the disk, with eviction. */
 #include "store/store.h"
 
 #include "base/hashmap.h"
@@ -18,7 +19,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-/* A record's file: the magic, the hash of the rest, the head, a row for each blob, the content. */
+/* File of a record: the magic, the hash of the rest, the head, a row for each blob, the content. */
 #define MAGIC "farlight scene 1"
 #define MAGIC_BYTES (sizeof(MAGIC) - 1)
 #define SEAL_BYTES (MAGIC_BYTES + BLOB_HASH_BYTES)
@@ -29,22 +30,22 @@
 #define RECORD_TEXT_BYTES (2 * STORE_NAME_BYTES + 1)
 #define BLOB_TEXT_BYTES (2 * BLOB_HASH_BYTES + 1)
 
-/* A blob on the disk, or one that is about to be. */
+/* A blob on the disk, or one about to be written. */
 struct held {
     struct hashmap_link same_key;
     uint8_t hash[BLOB_HASH_BYTES];
     uint64_t size_bytes;
-    size_t uses; /* by records */
+    size_t uses; /* number of records that use it */
     bool is_there;
-    uint64_t counted_by; /* the last entry that counted it: each does so once */
+    uint64_t counted_by; /* last entry that counted it: each does so once */
 };
 
 struct entry {
     uint8_t name[STORE_NAME_BYTES];
-    uint64_t owner, number; /* ascending with each that is written */
-    uint64_t count_id;      /* unlike that of any other in this process */
+    uint64_t owner, number; /* ascending in the order of writing */
+    uint64_t count_id;      /* unique in this process */
     uint64_t file_bytes, content_bytes;
-    uint64_t blob_bytes; /* also of those that other entries have, too */
+    uint64_t blob_bytes; /* includes blobs that other entries also use */
     struct held **blobs; /* owned array, each once */
     size_t blob_count;
 };
@@ -81,7 +82,7 @@ static void print_hash(const uint8_t hash[BLOB_HASH_BYTES], char text[BLOB_TEXT_
     sodium_bin2hex(text, BLOB_TEXT_BYTES, hash, BLOB_HASH_BYTES);
 }
 
-/* Exactly that many bytes, as they are printed. */
+/* Parses exactly `count` bytes in their printed form. */
 static bool parse_hex(const char *text, uint8_t *bytes, size_t count)
 {
     char printed[BLOB_TEXT_BYTES];
@@ -107,7 +108,7 @@ static struct held *find_held(const struct store *store, const uint8_t hash[BLOB
     return held;
 }
 
-/* NULL: no memory. */
+/* Finds or adds a blob. NULL: no memory. */
 static struct held *need_held(struct store *store, const uint8_t hash[BLOB_HASH_BYTES], uint64_t size_bytes)
 {
     struct held *held = find_held(store, hash);
@@ -140,7 +141,7 @@ static void release_held(struct store *store, struct held *held)
 
 /* ---- entries ----------------------------------------------------------------------------------------- */
 
-/* Not in the list; its blobs end with it where no other entry uses them. Accepts NULL. */
+/* Frees an entry that is not in the list; blobs that no other entry uses are removed. Accepts NULL. */
 static void entry_free(struct store *store, struct entry *entry)
 {
     for (size_t i = 0; entry && i < entry->blob_count; i++)
@@ -150,7 +151,7 @@ static void entry_free(struct store *store, struct entry *entry)
     free(entry);
 }
 
-/* False: no memory, or the same hash has another size. */
+/* Adds a blob to an entry. False: no memory, or the same hash has another size. */
 static bool add_blob(struct store *store, struct entry *entry, const uint8_t hash[BLOB_HASH_BYTES],
                      uint64_t size_bytes)
 {
@@ -189,7 +190,7 @@ static size_t find_entry(const struct store *store, const uint8_t name[STORE_NAM
     return place;
 }
 
-/* False: no memory. */
+/* Inserts an entry into the list. False: no memory. */
 static bool insert_entry(struct store *store, struct entry *entry)
 {
     if (store->entry_count == store->entry_capacity) {
@@ -240,8 +241,8 @@ static uint64_t bytes_of_owner(const struct store *store, uint64_t owner)
     return bytes;
 }
 
-/* The record that gives way: the first written of the owner who has most. There is one. */
-static size_t first_to_give_way(const struct store *store)
+/* The record to be evicted: the oldest one of the owner with the most bytes. There is one. */
+static size_t record_to_evict(const struct store *store)
 {
     size_t first = 0;
     uint64_t most_bytes = 0;
@@ -266,7 +267,7 @@ static bool is_what_was_written(const uint8_t *bytes, size_t size_bytes)
     return memcmp(hash, bytes + MAGIC_BYTES, BLOB_HASH_BYTES) == 0;
 }
 
-/* What the whole file says; *entry is not in the list. False: it is not what was written. */
+/* Parses a whole file; *entry is not in the list. False: it is not what was written. */
 static bool parse_record(struct store *store, const uint8_t name[STORE_NAME_BYTES], const uint8_t *bytes,
                          size_t size_bytes, struct entry **entry)
 {
@@ -295,7 +296,7 @@ static bool parse_record(struct store *store, const uint8_t name[STORE_NAME_BYTE
     return true;
 }
 
-/* All of a file that is no greater than the limit; NULL and *error: it cannot be read. */
+/* Reads a file no larger than the limit; NULL and *error: it cannot be read. */
 static uint8_t *read_whole(const struct store *store, const char *name, uint64_t *size_bytes, struct error *error)
 {
     uint8_t *bytes = NULL;
@@ -392,7 +393,7 @@ struct store *store_open(const char *folder, uint64_t limit_bytes, struct error 
     }
     drop_incomplete(store);
     while (store->bytes > store->limit_bytes && store->entry_count)
-        remove_entry(store, first_to_give_way(store));
+        remove_entry(store, record_to_evict(store));
     return store;
 }
 
@@ -448,7 +449,7 @@ static struct entry *entry_of(struct store *store, const struct store_record *re
 }
 
 /* Evicts until the entry fits; its predecessor goes first. False: it never does. */
-static bool make_room(struct store *store, const struct entry *entry, struct error *error)
+static bool evict_for(struct store *store, const struct entry *entry, struct error *error)
 {
     uint64_t all_bytes = entry->file_bytes + entry->blob_bytes, new_bytes = entry->file_bytes;
     for (size_t i = 0; i < entry->blob_count; i++)
@@ -462,7 +463,7 @@ static bool make_room(struct store *store, const struct entry *entry, struct err
         return error_remedy(error, "raise scenes.store_bytes in the daemon's configuration");
     }
     while (store->bytes + new_bytes > store->limit_bytes && store->entry_count)
-        remove_entry(store, first_to_give_way(store));
+        remove_entry(store, record_to_evict(store));
     return true;
 }
 
@@ -517,7 +518,7 @@ static bool put(struct store *store, const struct store_record *record, const at
     struct entry *entry = entry_of(store, record);
     if (!entry)
         return error_set(error, ERROR_OUT_OF_MEMORY, "", "no memory");
-    bool written = make_room(store, entry, error) && write_blobs(store, record, abandoned, error) &&
+    bool written = evict_for(store, entry, error) && write_blobs(store, record, abandoned, error) &&
                    write_record(store, entry, record, abandoned, error);
     size_t before = find_entry(store, entry->name);
     if (written && before < store->entry_count)
