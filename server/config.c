@@ -26,7 +26,7 @@
 
 enum option_type { OPTION_TEXT, OPTION_BOOL, OPTION_LEVEL, OPTION_U32, OPTION_BYTES, OPTION_MEBIBYTES };
 
-/* When a value is taken: at the start, or again when the daemon is told to read its configuration. */
+/* Time at which a value is read: at the start, or also when the daemon reads its configuration again. */
 enum option_time { START, ANYTIME };
 
 struct option {
@@ -189,7 +189,7 @@ static bool parse_bool(const char *text, bool *value)
     return *value || strcmp(text, "no") == 0 || strcmp(text, "false") == 0 || strcmp(text, "0") == 0;
 }
 
-/* "16M", "25%" (of the memory that this process may have, for bytes), "1024" */
+/* Parses "16M", "25%" (of the memory available to this process, for bytes), "1024". */
 static bool parse_number(const char *text, bool bytes, uint64_t *value)
 {
     if (!isdigit((unsigned char)text[0]))
@@ -235,7 +235,7 @@ static bool set_number(struct config *config, const struct option *option, const
                          number, option->min, option->max, option->unit);
     if (option->type == OPTION_BYTES)
         *(uint64_t *)slot(config, option) = number;
-    else if (option->type == OPTION_MEBIBYTES) /* less than one is a limit still */
+    else if (option->type == OPTION_MEBIBYTES) /* less than one is a limit too */
         *(uint32_t *)slot(config, option) = number > 0 && number < MIB ? 1 : (uint32_t)(number / MIB);
     else
         *(uint32_t *)slot(config, option) = (uint32_t)number;
@@ -275,7 +275,7 @@ static const struct option *find(const char *section, size_t section_bytes, cons
     return NULL;
 }
 
-/* A user who may not write to the system's folder has a socket of their own. */
+/* Gives users without access to the system's folder a socket of their own. */
 static void use_user_socket(struct config *config)
 {
     char folder[CONFIG_TEXT_BYTES], listen[CONFIG_TEXT_BYTES];
@@ -343,7 +343,7 @@ void config_keep_start(struct config *next, const struct config *config)
 
 struct reader {
     struct config *config;
-    struct error error; /* the first; its line is what ini_parse_file() returns */
+    struct error error; /* the first one; ini_parse_file() returns its line */
 };
 
 static int on_value(void *user, const char *section, const char *key, const char *value)
@@ -433,7 +433,7 @@ void config_hub(const struct config *config, struct hub_options *hub)
     hub->limits.frames_in_flight = ENGINE_FRAMES_IN_FLIGHT;
 }
 
-/* At least 1. */
+/* Clients of a single owner, at least 1. */
 static uint32_t clients_of_one(const struct session_limits *limits)
 {
     const uint64_t share = (uint64_t)limits->clients * limits->share_percent / 100;
@@ -485,7 +485,7 @@ static void print_value(const struct config *config, const struct option *option
     }
 }
 
-/* The lines stay short, as who reads a file takes no lines of any length. */
+/* Prints a comment in short lines, as readers of the file limit their length. */
 static void print_comment(const char *text, FILE *stream)
 {
     size_t column = 0;
@@ -520,7 +520,7 @@ bool config_dump(const struct config *config, FILE *stream)
         if (i == 0 || strcmp(option->section, options[i - 1].section) != 0)
             fprintf(stream, "\n[%s]\n", option->section);
         print_doc(option, stream);
-        /* A default is written as in the table, since some depend on the host. */
+        /* A default is printed as in the table, since some depend on the host. */
         if (is_same(config, &defaults, option)) {
             fprintf(stream, "#%s = %s\n", option->key, option->default_text);
             continue;

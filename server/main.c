@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* farlightd: options, and what the process is to be: the front that people start, a worker of it, or a daemon of
+/* farlightd: its options, and the role of the process: the front that people start, a worker of it, or a daemon of
  * one client. Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one
- * client is gone; 1 when it cannot start or go on; 2 for wrong usage; 75 when the GPU of a daemon of one client is
- * lost for good, which may be different in a new process. With --check-device: 0 when all holds, 1 when something
- * does not, 75 when the GPU was lost on the way. */
+ * client is gone; 1 when it cannot start or continue; 2 for wrong usage; 75 when the GPU of a daemon of one client
+ * is lost for good, which may be different in a new process. With --check-device: 0 when all checks pass, 1 when
+ * one fails, 75 when the GPU was lost on the way. */
 #include "base/allocator.h"
 #include "base/clock.h"
 #include "base/log.h"
@@ -33,14 +33,15 @@
 #include <sys/prctl.h>
 #include <sysexits.h>
 
-/* A worker without a client ends so long after the last scene that may have lingered. */
+/* Seconds after which a worker without a client, and without lingering scenes, ends. */
 #define WORKER_UNUSED_S 60u
-/* Workers that restore scenes at the start, at most: scenes of further owners come back when these do. */
+/* Maximum of workers that restore scenes at the start: those of further owners are restored when the owners
+ * return. */
 #define OWNERS_MAX 64
-/* Each worker numbers its clients from another multiple of this on. */
+/* Range of client numbers of each worker. */
 #define WORKER_CLIENTS UINT64_C(1000000)
 
-/* glibc looks for it by name, which -fvisibility=hidden would hide. */
+/* Version for argp, which glibc finds by name; -fvisibility=hidden would hide it. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlightd " FARLIGHT_VERSION;
 
 enum {
@@ -84,9 +85,9 @@ static const struct argp_option option_table[] = {
 };
 
 struct arguments {
-    char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
+    char listen[CONFIG_TEXT_BYTES]; /* addresses, each followed by a blank */
     const char *config_file, *device, *log_level, *insecure, *trace_file, *key_file, *reader_key_file;
-    char *worker; /* its number; NULL: it is none */
+    char *worker; /* its number; NULL: no worker */
     int fd;
     bool dump_config, check_device, json;
 };
@@ -197,19 +198,19 @@ static int check(const struct config *config, bool json)
 
 /* ---- a process that serves --------------------------------------------------------------------------- */
 
-/* The front tells a worker this first of all, and when the configuration was read again. */
+/* First packet from the front to a worker, also sent after the configuration was read again. */
 struct worker_setup {
-    struct config config;         /* without files of keys, which are the front's alone */
-    struct auth_key_numbers keys; /* that clients may have come with */
-    uint64_t started_ns;          /* when the front was */
-    uint64_t watchdog_ns;         /* without progress, after which a device hangs; 0: never */
+    struct config config;         /* without key files, which are the front's alone */
+    struct auth_key_numbers keys; /* keys with which clients may have come */
+    uint64_t started_ns;          /* start of the front */
+    uint64_t watchdog_ns;         /* time without progress after which a device counts as hanging; 0: never */
 };
 
 struct serving {
     struct worker_setup setup;
     struct channel_start start;
-    uint32_t number; /* of the worker; 0: it is none */
-    char *title;     /* what a list of processes shows behind --worker; NULL: it is no worker */
+    uint32_t number; /* number of the worker; 0: no worker */
+    char *title;     /* text that lists of processes show after --worker; NULL: no worker */
     struct daemon daemon;
     struct store *store; /* NULL: scenes end with the process */
     struct timeline *timeline;
@@ -222,7 +223,7 @@ static void fill_hub(const struct worker_setup *setup, struct hub_options *optio
     options->keys = setup->keys;
 }
 
-/* Nothing lingers any more by then. */
+/* Seconds until a worker without a client ends; nothing lingers any more by then. */
 static uint32_t unused_s(const struct config *config)
 {
     return config->scene_linger_s + WORKER_UNUSED_S;
@@ -243,7 +244,7 @@ static void configured(void *context, const void *bytes, size_t count)
     log_set_level((enum log_level)serving->setup.config.log_level);
 }
 
-/* Restores scenes that were kept for the owner, before its first client comes. */
+/* Restores scenes kept for the owner, before its first client is served. */
 static void owned(void *context, const struct channel_owner *owner)
 {
     struct serving *serving = context;
@@ -260,7 +261,7 @@ static void owned(void *context, const struct channel_owner *owner)
         log_write(LOG_ERROR, "store", "no scene is kept: %s: %s", error.field, error.text);
 }
 
-/* `fd`: of the one client, or of the front. */
+/* Serves; `fd` is the socket of the only client, or of the front. */
 static bool serve_with_engine(struct serving *serving, struct engine *engine, int fd, bool is_worker,
                               struct error *error)
 {
@@ -290,7 +291,8 @@ static bool serve_with_engine(struct serving *serving, struct engine *engine, in
 
 #define TRACE_PATH_BYTES (CONFIG_TEXT_BYTES + 16)
 
-/* Each worker writes a file of its own; the first, and a daemon of one client, that of the configuration. */
+/* Path of a worker's trace: each writes a file of its own; the first one, and a daemon of one client, use the
+ * configured path. */
 static void trace_path(char path[TRACE_PATH_BYTES], const struct serving *serving)
 {
     const int bytes = snprintf(path, TRACE_PATH_BYTES, "%s", serving->setup.config.trace_file);
@@ -298,7 +300,7 @@ static void trace_path(char path[TRACE_PATH_BYTES], const struct serving *servin
         snprintf(path + bytes, TRACE_PATH_BYTES - (size_t)bytes, ".%" PRIu32, serving->number);
 }
 
-/* The sandbox is entered before the first thread starts. */
+/* Enters the sandbox, before the first thread starts. */
 static bool begin_confined(struct serving *serving, bool is_worker, struct error *error)
 {
     const struct config *config = &serving->setup.config;
@@ -322,7 +324,7 @@ static bool serve(struct serving *serving, int fd, bool is_worker, struct error 
         return false;
     _Static_assert(CHANNEL_DEVICES == GPU_DEVICES_MAX, "the front counts as many devices as EGL may have");
     memcpy(engine_options.gpu.used_by, serving->start.workers_at, sizeof(engine_options.gpu.used_by));
-    /* Scenes of a process that serves one client alone end with that client. */
+    /* A process that serves a single client drops its scenes with that client. */
     const struct engine_keeper keeper = keeper_port(&serving->store);
     if (is_worker && config->store[0])
         engine_options.keeper = &keeper;
@@ -347,7 +349,7 @@ static int serve_to_the_end(struct serving *serving, int fd, bool is_worker)
     return is_worker ? EXIT_FAILURE : fail(&error);
 }
 
-/* Where memory is short, it is a worker that ends: its clients come again. */
+/* Makes a worker the first to be killed when memory is short: its clients reconnect. */
 static void offer_to_end_first(void)
 {
     FILE *file = fopen("/proc/self/oom_score_adj", "we");
@@ -357,12 +359,12 @@ static void offer_to_end_first(void)
     fclose(file);
 }
 
-/* `title`: the argument of --worker, its number and many blanks. */
+/* Runs as a worker. `title`: the argument of --worker, its number and many blanks. */
 static int serve_as_worker(char *title)
 {
     const int fd = CHANNEL_WORKER_FD;
     struct serving *serving = calloc(1, sizeof(*serving));
-    prctl(PR_SET_PDEATHSIG, SIGKILL); /* the front's end is its own */
+    prctl(PR_SET_PDEATHSIG, SIGKILL); /* the worker ends with the front */
     offer_to_end_first();
     bool ok = serving && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
               channel_wait(fd, CHANNEL_START, &serving->start, sizeof(serving->start)) &&
@@ -391,7 +393,7 @@ static int serve_one_client(const struct config *config, int fd)
 
 /* ---- the front --------------------------------------------------------------------------------------- */
 
-/* How the configuration came about, to be read again. */
+/* Source of the configuration, for reading it again. */
 struct source {
     const struct arguments *arguments;
     struct config *config;
@@ -400,8 +402,8 @@ struct source {
     struct store_folder *folder; /* NULL: scenes end with the daemon */
 };
 
-/* False: something in the configuration cannot be understood. The caller has a reference to options->keys in any
- * case. */
+/* Fills the front's options. False: the configuration is invalid. The caller has a reference to options->keys
+ * in any case. */
 static bool fill_front(struct source *source, const struct config *config, struct front_options *options,
                        struct error *error)
 {
@@ -416,7 +418,7 @@ static bool fill_front(struct source *source, const struct config *config, struc
     return true;
 }
 
-/* All of it or, where something is wrong, nothing. */
+/* Reads the configuration again, and applies either all of it or nothing. */
 static void reload(void *context)
 {
     struct source *source = context;
@@ -437,7 +439,7 @@ static void reload(void *context)
     log_set_level((enum log_level)source->config->log_level);
 }
 
-/* Whoever starts us with sockets knows where they are to be. */
+/* Begins to listen; sockets from a service manager replace the configured addresses. */
 static bool begin_to_listen(struct front *front, const struct config *config, bool beyond_loopback,
                             struct error *error)
 {

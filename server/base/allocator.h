@@ -3,8 +3,8 @@
 #ifndef FARLIGHT_BASE_ALLOCATOR_H
 #define FARLIGHT_BASE_ALLOCATOR_H
 
-/* Starts a thread that returns unused pages to the kernel, also while the process does nothing. Nothing happens
- * where the sanitizers are linked in place of jemalloc. */
+/* Starts a thread that returns unused pages to the kernel, even while the process is idle. Does nothing if the
+ * sanitizers are linked instead of jemalloc. */
 void allocator_start_thread(void);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sandbox of a process that serves: Landlock and seccomp. */
+/* Sandbox of a process that serves clients: Landlock and seccomp. */
 #include "base/confinement.h"
 
 #include <dirent.h>
@@ -18,7 +18,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-/* Not in the headers of every supported distribution. */
+/* Headers of some supported distributions lack this. */
 #ifndef LANDLOCK_ACCESS_FS_TRUNCATE
 #define LANDLOCK_ACCESS_FS_TRUNCATE (1ULL << 14)
 #endif
@@ -29,7 +29,7 @@
 #define SCOPES (3ULL)     /* LANDLOCK_SCOPE_ABSTRACT_UNIX_SOCKET and _SIGNAL, ABI 6 */
 #define PATHS_MAX 128
 
-/* The leak sanitizer stops threads by ptrace(). */
+/* The leak sanitizer needs ptrace(), by which it stops threads. */
 #if defined(__SANITIZE_ADDRESS__)
 #define SANITIZED 1
 #elif defined(__has_feature)
@@ -41,7 +41,7 @@
 #define SANITIZED 0
 #endif
 
-/* struct landlock_ruleset_attr as of ABI 6; an older kernel takes its first members. */
+/* struct landlock_ruleset_attr in ABI 6; an older kernel reads its first members. */
 struct ruleset_attributes {
     uint64_t handled_access_fs, handled_access_net, scoped;
 };
@@ -53,7 +53,7 @@ struct confinement {
         enum confined_access access;
     } paths[PATHS_MAX];
     size_t count;
-    bool is_incomplete; /* a path was one too many */
+    bool is_incomplete; /* there was no room for a path */
 };
 
 struct confinement *confinement_create(void)
@@ -88,8 +88,8 @@ void confinement_destroy(struct confinement *confinement)
 
 /* ---- Landlock ---------------------------------------------------------------------------------------- */
 
-/* Landlock binds the thread that enters it and those that it starts. A thread that is not bound shares the memory,
- * and so does what a bound one wants. */
+/* Whether the calling thread is the only one. Landlock binds the thread that enters it and those that it
+ * starts; an unbound thread shares the memory, and could be made to act for a bound one. */
 static bool is_alone(struct error *error)
 {
     DIR *tasks = opendir("/proc/self/task");
@@ -171,14 +171,14 @@ static bool enter_landlock(const struct confinement *confinement, bool *has_file
 
 /* ---- seccomp ----------------------------------------------------------------------------------------- */
 
-/* Drivers make calls that nobody lists, so all are allowed but these. */
+/* Denied calls; all others are allowed, as drivers make calls that nobody lists. */
 static const char *const denied[] = {
-    /* the network, also by sockets that clients are connected to */
+    /* network, including sockets that clients are connected to */
     "connect", "bind", "listen", "accept", "accept4", "io_uring_setup",
     /* other programs and processes */
     "execve", "execveat", "process_vm_readv", "process_vm_writev", "process_madvise", "pidfd_getfd",
     "pidfd_send_signal", "kcmp", "tkill", "rt_sigqueueinfo",
-    /* the system */
+    /* system */
     "bpf", "perf_event_open", "userfaultfd", "keyctl", "add_key", "request_key", "mount", "umount2", "pivot_root",
     "chroot", "setns", "unshare", "open_by_handle_at", "init_module", "finit_module", "delete_module",
     "kexec_load", "kexec_file_load", "reboot", "swapon", "swapoff", "acct", "quotactl", "settimeofday",
@@ -188,12 +188,13 @@ static const char *const denied[] = {
 static bool deny(scmp_filter_ctx filter, const char *name, unsigned count, const struct scmp_arg_cmp *argument)
 {
     const int number = seccomp_syscall_resolve_name(name);
-    /* Not every architecture and version of libseccomp knows every name. */
+    /* Some architectures and versions of libseccomp lack a name. */
     return number == __NR_SCMP_ERROR || number < 0 ||
            seccomp_rule_add_array(filter, SCMP_ACT_ERRNO(EPERM), number, count, argument) == 0;
 }
 
-/* Sockets of drivers' services are made, though nothing can connect them, and the kernel tells of devices. */
+/* Denies sockets, except Unix ones, which drivers make for their services though they cannot connect, and netlink,
+ * by which the kernel reports devices. */
 static bool deny_sockets(scmp_filter_ctx filter)
 {
     for (uint64_t family = AF_UNIX + 1; family <= AF_NETLINK; family++) {
@@ -205,7 +206,7 @@ static bool deny_sockets(scmp_filter_ctx filter)
     return deny(filter, "socket", 1, &is_beyond);
 }
 
-/* abort() signals its own thread by tgkill(). */
+/* Denies signals to other processes; abort() signals its own thread by tgkill(). */
 static bool deny_signals(scmp_filter_ctx filter)
 {
     static const char *const calls[] = {"kill", "tgkill", "rt_tgsigqueueinfo"};

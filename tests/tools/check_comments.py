@@ -43,7 +43,7 @@ AT_MOST = {
     "protocol/docs": (43, 0),
     "protocol/pixels": (25, 0),
     "protocol/sealed": (14, 2),
-    "server": (13, 0),
+    "server": (4, 0),
     "server/base": (4, 0),
     "server/check": (4, 0),
     "server/encode": (4, 0),
