@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Runs the checks in order, and those that need no frame. */
+/* The device check: all checks in order; those that need no frame are here. */
 #include "check/check.h"
 
 #include "base/host.h"

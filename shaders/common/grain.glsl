@@ -20,8 +20,8 @@ vec2 facet_alpha(surface s, float roughness)
 #endif
 }
 
-// Roughness for polynomials that know only one, and the share that these surely overlook as lost. Fitted so that a white
-// metal, of any roughness and grain, keeps 0.974 to 1.000 of the light from all around, and at no angle more than 1.005.
+// Roughness for polynomials that know only one, and a factor on the loss that they give. Fitted so that a white metal, of
+// any roughness and grain, keeps 0.974 to 1.000 of the light from all around, and at no angle more than 1.005.
 vec2 facet_alpha_mean(vec2 alpha)
 {
 #ifdef HAS_ANISOTROPY

@@ -76,16 +76,15 @@ SHARED_SIZE(quadtree_counts, 32)
 #define QUADTREE_OUTSIDE 8u
 #define QUADTREE_OUTCOMES 12
 
-/* Distance in texels from its origin within which a ray may pass the extension of a plane beside the surface
- * that it began on; and width of a gap that it may pass between two planes: half a texel, and half its
- * diagonal. */
+/* Distance in texels within which a ray may pass the extension of a plane beside the surface that it began on,
+ * and within which a ray behind a plane may come before the next one again: half a texel, and its diagonal's. */
 #define QUADTREE_OWN_WAY 1.5f
 /* Texels: primitives narrower than this may lie between the middles of texels, and be missed. */
 #define QUADTREE_FINE 2.0f
 #define QUADTREE_DEEP 0.05f /* share of w behind a plane from which a ray is behind the surface */
 
-/* Maximum distance, in bounds of w, between a plane and another one's extension through a texel. The maximum
- * factor by which a place beyond the farthest surface, by that bound, may be farther. */
+/* Maximum distance, in bounds of w, between a plane and another one's extension through a texel; and the maximum
+ * factor by which this may increase the distance of the farthest surface. */
 #define QUADTREE_PLANES_APART 2.0f
 #define QUADTREE_FARTHER_MAX 16.0f
 /* Share of its way through the view at which a ray that was before nothing counts as ended. */

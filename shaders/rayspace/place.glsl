@@ -14,7 +14,7 @@ uint ray_of_place(uint place)
     return control.sorted != 0u ? texelFetch(order, int(place)).x : place;
 }
 
-// Maximum coordinate of a reversed ray's origin: from farther away, the direction would be lost to rounding.
+// Maximum length of a reversed ray: rounding at a point farther away would lose the direction.
 const float TURNED_MAX = 1e18;
 
 // Ray at a place. A reversed ray begins at its end, which it shares with others (section 3.5.1).

@@ -68,7 +68,7 @@ vec2 range_of_parts(vec3 mean, uint slot, float count)
 }
 
 // Light of a pixel without specks, which are replaced by the mean around it. `filtered`: the part that the filter has
-// passed. A pixel is believed if a part is half as far off as the whole, as parts differ by as much.
+// kept. A part that is half as far off as the whole confirms it, as parts differ by that much anyway.
 vec3 without_specks(vec3 own, vec3 filtered, vec2 parts, surroundings around)
 {
     float own_luminance = luminance(own);

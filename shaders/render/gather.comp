@@ -118,7 +118,7 @@ void main()
         return;
     vec4 sum = slice_sums[slot];
     bool more = true;
-    while (more) { // a batch that is not the last has one path of it
+    while (more) { // over the sample's paths; a batch that is not the last has one
         uint j = hit_places[k];
         vec4 arrived = vec4(0.0);
         if (j != HIT_PLACE_NONE)

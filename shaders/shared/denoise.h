@@ -47,7 +47,7 @@
 /* Weight, among the surroundings, of pixels that see another surface: where few see the same one, all of them
  * together show the usual brightness. */
 #define DENOISE_UNLIKE 0.0625f
-/* Share of a speck's remaining brightness below which the pixels beside it make it a speck. */
+/* Share of a pixel's filtered brightness that a pixel beside it must show; otherwise it counts as a speck. */
 #define DENOISE_ALONE 0.5f
 /* Number of standard deviations by which similar light may differ; in mirrors and glass lower by
  * DENOISE_MIRROR_EDGES. */

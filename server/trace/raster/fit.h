@@ -38,7 +38,7 @@ struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32
 
 struct axes_request {
     uint32_t resolution;      /* requested; 0: chosen */
-    uint32_t usual;           /* maximum of those that are chosen */
+    uint32_t usual;           /* maximum of a chosen one */
     double samples_per_pixel; /* samples per pixel of the picture that are worth their time */
 };
 

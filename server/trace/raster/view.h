@@ -24,7 +24,7 @@ struct raster_camera {
 /* Fills the camera's members of the uniforms, and no others, for a picture with one view. */
 void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_camera *camera);
 
-/* The near distance of a view, metres; where `near` is 0, one that cuts nothing off. */
+/* The near distance of a view, metres; where `near` is 0, one at which nothing is cut off. */
 float raster_near(const struct gpu_scene *scene, float near, bool orthographic);
 
 /* Primitives of an instance, counted from its first. */
