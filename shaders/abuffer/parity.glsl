@@ -8,7 +8,7 @@
 
 #ifdef ABUFFER_PARITY
 
-struct parity_walk {
+struct parity_march {
     bool is_known, is_inside;
     float s_least; // intersections before it do not count, as the ray may begin on a surface
 };
@@ -50,23 +50,24 @@ void pass_surface(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
         offer_at(r, w, found, nearest, s, side);
 }
 
-void search_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found found, found_voxel here, inout parity_walk walk)
+void search_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found found, found_voxel here,
+                   inout parity_march march)
 {
     int axis = image_of(here.what, w.ray.d);
     vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis);
-    float s = max(here.s_in, walk.s_least), s_end = min(here.s_out, w.s_limit);
+    float s = max(here.s_in, march.s_least), s_end = min(here.s_out, w.s_limit);
     ivec2 texel = texel_of(o.xy + s * d.xy), forward = ivec2(greaterThan(d.xy, vec2(0.0)));
     vec2 inverse = 1.0 / d.xy, border = (vec2(texel + forward) - o.xy) * inverse;
     bool goes_on = s < s_end;
-    if (goes_on && !walk.is_known)
-        walk = parity_walk(true, is_inside(axis, texel, o + s * d), walk.s_least);
+    if (goes_on && !march.is_known)
+        march = parity_march(true, is_inside(axis, texel, o + s * d), march.s_least);
     while (goes_on) {
         bool along_u = border.x < border.y;
         float s_next = along_u ? border.x : border.y, s_out = min(s_next, s_end);
         bool now = is_inside(axis, texel, o + s_out * d);
-        if (now != walk.is_inside)
+        if (now != march.is_inside)
             pass_surface(r, w, found, axis, texel, o, d, s, s_out);
-        walk.is_inside = now;
+        march.is_inside = now;
         s = s_next;
         texel += along_u ? ivec2(2 * forward.x - 1, 0) : ivec2(0, 2 * forward.y - 1);
         goes_on = s < s_end && s < w.s_limit && all(lessThan(uvec2(texel), uvec2(abuffer_resolution)));
@@ -77,11 +78,11 @@ void search_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found fou
 void traverse_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
     // Places beyond the voxels are outside of all bodies.
-    parity_walk walk = parity_walk(w.s > w.s_min, false, w.s_min + OWN_WAY);
+    parity_march march = parity_march(w.s > w.s_min, false, w.s_min + OWN_WAY);
     while (w.s < w.s_end) {
         found_voxel here = next_voxel(w);
         if ((here.what & ABUFFER_VOXEL_BODY) != 0u)
-            search_parity(r, w, found, here, walk);
+            search_parity(r, w, found, here, march);
         else if (here.what != 0u)
             search_planes(r, w, found, here);
     }

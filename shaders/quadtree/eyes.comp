@@ -23,7 +23,7 @@ const int START = QUADTREE_TOP;
 const float NEVER = -1.0; // w behind everything that a ray may meet
 
 // March of a ray through a layer, from greater to smaller w.
-struct eye_walk {
+struct eye_march {
     vec2 far, along, inverse; // places on it are far + w * along
     float w, w_end;
     int level; // level of the first node
@@ -35,22 +35,22 @@ struct eye_walk {
     bool ends_behind; // the end is behind the first layer
 };
 
-void walk_layer(uint layer, inout eye_walk walk)
+void trace_layer(uint layer, inout eye_march march)
 {
-    vec2 far = walk.far, along = walk.along;
+    vec2 far = march.far, along = march.along;
     ivec2 forward = ivec2(lessThan(along, vec2(0.0))), padded = ivec2(quadtree.padded_width, quadtree.padded_height);
-    float w = walk.w, w_end = walk.w_end, w_since = NEVER, w_before = walk.is_before ? w : NEVER;
-    bool is_before = walk.is_before;
-    int level = walk.level, first = int(layer * quadtree.slice_nodes);
+    float w = march.w, w_end = march.w_end, w_since = NEVER, w_before = march.is_before ? w : NEVER;
+    bool is_before = march.is_before;
+    int level = march.level, first = int(layer * quadtree.slice_nodes);
     ivec2 cell = clamp(ivec2(floor(far + w * along)), ivec2(0), padded - 1) >> level;
-    walk.w_met = walk.w_behind = NEVER;
+    march.w_met = march.w_behind = NEVER;
     // Lanes in lockstep execute a loop that begins with its condition once more for the last of them. This loop has two
     // exits, which assign w_met differently: with a single one at the end, lanes that had finished earlier had wrong
     // values after the loop (Mesa's llvmpipe 22.3).
     while (true) {
         bool is_on_way = w > w_end;
         uvec2 node = texelFetch(quadtree_nodes, first + int(node_index(0u, uint(level), uvec2(cell)))).xy;
-        vec2 exits = (vec2((cell + forward) << level) - far) * walk.inverse;
+        vec2 exits = (vec2((cell + forward) << level) - far) * march.inverse;
         float w_out = clamp(max(exits.x, exits.y), w_end, w);
         bool is_plane = node_is_plane(node);
         vec2 slopes = plane_slopes(node), range = box_range(node);
@@ -63,7 +63,7 @@ void walk_layer(uint layer, inout eye_walk walk)
         bool is_met = is_on_way && is_plane && (passes || is_before && gap_in > 0.0 &&
                                             gap_in <= QUADTREE_EDGE_SHARE * plane_w(node) + quadtree.bounds.x);
         if (is_met) {
-            walk.w_met = passes ? mix(w, w_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0)) : w;
+            march.w_met = passes ? mix(w, w_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0)) : w;
             break;
         }
 
@@ -72,15 +72,15 @@ void walk_layer(uint layer, inout eye_walk walk)
             w_before = is_before ? mix(w, w_out, 0.99) : w_before;
             w_since = is_before ? NEVER : max(w_since, w);
             if (is_on_way && layer == 0u)
-                walk.ends_behind = !is_before;
+                march.ends_behind = !is_before;
             vec2 way = abs(along) * (w_since - w_out);
             bool stays = is_on_way && !is_before &&
                          (gap_out > QUADTREE_DEEP * w_out || max(way.x, way.y) > QUADTREE_OWN_WAY);
-            if (stays && w_since > walk.w_behind) {
-                walk.w_behind = w_since;
-                if (walk.w_fill == NEVER && w_before != NEVER) {
-                    walk.w_fill = w_before;
-                    walk.fill_layer = layer;
+            if (stays && w_since > march.w_behind) {
+                march.w_behind = w_since;
+                if (march.w_fill == NEVER && w_before != NEVER) {
+                    march.w_fill = w_before;
+                    march.fill_layer = layer;
                 }
             }
         }
@@ -100,11 +100,11 @@ void walk_layer(uint layer, inout eye_walk walk)
 
 // Whether everything before the view counts as empty, by the rule of traverse.glsl: where the ray enters near the view's
 // eye, or through the near plane.
-bool is_free_before(eye_walk walk, float w_enters, float w_begins)
+bool is_free_before(eye_march march, float w_enters, float w_begins)
 {
     if (w_enters >= w_begins)
         return true;
-    vec2 place = (walk.far + w_enters * walk.along - quadtree.scale_centre.zw) / quadtree.scale_centre.xy;
+    vec2 place = (march.far + w_enters * march.along - quadtree.scale_centre.zw) / quadtree.scale_centre.xy;
     return length(vec3(place, 1.0)) <= QUADTREE_FREE_RADII * quadtree.bounds.w * w_enters;
 }
 
@@ -113,50 +113,50 @@ vec4 trace_sample(vec3 eye, vec2 place, vec4 beam, out uint code)
 {
     eye_line line = line_of(eye, direction_through(place));
     float w_last = quadtree.depths.x / max(eye.z + beam.z * line.cosine, quadtree.depths.w);
-    eye_walk walk;
-    walk.far = line.far;
-    walk.along = mix(line.along, vec2(1e-9), lessThan(abs(line.along), vec2(1e-9)));
-    walk.inverse = 1.0 / walk.along;
-    vec2 a = -line.far * walk.inverse, b = (vec2(quadtree.width, quadtree.height) - line.far) * walk.inverse;
+    eye_march march;
+    march.far = line.far;
+    march.along = mix(line.along, vec2(1e-9), lessThan(abs(line.along), vec2(1e-9)));
+    march.inverse = 1.0 / march.along;
+    vec2 a = -line.far * march.inverse, b = (vec2(quadtree.width, quadtree.height) - line.far) * march.inverse;
     vec2 near_sides = max(a, b), far_sides = min(a, b);
     float w_enters = min(near_sides.x, near_sides.y), w_leaves = max(far_sides.x, far_sides.y);
-    walk.w = min(w_enters, beam.x);
-    walk.w_end = max(w_leaves, w_last);
+    march.w = min(w_enters, beam.x);
+    march.w_end = max(w_leaves, w_last);
     int bits = int(beam.y);
-    walk.level = bits & QUADTREE_BEAM_LEVEL;
-    walk.is_before = (bits & QUADTREE_BEAM_INSIDE) != 0;
-    walk.w_fill = NEVER;
-    walk.fill_layer = 0u;
-    walk.ends_behind = false;
-    float w_leaves_or_ends = walk.w_end;
-    float w_hit = NEVER, w_unknown = NEVER, w_first = walk.w;
+    march.level = bits & QUADTREE_BEAM_LEVEL;
+    march.is_before = (bits & QUADTREE_BEAM_INSIDE) != 0;
+    march.w_fill = NEVER;
+    march.fill_layer = 0u;
+    march.ends_behind = false;
+    float w_leaves_or_ends = march.w_end;
+    float w_hit = NEVER, w_unknown = NEVER, w_first = march.w;
     uint hit_layer = 0u, layers = 1u;
     bool has_left = false, goes_on = true;
     for (uint layer = 0u; layer < QUADTREE_LAYERS && goes_on; layer++) {
         layers = layer + 1u;
-        walk_layer(layer, walk);
+        trace_layer(layer, march);
         // A ray that enters the view behind the first surface has passed that beside the view.
-        has_left = has_left || layer == 0u && walk.w_behind == w_first && w_enters < beam.x;
-        if (walk.w_met > walk.w_end) {
-            walk.w_end = w_hit = walk.w_met;
+        has_left = has_left || layer == 0u && march.w_behind == w_first && w_enters < beam.x;
+        if (march.w_met > march.w_end) {
+            march.w_end = w_hit = march.w_met;
             hit_layer = layer;
         }
-        goes_on = walk.w_behind > walk.w_end;
-        w_unknown = goes_on ? walk.w_behind : NEVER;
-        walk.w = walk.w_behind;
-        walk.level = START;
-        walk.is_before = false;
+        goes_on = march.w_behind > march.w_end;
+        w_unknown = goes_on ? march.w_behind : NEVER;
+        march.w = march.w_behind;
+        march.level = START;
+        march.is_before = false;
     }
     bool is_outside = w_hit == NEVER && (w_leaves > w_last || w_enters <= w_last);
-    bool is_filled = w_hit == NEVER && w_unknown != NEVER && !has_left && walk.ends_behind;
-    bool is_free = is_free_before(walk, w_enters, quadtree.depths.x / max(eye.z, quadtree.depths.w));
+    bool is_filled = w_hit == NEVER && w_unknown != NEVER && !has_left && march.ends_behind;
+    bool is_free = is_free_before(march, w_enters, quadtree.depths.x / max(eye.z, quadtree.depths.w));
     has_left = has_left || !is_free || is_outside && w_unknown == NEVER;
     bool is_unknown = has_left || w_unknown > w_hit;
-    float w_fill = walk.w_fill != NEVER ? walk.w_fill : mix(w_first, w_leaves_or_ends, QUADTREE_ALMOST_END);
+    float w_fill = march.w_fill != NEVER ? march.w_fill : mix(w_first, w_leaves_or_ends, QUADTREE_ALMOST_END);
     float w = is_filled ? w_fill : w_hit;
-    uint layer = is_filled ? walk.fill_layer : hit_layer;
+    uint layer = is_filled ? march.fill_layer : hit_layer;
     code = layers - 1u + (is_unknown ? has_left ? QUADTREE_OUTSIDE : QUADTREE_BEHIND : 0u);
-    return vec4(walk.far + w * walk.along, w * (1.0 / quadtree.depths.x),
+    return vec4(march.far + w * march.along, w * (1.0 / quadtree.depths.x),
                 float((w == NEVER ? 0u : (layer + 1u) * EYE_LAYER) + (is_unknown ? EYE_UNKNOWN : 0u)));
 }
 

@@ -7,7 +7,7 @@
 //
 // Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive;
 // QUADTREE_VIEW there is one face.
-#define INTERSECTION_FLAGS walk_flags
+#define INTERSECTION_FLAGS march_flags
 
 #include "shared/path.h"
 #include "quadtree/face.glsl"
@@ -34,7 +34,7 @@ const int MEETINGS_MAX = 1 << 20;
 const int LAYERS_MAX = 32; // more than all faces have
 
 // March of a ray through a layer of a face.
-struct layer_walk {
+struct layer_march {
     face_segment s;
     vec3 origin;  // x, y, w of the ray's origin; w below 0: it is not in this face
     vec2 inverse; // inverse of s.along.xy
@@ -65,42 +65,42 @@ struct node_passage {
     float reach; // plane: a ray farther from it than this meets nothing of the surface within a texel
 };
 
-uint walk_flags = 0u;
+uint march_flags = 0u;
 
-uint slice_of(layer_walk walk)
+uint slice_of(layer_march march)
 {
-    return FACE(walk.face) * quadtree.layers + walk.layer;
+    return FACE(march.face) * quadtree.layers + march.layer;
 }
 
 // ---- hits ----
 
-bool is_met_before(layer_walk walk, float distance_)
+bool is_met_before(layer_march march, float distance_)
 {
-    vec2 apart = abs(walk.offered - distance_);
+    vec2 apart = abs(march.offered - distance_);
     return min(apart.x, apart.y) <= SAME_DISTANCE * abs(distance_);
 }
 
 // Whether the distance is in this face: what the ray meets elsewhere counts there.
-bool is_in_face(layer_walk walk, float distance_)
+bool is_in_face(layer_march march, float distance_)
 {
     float slack = SAME_DISTANCE * abs(distance_);
-    return distance_ >= walk.s.t_from - slack && distance_ <= walk.s.t_to + slack;
+    return distance_ >= march.s.t_from - slack && distance_ <= march.s.t_to + slack;
 }
 
 // Offers a hit. True: the ray ends there.
-bool offer(trace_ray r, candidate met, inout layer_walk walk, inout found_type found)
+bool offer(trace_ray r, candidate met, inout layer_march march, inout found_type found)
 {
 #ifdef ANY_HIT
-    if (is_met_before(walk, met.distance) || !is_in_face(walk, met.distance))
+    if (is_met_before(march, met.distance) || !is_in_face(march, met.distance))
         return false;
-    walk.offered = vec2(met.distance, walk.offered.x);
+    march.offered = vec2(met.distance, march.offered.x);
     return offer_any(r, met, found);
 #else
     float before = found.distance;
     offer_closest(r, met, found);
     if (found.distance >= before)
         return false;
-    walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
+    march_flags = (march.layer + 1u) << HIT_LAYER_SHIFT;
     return false; // the march ends where the ray now does
 #endif
 }
@@ -133,11 +133,11 @@ bool intersect_visible(trace_ray r, uvec2 visible, float near, out candidate met
 
 // Offers the primitives of the texel and of those beside it on the side of the place; the first one that is met is enough
 // where surfaces continue from texel to texel. True: the ray ends.
-bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout layer_walk walk, inout found_type found,
+bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout layer_march march, inout found_type found,
                       out bool has_met)
 {
     ivec2 texel = ivec2(floor(place)), towards = ivec2(greaterThan(fract(place), vec2(0.5))) * 2 - 1;
-    uint slice = slice_of(walk), left = 0u;
+    uint slice = slice_of(march), left = 0u;
     uvec2 a, b, c, d;
     left |= visible_at(texel, slice, a) ? 1u : 0u;
     left |= visible_at(texel + ivec2(towards.x, 0), slice, b) && b != a ? 2u : 0u;
@@ -152,7 +152,7 @@ bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout 
         candidate met;
         if (left != 0u && intersect_visible(r, visible, near, met) && met.distance > r.t_min) {
             has_met = true;
-            ends = offer(r, met, walk, found) || ends;
+            ends = offer(r, met, march, found) || ends;
         }
         left ^= first;
         if (left == 0u || has_met && !all_four)
@@ -162,10 +162,10 @@ bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout 
 }
 
 // Whether a plane through a neighbour of the surface that the ray begins on passes beside its origin, which is no hit.
-bool is_own_surface(layer_walk walk, vec3 place, vec2 slopes)
+bool is_own_surface(layer_march march, vec3 place, vec2 slopes)
 {
-    vec3 away = abs(place - walk.origin);
-    return walk.origin.z >= 0.0 && max(away.x, away.y) < QUADTREE_OWN_WAY &&
+    vec3 away = abs(place - march.origin);
+    return march.origin.z >= 0.0 && max(away.x, away.y) < QUADTREE_OWN_WAY &&
            away.z <= QUADTREE_OWN_WAY * (abs(slopes.x) + abs(slopes.y)) + QUADTREE_EDGE_SHARE * place.z;
 }
 
@@ -177,76 +177,76 @@ bool is_met(node_passage p)
 
 // Meets the surface in a node: its plane, or primitives beside the edge that it passes. True: the ray ends. There is a
 // single call of offer_primitives(), as neighbouring rays execute every call.
-bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_type found)
+bool meet_in(trace_ray r, node_passage p, inout layer_march march, inout found_type found)
 {
     bool passes = is_met(p);
     // The ray may also pass between two planes that do not quite meet.
-    bool meets = passes || walk.is_before && p.gap_in <= QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
-    float u = passes ? mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0)) : walk.u;
-    vec3 place = walk.s.from + u * walk.s.along;
-    float near = distance_at(walk.s, u);
+    bool meets = passes || march.is_before && p.gap_in <= QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
+    float u = passes ? mix(march.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0)) : march.u;
+    vec3 place = march.s.from + u * march.s.along;
+    float near = distance_at(march.s, u);
 #ifndef QUADTREE_PLANES
     // Within a texel of an edge the texel's middle sees the other side.
     bool is_at_edge = plane_is_at_edge(p.node), has_met;
-    if (offer_primitives(r, place.xy, near, is_at_edge || !meets, walk, found, has_met))
+    if (offer_primitives(r, place.xy, near, is_at_edge || !meets, march, found, has_met))
         return true;
     if (has_met)
         return false;
 #endif
     uvec2 visible;
-    if (!meets || is_own_surface(walk, place, plane_slopes(p.node)) ||
-        !visible_at(ivec2(floor(place.xy)), slice_of(walk), visible))
+    if (!meets || is_own_surface(march, place, plane_slopes(p.node)) ||
+        !visible_at(ivec2(floor(place.xy)), slice_of(march), visible))
         return false;
 #ifndef QUADTREE_PLANES
     // The ray passed the edge of the surface, or primitives finer than texels.
     if (is_at_edge) {
-        walk.u_beside = u;
+        march.u_beside = u;
         return false;
     }
 #endif
-    return offer(r, candidate(near, visible.y, visible.x - 1u, vec2(0.0)), walk, found);
+    return offer(r, candidate(near, visible.y, visible.x - 1u, vec2(0.0)), march, found);
 }
 
 // ---- march through a layer ----
 
 // Begins a layer at `level` and below: rays that begin at a surface must descend to it.
-void begin_layer(uint layer, float u, int level, inout layer_walk walk)
+void begin_layer(uint layer, float u, int level, inout layer_march march)
 {
     ivec2 last = ivec2(quadtree.padded_width, quadtree.padded_height) - 1;
-    walk.level = level;
-    walk.layer = layer;
-    walk.u = u;
-    walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
-    walk.is_before = walk.is_behind = walk.was_close = false;
-    walk.u_last = 0.0;
-    walk.u_before = walk.u_since = walk.u_behind = walk.u_beside = NEVER;
+    march.level = level;
+    march.layer = layer;
+    march.u = u;
+    march.cell = clamp(ivec2(floor(march.s.from.xy + march.s.along.xy * u)), ivec2(0), last) >> march.level;
+    march.is_before = march.is_behind = march.was_close = false;
+    march.u_last = 0.0;
+    march.u_before = march.u_since = march.u_behind = march.u_beside = NEVER;
 }
 
-vec2 exits_of(layer_walk walk)
+vec2 exits_of(layer_march march)
 {
-    ivec2 forward = ivec2(greaterThan(walk.inverse, vec2(0.0)));
-    return (vec2((walk.cell + forward) << walk.level) - walk.s.from.xy) * walk.inverse;
+    ivec2 forward = ivec2(greaterThan(march.inverse, vec2(0.0)));
+    return (vec2((march.cell + forward) << march.level) - march.s.from.xy) * march.inverse;
 }
 
-node_passage passage_of(layer_walk walk)
+node_passage passage_of(layer_march march)
 {
     node_passage p;
-    p.node = texelFetch(quadtree_nodes, int(node_index(slice_of(walk), uint(walk.level), uvec2(walk.cell)))).xy;
+    p.node = texelFetch(quadtree_nodes, int(node_index(slice_of(march), uint(march.level), uvec2(march.cell)))).xy;
     p.is_plane = node_is_plane(p.node);
-    vec2 exits = exits_of(walk);
-    p.u_out = clamp(min(exits.x, exits.y), walk.u, walk.u_end);
-    float w_in = walk.s.from.z + walk.s.along.z * walk.u;
-    p.w_out = walk.s.from.z + walk.s.along.z * p.u_out;
-    vec2 slopes = plane_slopes(p.node), centre = node_centre(uint(walk.level), uvec2(walk.cell));
-    float w = plane_w(p.node) + dot(slopes, walk.s.from.xy - centre), growth = dot(slopes, walk.s.along.xy);
+    vec2 exits = exits_of(march);
+    p.u_out = clamp(min(exits.x, exits.y), march.u, march.u_end);
+    float w_in = march.s.from.z + march.s.along.z * march.u;
+    p.w_out = march.s.from.z + march.s.along.z * p.u_out;
+    vec2 slopes = plane_slopes(p.node), centre = node_centre(uint(march.level), uvec2(march.cell));
+    float w = plane_w(p.node) + dot(slopes, march.s.from.xy - centre), growth = dot(slopes, march.s.along.xy);
     // Just behind a surface the question is open: the next texels say whether the ray stays there or has passed its edge.
-    bool is_undecided = walk.was_close || walk.u_since < walk.u_behind;
-    p.skips_gaps = walk.hits_alone && !is_undecided && !p.is_plane && box_has_gaps(p.node);
+    bool is_undecided = march.was_close || march.u_since < march.u_behind;
+    p.skips_gaps = march.hits_alone && !is_undecided && !p.is_plane && box_has_gaps(p.node);
     vec2 range = p.skips_gaps ? box_range_of_surfaces(p.node) : box_range(p.node);
     vec2 of_ray = vec2(min(w_in, p.w_out), max(w_in, p.w_out));
     // distance to a box; 0: in it
     float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0;
-    p.gap_in = p.is_plane ? w + growth * walk.u - w_in : gap;
+    p.gap_in = p.is_plane ? w + growth * march.u - w_in : gap;
     p.gap_out = p.is_plane ? w + growth * p.u_out - p.w_out : gap;
     float steepness = abs(slopes.x) + abs(slopes.y);
     p.reach = BRUSHES * steepness + QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
@@ -257,82 +257,82 @@ node_passage passage_of(layer_walk walk)
     return p;
 }
 
-void go_down(inout layer_walk walk)
+void go_down(inout layer_march march)
 {
-    walk.level--;
-    ivec2 low = walk.cell * 2;
-    walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u)) >> walk.level, low, low + 1);
+    march.level--;
+    ivec2 low = march.cell * 2;
+    march.cell = clamp(ivec2(floor(march.s.from.xy + march.s.along.xy * march.u)) >> march.level, low, low + 1);
 }
 
 // Notes on which side the ray is. A ray behind a plane's extension beyond the surface comes before its neighbour's within
 // a texel: it counts as behind the layer where it stays so.
-void note_side(node_passage p, inout layer_walk walk)
+void note_side(node_passage p, inout layer_march march)
 {
-    walk.is_before = p.gap_out <= 0.0;
-    walk.is_behind = !walk.is_before && !p.skips_gaps;
-    walk.was_close = abs(p.gap_out) <= p.reach;
-    walk.u_last = max(p.gap_in, p.gap_out) > 0.0 ? p.u_out : walk.u_last;
-    if (walk.is_before) {
-        walk.u_before = mix(walk.u, p.u_out, 0.99);
-        walk.u_since = NEVER;
+    march.is_before = p.gap_out <= 0.0;
+    march.is_behind = !march.is_before && !p.skips_gaps;
+    march.was_close = abs(p.gap_out) <= p.reach;
+    march.u_last = max(p.gap_in, p.gap_out) > 0.0 ? p.u_out : march.u_last;
+    if (march.is_before) {
+        march.u_before = mix(march.u, p.u_out, 0.99);
+        march.u_since = NEVER;
         return;
     }
-    float u_in = p.gap_in > 0.0 ? walk.u : mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0));
-    walk.u_since = min(walk.u_since, u_in);
-    vec2 way = abs(walk.s.along.xy) * (p.u_out - walk.u_since);
+    float u_in = p.gap_in > 0.0 ? march.u : mix(march.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0));
+    march.u_since = min(march.u_since, u_in);
+    vec2 way = abs(march.s.along.xy) * (p.u_out - march.u_since);
     bool stays = p.gap_out > QUADTREE_DEEP * p.w_out || max(way.x, way.y) > QUADTREE_OWN_WAY;
-    if (stays && walk.u_since < walk.u_behind) {
-        walk.u_behind = walk.u_since;
-        if (walk.u_before != NEVER && walk.u_fill == NEVER) {
-            walk.u_fill = walk.u_before;
-            walk.fill_layer = walk.layer;
+    if (stays && march.u_since < march.u_behind) {
+        march.u_behind = march.u_since;
+        if (march.u_before != NEVER && march.u_fill == NEVER) {
+            march.u_fill = march.u_before;
+            march.fill_layer = march.layer;
         }
     }
 }
 
 // Moves to the successor across the side at which the ray leaves the node, one level below the last node that contains
 // both.
-void leave(node_passage p, inout layer_walk walk)
+void leave(node_passage p, inout layer_march march)
 {
-    ivec2 size = ivec2(quadtree.padded_width, quadtree.padded_height), next = walk.cell;
-    vec2 exits = exits_of(walk);
+    ivec2 size = ivec2(quadtree.padded_width, quadtree.padded_height), next = march.cell;
+    vec2 exits = exits_of(march);
     if (exits.x < exits.y)
-        next.x += walk.inverse.x > 0.0 ? 1 : -1;
+        next.x += march.inverse.x > 0.0 ? 1 : -1;
     else
-        next.y += walk.inverse.y > 0.0 ? 1 : -1;
-    walk.u = p.u_out;
-    if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << walk.level, size)))
-        walk.u = walk.u_end;
-    int up = min(findMSB((walk.cell.x ^ next.x) | (walk.cell.y ^ next.y)), QUADTREE_TOP - walk.level);
-    walk.level += up;
-    walk.cell = next >> up;
+        next.y += march.inverse.y > 0.0 ? 1 : -1;
+    march.u = p.u_out;
+    if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << march.level, size)))
+        march.u = march.u_end;
+    int up = min(findMSB((march.cell.x ^ next.x) | (march.cell.y ^ next.y)), QUADTREE_TOP - march.level);
+    march.level += up;
+    march.cell = next >> up;
 }
 
 // Passes nodes until the ray may meet something in one of them: true. The loop ends with two exits: with one, software GL
 // gave rays that had finished earlier the values of their neighbours.
-bool walk_on(inout layer_walk walk, out node_passage p)
+bool pass_nodes(inout layer_march march, out node_passage p)
 {
     bool meets = false;
     for (int i = 0; i < STEPS_TOGETHER; i++) {
-        p = passage_of(walk);
+        p = passage_of(march);
         bool goes_down = !p.is_plane && p.gap_in == 0.0;
-        bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
+        bool is_other_side = p.gap_in > 0.0 ? !march.is_behind : !march.is_before;
         // Most rays that pass an edge are far behind or before both of its sides: fewer than one in ten of them meets
         // either.
-        bool is_close = walk.was_close || abs(p.gap_in) <= p.reach;
+        bool is_close = march.was_close || abs(p.gap_in) <= p.reach;
         // A ray that begins before a continuous surface, and moves away from it, meets none of it.
-        bool moves_away = !(walk.is_before || walk.is_behind) && p.gap_out <= p.gap_in && p.gap_in <= 0.0 &&
+        bool moves_away = !(march.is_before || march.is_behind) && p.gap_out <= p.gap_in && p.gap_in <= 0.0 &&
                           !plane_is_at_edge(p.node);
         meets = p.is_plane && (is_met(p) || is_other_side && is_close && !moves_away);
         if (meets)
             break;
         if (goes_down) {
-            go_down(walk);
+            go_down(march);
         } else {
-            note_side(p, walk);
-            leave(p, walk);
+            note_side(p, march);
+            leave(p, march);
         }
-        if (!(walk.u < walk.u_end))
+        if (!(march.u < march.u_end))
             break;
     }
     return meets;
@@ -341,7 +341,7 @@ bool walk_on(inout layer_walk walk, out node_passage p)
 // ---- faces ----
 
 // State of a ray in all faces.
-struct view_walk {
+struct view_march {
     float t_last;    // maximum distance along the ray of anything visible
     float t_leaves;  // distance where it leaves the last face that it passes, or ends in it; -1: it passes none
     uint last_face;
@@ -369,7 +369,7 @@ bool is_free_before(trace_ray r, float t)
 }
 
 // Notes that the ray leaves a view with one face, which sees nothing beside it.
-void note_outside(trace_ray r, float t_end, inout view_walk seen)
+void note_outside(trace_ray r, float t_end, inout view_march seen)
 {
     if (!IS_VIEW)
         return;
@@ -397,10 +397,10 @@ float last_distance(trace_ray r)
 
 #ifdef ANY_HIT
 #define NEAREST(found, r) r.t_max
-#define SHORTEN(walk, found)
+#define SHORTEN(march, found)
 #else
 #define NEAREST(found, r) found.distance
-#define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
+#define SHORTEN(march, found) march.u_end = min(march.u_end, place_at(march.s, found.distance))
 #endif
 
 // Whether neighbours of a primitive may lie between the middles of texels, unseen, as it is so narrow itself.
@@ -426,16 +426,16 @@ bool is_finer_than_texels(uint face, uvec2 visible)
 }
 
 // Meets the layer that a ray stays behind, even where it passed between primitives finer than texels. True: the ray ends.
-bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
+bool meet_beside(trace_ray r, inout layer_march march, inout found_type found)
 {
-    if (!(walk.u_behind < walk.u_end) || walk.u_behind != walk.u_beside)
+    if (!(march.u_behind < march.u_end) || march.u_behind != march.u_beside)
         return false;
     uvec2 visible;
-    vec2 place = walk.s.from.xy + walk.u_beside * walk.s.along.xy;
-    if (!visible_at(ivec2(floor(place)), slice_of(walk), visible) || !is_finer_than_texels(walk.face, visible))
+    vec2 place = march.s.from.xy + march.u_beside * march.s.along.xy;
+    if (!visible_at(ivec2(floor(place)), slice_of(march), visible) || !is_finer_than_texels(march.face, visible))
         return false;
-    walk.u_behind = NEVER;
-    return offer(r, candidate(distance_at(walk.s, walk.u_beside), visible.y, visible.x - 1u, vec2(0.0)), walk, found);
+    march.u_behind = NEVER;
+    return offer(r, candidate(distance_at(march.s, march.u_beside), visible.y, visible.x - 1u, vec2(0.0)), march, found);
 }
 
 // Maximum w of a face; 0: it sees nothing.
@@ -452,7 +452,7 @@ void clip_to_surfaces(float w, vec3 origin, vec3 direction, inout vec2 t)
 }
 
 // Finds where the ray enters each of the faces.
-void begin_faces(trace_ray r, float t_end, inout view_walk seen)
+void begin_faces(trace_ray r, float t_end, inout view_march seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
     vec2 t_ray = vec2(r.t_min, min(seen.t_last, t_end));
@@ -472,7 +472,7 @@ void begin_faces(trace_ray r, float t_end, inout view_walk seen)
 }
 
 // Next face of the ray, and where it enters; FLOAT_MAX: none.
-float next_face(inout view_walk seen, out uint face)
+float next_face(inout view_march seen, out uint face)
 {
     float begin = seen.begins.x;
     face = 0u;
@@ -487,65 +487,65 @@ float next_face(inout view_walk seen, out uint face)
 }
 
 // Begins the first layer of the next face that the ray passes. False: there is none before its end.
-bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
+bool begin_face(trace_ray r, found_type found, inout layer_march march, inout view_march seen)
 {
     float t_end = min(seen.t_last, NEAREST(found, r)), begin = FLOAT_MAX;
     vec3 from_eye = r.origin - quadtree.eye_world.xyz, origin, direction;
     vec2 t = vec2(1.0, 0.0);
     // A GPU may round a short way through a face to none: the next face follows.
     for (uint i = 0u; i < FACES; i++) {
-        begin = next_face(seen, walk.face);
-        origin = face_vector(walk.face, from_eye);
-        direction = face_vector(walk.face, r.direction);
+        begin = next_face(seen, march.face);
+        origin = face_vector(march.face, from_eye);
+        direction = face_vector(march.face, r.direction);
         t = clip_to_face(origin, direction, vec2(r.t_min, t_end));
-        clip_to_surfaces(nearest_w(walk.face), origin, direction, t);
+        clip_to_surfaces(nearest_w(march.face), origin, direction, t);
         if (t.x < t.y || !(begin < t_end))
             break;
     }
-    walk.s = segment_of(origin, direction, t);
-    walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
-    vec2 along = walk.s.along.xy;
-    walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
-    walk.u_end = 1.0;
-    walk.u_fill = NEVER;
-    walk.fill_layer = 0u;
-    begin_layer(0u, 0.0, walk.s.t_from <= r.t_min ? LEVEL_AT_SURFACES : QUADTREE_TOP, walk);
+    march.s = segment_of(origin, direction, t);
+    march.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
+    vec2 along = march.s.along.xy;
+    march.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
+    march.u_end = 1.0;
+    march.u_fill = NEVER;
+    march.fill_layer = 0u;
+    begin_layer(0u, 0.0, march.s.t_from <= r.t_min ? LEVEL_AT_SURFACES : QUADTREE_TOP, march);
     return begin < t_end && t.x < t.y;
 }
 
 // Fills an unknown part with the surface that the ray was last before: the background of what hides it (section 4.1); if
 // it was before none, with the hiding surface at its end.
-void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
+void end_face(trace_ray r, layer_march march, inout found_type found, inout view_march seen)
 {
-    float t = distance_at(walk.s, min(walk.u_behind, 1.0));
-    if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
+    float t = distance_at(march.s, min(march.u_behind, 1.0));
+    if (march.u_behind >= march.u_end || t >= seen.t_unknown)
         return;
-    bool was_before = walk.u_fill != NEVER;
+    bool was_before = march.u_fill != NEVER;
     seen.t_unknown = t;
-    seen.t_fill = was_before ? distance_at(walk.s, walk.u_fill) : t;
-    seen.fill_slice = FACE(walk.face) * quadtree.layers + walk.fill_layer;
+    seen.t_fill = was_before ? distance_at(march.s, march.u_fill) : t;
+    seen.fill_slice = FACE(march.face) * quadtree.layers + march.fill_layer;
     seen.is_filled = true;
-    seen.fill_texel = was_before ? ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u_fill)) : ivec2(-1);
+    seen.fill_texel = was_before ? ivec2(floor(march.s.from.xy + march.s.along.xy * march.u_fill)) : ivec2(-1);
 }
 
 // Begins the next layer where the ray is behind this one. False: the face is finished.
-bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inout view_walk seen)
+bool begin_next(trace_ray r, inout layer_march march, inout found_type found, inout view_march seen)
 {
     // A ray that enters the view behind the first surface has passed that beside the view.
-    if (IS_VIEW && walk.layer == 0u && walk.u_behind == 0.0 && walk.s.t_from > r.t_min &&
-        walk.s.t_from < seen.t_unknown) {
-        seen.t_unknown = walk.s.t_from;
+    if (IS_VIEW && march.layer == 0u && march.u_behind == 0.0 && march.s.t_from > r.t_min &&
+        march.s.t_from < seen.t_unknown) {
+        seen.t_unknown = march.s.t_from;
         seen.has_left = true;
     }
-    if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
+    if (march.u_behind < march.u_end && march.layer + 1u < quadtree.layers) {
         // A ray before this layer is also before all layers behind it. Their edges may be off by its own way.
-        float own_way = QUADTREE_OWN_WAY * min(abs(walk.inverse.x), abs(walk.inverse.y));
-        walk.u_end = min(walk.u_end, walk.u_last + own_way);
-        begin_layer(walk.layer + 1u, walk.u_behind, LEVEL_AT_SURFACES, walk);
-        seen.layers = max(seen.layers, walk.layer + 1u);
+        float own_way = QUADTREE_OWN_WAY * min(abs(march.inverse.x), abs(march.inverse.y));
+        march.u_end = min(march.u_end, march.u_last + own_way);
+        begin_layer(march.layer + 1u, march.u_behind, LEVEL_AT_SURFACES, march);
+        seen.layers = max(seen.layers, march.layer + 1u);
         return true;
     }
-    end_face(r, walk, found, seen);
+    end_face(r, march, found, seen);
     return false;
 }
 
@@ -557,32 +557,32 @@ bool is_ray(trace_ray r)
 }
 
 // Traces through a layer. True: the ray ends in it.
-bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
+bool trace_layer(trace_ray r, inout layer_march march, inout found_type found)
 {
     node_passage p;
     bool ends = false;
     for (int i = 0; i < MEETINGS_MAX; i++) {
-        if (walk_on(walk, p)) {
-            ends = meet_in(r, p, walk, found);
-            SHORTEN(walk, found);
-            if (walk.u_end < p.u_out) {
+        if (pass_nodes(march, p)) {
+            ends = meet_in(r, p, march, found);
+            SHORTEN(march, found);
+            if (march.u_end < p.u_out) {
                 // The ray counts as behind also after a plane that it meets from the back: a node may be as large as
                 // everything that it hides.
-                walk.u_last = p.gap_in > 0.0 ? walk.u_end : walk.u_last;
-                walk.u = walk.u_end;
+                march.u_last = p.gap_in > 0.0 ? march.u_end : march.u_last;
+                march.u = march.u_end;
             } else {
-                note_side(p, walk);
-                leave(p, walk);
+                note_side(p, march);
+                leave(p, march);
             }
         }
-        if (ends || !(walk.u < walk.u_end))
+        if (ends || !(march.u < march.u_end))
             break;
     }
     return ends;
 }
 
 // Whether the end of the ray is behind the first layer.
-bool ends_behind_first(trace_ray r, view_walk seen)
+bool ends_behind_first(trace_ray r, view_march seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
     vec3 end = face_vector(seen.last_face, from_eye + seen.t_leaves * r.direction);
@@ -594,36 +594,36 @@ bool ends_behind_first(trace_ray r, view_walk seen)
 
 // Traces through a view. True: the ray ends early. Three loops are nested: software GL executes both sides of a branch
 // for all neighbouring rays, so in a single loop each step would pay for work done once per layer.
-bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
+bool trace_view(trace_ray r, inout view_march seen, inout found_type found)
 {
-    layer_walk walk;
-    walk.offered = vec2(-1.0);
+    layer_march march;
+    march.offered = vec2(-1.0);
     begin_faces(r, NEAREST(found, r), seen);
     seen.ends_behind = ends_behind_first(r, seen);
 #ifdef ANY_HIT
-    walk.hits_alone = !seen.ends_behind;
+    march.hits_alone = !seen.ends_behind;
 #else
-    walk.hits_alone = false;
+    march.hits_alone = false;
 #endif
     bool ends = false, has_layer = false;
     for (int i = 0; i < LAYERS_MAX; i++) {
-        if (!has_layer && !begin_face(r, found, walk, seen))
+        if (!has_layer && !begin_face(r, found, march, seen))
             break;
-        ends = walk_layer(r, walk, found) || meet_beside(r, walk, found);
+        ends = trace_layer(r, march, found) || meet_beside(r, march, found);
         if (ends)
             break;
-        has_layer = begin_next(r, walk, found, seen);
+        has_layer = begin_next(r, march, found, seen);
     }
     return ends;
 }
 
-view_walk begin_view_walk(trace_ray r)
+view_march begin_view_march(trace_ray r)
 {
-    return view_walk(last_distance(r), -1.0, 0u, vec4(FLOAT_MAX), vec2(FLOAT_MAX), vec2(1.0, 0.0), 1e30, 1u, false,
+    return view_march(last_distance(r), -1.0, 0u, vec4(FLOAT_MAX), vec2(FLOAT_MAX), vec2(1.0, 0.0), 1e30, 1u, false,
                      false, false, 0.0, 0u, ivec2(-1));
 }
 
-void count(view_walk seen, bool is_unknown)
+void count(view_march seen, bool is_unknown)
 {
     atomicAdd(counts_of_kinds[ray_kind].rays, 1u);
     if (seen.layers > 1u)
@@ -646,8 +646,8 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     if (!is_ray(r))
         return false;
-    view_walk seen = begin_view_walk(r);
-    bool is_stopped = walk_view(r, seen, optical_depth);
+    view_march seen = begin_view_march(r);
+    bool is_stopped = trace_view(r, seen, optical_depth);
     note_outside(r, r.t_max, seen);
     bool is_unknown = !is_stopped && seen.t_unknown < r.t_max;
     count(seen, is_unknown);
@@ -658,7 +658,7 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
 
 // Handles a ray that met nothing. If it came out again from behind the visible surfaces, it has left the scene, as far as
 // is known.
-void fill(trace_ray r, view_walk seen, inout candidate best)
+void fill(trace_ray r, view_march seen, inout candidate best)
 {
     uint face = seen.fill_slice / quadtree.layers;
     vec3 origin = face_vector(face, r.origin - quadtree.eye_world.xyz), direction = face_vector(face, r.direction);
@@ -670,21 +670,21 @@ void fill(trace_ray r, view_walk seen, inout candidate best)
         !visible_at(seen.fill_texel.x < 0 ? last : seen.fill_texel, seen.fill_slice, visible))
         return;
     best = candidate(seen.t_fill, visible.y, visible.x - 1u, vec2(0.0));
-    walk_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;
+    march_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;
 }
 
 void trace_closest(trace_ray r, inout candidate best)
 {
     if (!is_ray(r))
         return;
-    view_walk seen = begin_view_walk(r);
-    walk_flags = 0u;
-    walk_view(r, seen, best);
+    view_march seen = begin_view_march(r);
+    march_flags = 0u;
+    trace_view(r, seen, best);
     note_outside(r, best.distance, seen);
     bool is_unknown = seen.t_unknown < best.distance;
     count(seen, is_unknown);
     if (is_unknown) {
-        walk_flags |= HIT_UNKNOWN;
+        march_flags |= HIT_UNKNOWN;
         if (best.primitive == HIT_NO_PRIMITIVE)
             fill(r, seen, best);
     }
