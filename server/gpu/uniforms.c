@@ -173,8 +173,8 @@ bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_tex
                       struct error *error)
 {
     struct block block = {0};
-    const char *files = text->text ? strstr(text->text, "#line ") : NULL; /* after the lines that must come
-                                                                             first */
+    /* After the lines that must come first. */
+    const char *files = text->text ? strstr(text->text, "#line ") : NULL;
     const bool copies = files && software && strstr(files, "#ifdef " ASKS_AT_START);
     if (!files)
         return true;

@@ -15,8 +15,8 @@ struct material {
     float anisotropy, anisotropy_rotation; /* strength for rough reflections; radians from the tangent */
     uint id;                               /* the client's id; 0: the default material */
     uint texture_specular;
-    float specular_red, specular_green, specular_blue, specular; /* reflectance of a dielectric: colour and
-                                                                    strength */
+    /* Reflectance of a dielectric: colour and strength. */
+    float specular_red, specular_green, specular_blue, specular;
     uint texture_specular_colour;
     float body_red, body_green, body_blue; /* share of shadow rays' light that one of the two surfaces of a body
                                               absorbs */

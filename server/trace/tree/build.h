@@ -138,8 +138,8 @@ bool bvh_tree_plan(struct bvh_tree *tree, const struct bvh_shape *shape, const s
                    struct error *error);
 void bvh_tree_write(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     uint32_t *elements, float *primitives);
-bool bvh_tree_alloc(struct bvh_tree *tree, const struct bvh_form *settings); /* allocates arrays of the tree's
-                                                                                own for the second step */
+/* Allocates arrays of the tree's own for the second step. */
+bool bvh_tree_alloc(struct bvh_tree *tree, const struct bvh_form *settings);
 void bvh_tree_finish(struct bvh_tree *tree);
 #define BVH_PAD_RELATIVE 0x1p-21f
 
