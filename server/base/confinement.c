@@ -173,12 +173,12 @@ static bool enter_landlock(const struct confinement *confinement, bool *has_file
 
 /* Denied calls; all others are allowed, as drivers make calls that nobody lists. */
 static const char *const denied[] = {
-    /* network, including sockets that clients are connected to */
+    /* Network, including sockets that clients are connected to. */
     "connect", "bind", "listen", "accept", "accept4", "io_uring_setup",
-    /* other programs and processes */
+    /* Other programs and processes. */
     "execve", "execveat", "process_vm_readv", "process_vm_writev", "process_madvise", "pidfd_getfd",
     "pidfd_send_signal", "kcmp", "tkill", "rt_sigqueueinfo",
-    /* system */
+    /* System. */
     "bpf", "perf_event_open", "userfaultfd", "keyctl", "add_key", "request_key", "mount", "umount2", "pivot_root",
     "chroot", "setns", "unshare", "open_by_handle_at", "init_module", "finit_module", "delete_module",
     "kexec_load", "kexec_file_load", "reboot", "swapon", "swapoff", "acct", "quotactl", "settimeofday",

@@ -27,9 +27,9 @@ void *hashmap_remove(struct hashmap *map, uint64_t key); /* the value, or NULL *
 struct hashmap_link {
     struct hashmap_link *next;
 };
-/* false: see hashmap_put() */
+/* Adds a value to the chain of a key. False: see hashmap_put(). */
 bool hashmap_chain(struct hashmap *map, uint64_t key, struct hashmap_link *link);
-/* the link must be in the chain */
+/* Removes a value; its link must be in the chain. */
 void hashmap_unchain(struct hashmap *map, uint64_t key, struct hashmap_link *link);
 /* Iterates; *cursor starts at 0; false at the end. The map must not change in between. */
 bool hashmap_next(const struct hashmap *map, size_t *cursor, uint64_t *key, void **value);

@@ -41,7 +41,7 @@ void *gpu_buffer_open(struct gpu_device *device, struct gpu_buffer *buffer, stru
 void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer);
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
                      size_t size_bytes); /* waits for the GPU */
-/* sets every u32 */
+/* Sets every u32 of the buffer to the value. */
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value);
 /* Clears a part of it, in whole u32. */
 void gpu_buffer_clear_part(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes,

@@ -192,7 +192,7 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     gpu_binary_finish(&binary);
     if (!program) {
         gpu_object_destroy(device->registry, GPU_PROGRAM, name);
-        /* unless a reason is set already */
+        /* The error stands unless an earlier one is set. */
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program");
         return NULL;
     }

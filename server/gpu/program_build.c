@@ -59,7 +59,7 @@ bool gpu_build_prepare(struct gpu_build *build, const struct gpu_device *device,
     ok = ok && make_key(build, &device->info);
     if (!ok) {
         gpu_build_finish(build);
-        /* unless a reason is set already */
+        /* The error stands unless an earlier one is set. */
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program");
     }
     return ok;

@@ -48,8 +48,8 @@ struct gpu_scene_geometry {
     uint64_t revision; /* the object's revision: unchanged means the same primitives, and the same shape where
                           node is 0 */
     uint32_t id;       /* the object's id; unique together with `node` and the choice of the two */
-    /* the only node that shows this geometry, and deforms the mesh; 0: the mesh undeformed, or a set of
-     * spheres. With a skin its vertices are in world space, and its instance's transform is the identity */
+    /* The only node that shows this geometry, and deforms the mesh; 0: the mesh undeformed, or a set of
+     * spheres. With a skin its vertices are in world space, and its instance's transform is the identity. */
     uint32_t node;
     uint64_t deformed_revision; /* counts changes of its vertices, or of those at shutter close; 0: they are
                                    those of the mesh */
@@ -61,8 +61,8 @@ struct gpu_scene {
     struct gpu_device *device;
     const struct scene *scene; /* the scene of the last update, for tracers on the host; valid until it
                                   is edited */
-    /* the motion of the last update; NULL: all objects as committed. The caller's: valid as long as the caller
-     * keeps it, which is until the tracers are updated */
+    /* The motion of the last update; NULL: all objects as committed. The caller's: valid as long as the caller
+     * keeps it, which is until the tracers are updated. */
     const struct scene_motion *motion;
     uint64_t revision; /* revision of the scene on the device */
     struct gpu_scene_geometry *geometries;
@@ -98,7 +98,7 @@ struct gpu_scene {
     struct table_starts table_starts; /* mirror of the head of `tables` */
     struct gpu_texture environment;
     float environment_colour[3], environment_rotation;
-    /* revisions present on the device */
+    /* Revisions present on the device. */
     uint64_t geometry_revision, instances_revision, shading_revision, lights_revision;
     uint64_t deformed_revision;    /* last number given out; continues when the copy is rebuilt, as tracers
                                       identify kept data by it */

@@ -19,7 +19,7 @@ struct address {
 
 /* Parses an address; looks up a host name and uses the first answer. Error field: the text. */
 bool address_parse(struct address *address, const char *text, struct error *error);
-/* in the written form */
+/* Prints an address in its written form. */
 void address_print(const struct address *address, char text[ADDRESS_TEXT_BYTES]);
 bool address_is_unix(const struct address *address);
 bool address_is_loopback(const struct address *address); /* false for unix */

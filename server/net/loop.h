@@ -42,7 +42,7 @@ void loop_watch_change(struct loop_watch *watch, uint32_t epoll_events);
  * Accepts NULL. */
 void loop_watch_remove(struct loop_watch *watch);
 
-/* or restarts it */
+/* Starts a timer, or restarts it. */
 void loop_timer_start(struct loop *loop, struct loop_timer *timer, uint64_t delay_ns);
 void loop_timer_stop(struct loop *loop, struct loop_timer *timer);
 

@@ -287,7 +287,7 @@ static void reach_spheres(struct reach *reach, const struct scene_spheres *spher
 {
     const float *sphere = (const float *)(const void *)spheres->centres_radii->data, *m = reach->world_from_object;
     const struct direction *own = reach->own;
-    /* spheres stay spheres */
+    /* Mean scale, as spheres stay spheres. */
     const double scale = sqrt((double)(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]));
     for (uint32_t k = 0; reach->axis && k < spheres->sphere_count; k++) {
         double world[3];

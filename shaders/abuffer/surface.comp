@@ -9,7 +9,7 @@
 #include "abuffer/sample_primitive.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
-// three texels per hit; the first one is the intersection
+// Three texels per hit; the first one is the intersection.
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits;
 
 void main()

@@ -26,7 +26,7 @@ bool sphere_is_hit(bound_ray r, vec4 centre_radius, float t_min, float t_max)
     vec3 from_line = to_centre - closest * r.direction;
     float squared_half_chord = square(centre_radius.w + r.slack) - dot(from_line, from_line);
     float outside = max(closest - t_max, t_min - closest);
-    // negated so that NaN counts as a hit
+    // Negated so that NaN counts as a hit.
     return !(squared_half_chord < 0.0) &&
            !(outside > 0.0 && outside * outside > squared_half_chord * r.inverse_square) && t_min < t_max;
 }

@@ -217,7 +217,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], r
         precise float sum = w0 + w1 + w2, slope = dot(normal, d);
         bool inside_edges = (w0 >= 0.0 && w1 >= 0.0 && w2 >= 0.0) || (w0 <= 0.0 && w1 <= 0.0 && w2 <= 0.0);
         c.distance = above / slope;
-        // seen on edge, or without area: no hit
+        // Seen on edge, or without area: no hit.
         c.distance = inside_edges && sum != 0.0 && slope != 0.0 ? c.distance : -1.0;
 #ifdef ASK_MATERIALS
         c.barycentrics = vec2(w1, w2) / sum;

@@ -60,7 +60,7 @@ float emitter_importance(emitter_node node, vec3 position, vec3 normal)
     float squared = max(dot(to_middle, to_middle), 1e-30), radius_squared = square(node.centre_radius.w);
     to_middle *= inversesqrt(squared);
     bool inside = squared <= radius_squared;
-    // cosine of half the angle under which the node is seen
+    // Cosine of half the angle under which the node is seen.
     float seen = inside ? -1.0 : sqrt(1.0 - radius_squared / squared);
     float received = cosine_within(dot(normal, to_middle), seen) + EMITTER_COSINE_SLACK;
     float sent = cosine_within(cosine_within(abs(dot(unpack_unit(node.axis), to_middle)), node.cos_spread), seen);

@@ -105,7 +105,7 @@ bool settle(trace_ray r, cell_traversal w, float limit, inout ldc_found found)
             }
         }
     }
-    // moved forward, a ray that leaves a body would begin inside it once more
+    // Moved forward, a ray that leaves a body would begin inside it once more.
     bool stands_before = !is_hit && !own.from_behind;
     found.end = stands_before ? max(found.end - LDC_STANDS_BEFORE / w.scale, r.t_min) : found.end;
     return is_hit || !passes && w.is_within;

@@ -15,7 +15,7 @@
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer sample_surfaces;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer sample_primitives;
-// three texels per hit; the first one is the intersection
+// Three texels per hit; the first one is the intersection.
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits;
 
 hit surface_sampled(uint sample_index, float distance_, vec3 origin, vec3 direction)

@@ -11,7 +11,7 @@
 #include "quadtree/face.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
-// three texels per hit; the first one is the intersection
+// Three texels per hit; the first one is the intersection.
 layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer hits;
 layout(binding = UNIT_QUADTREE_VISIBLE) uniform usampler2DArray quadtree_visible;
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
@@ -56,7 +56,7 @@ bool is_within_reach(uint hidden, ivec2 texel)
     float growth = 1.0 / (quadtree.scale_centre.x * quadtree.bounds.w), w = plane_w(leaf(hidden, texel));
     vec2 towards = vec2(1.0, 0.0);
     for (int i = 0; i < DIRECTIONS && w > 0.0; i++) {
-        // turns by a fixed step: angles would take longer than the texels read along them
+        // Turns by a fixed step: angles would take longer than the texels read along them.
         towards = NEXT_DIRECTION * towards;
         if (is_seen_past(0u, texel, towards, w, growth) && (hidden < 2u || is_seen_past(1u, texel, towards, w, growth)))
             return true;

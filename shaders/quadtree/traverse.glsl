@@ -244,7 +244,7 @@ node_passage passage_of(layer_march march)
     p.skips_gaps = march.hits_alone && !is_undecided && !p.is_plane && box_has_gaps(p.node);
     vec2 range = p.skips_gaps ? box_range_of_surfaces(p.node) : box_range(p.node);
     vec2 of_ray = vec2(min(w_in, p.w_out), max(w_in, p.w_out));
-    // distance to a box; 0: in it
+    // Distance to a box; 0: in it.
     float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0;
     p.gap_in = p.is_plane ? w + growth * march.u - w_in : gap;
     p.gap_out = p.is_plane ? w + growth * p.u_out - p.w_out : gap;

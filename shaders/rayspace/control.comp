@@ -10,7 +10,7 @@ layout(std430, binding = BIND_RAYSPACE_STOPPED) buffer stopped_block { uint stop
 uniform uint last_from, last_to; // the stacks of the last pass
 uniform uint from, to;           // stacks of the next pass
 uniform uint capacity;         // pairs of a stack, and of the leaves
-// number of leaves that is worth a dispatch; 0: test all, 0xffffffff: none can be tested now
+// Number of leaves that is worth a dispatch; 0: test all, 0xffffffff: none can be tested now.
 uniform uint leaves_wanted;
 uniform uint limit_max;        // pairs of a pass
 // Places at the end of a stack that are kept for passes of one pair: one after another, these descend to the leaves in

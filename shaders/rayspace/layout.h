@@ -118,7 +118,7 @@ SHARED_SIZE(rayspace_counts, 48)
  * direction on the octahedron, one less. */
 #define RAYSPACE_DIRECTION_BITS 3u
 #define RAYSPACE_POSITION_BITS 4u
-/* maximum */
+/* Maximum of bins. */
 #define RAYSPACE_BINS (1u << (3u * RAYSPACE_POSITION_BITS + 2u * RAYSPACE_DIRECTION_BITS))
 #define RAYSPACE_BINS_MIN 256u
 

@@ -27,7 +27,7 @@ bool slabs_meet_box(bundle b, vec3 lower, vec3 upper)
     bvec3 forward = greaterThan(b.direction_lower, vec3(1e-6)), backward = lessThan(b.direction_upper, vec3(-1e-6));
     vec3 fast = mix(-b.direction_lower, b.direction_upper, forward);
     vec3 slow = mix(-b.direction_upper, b.direction_lower, forward);
-    // distance to the near side from the nearest origin, and to the far side from the farthest one
+    // Distance to the near side from the nearest origin, and to the far side from the farthest one.
     vec3 to_near = mix(b.origin_lower - upper, lower - b.origin_upper, forward);
     vec3 to_far = mix(b.origin_upper - lower, upper - b.origin_lower, forward);
     bvec3 one_way = bvec3(forward.x || backward.x, forward.y || backward.y, forward.z || backward.z);

@@ -24,7 +24,7 @@ void main()
     vec3 sum = vec3(0.0);
     uint count = 0u;
     for (uint i = 0u; i < EACH; i++) {
-        // divided in two steps: the product of both would overflow
+        // Divided in two steps: the product of both would overflow.
         uint first = uint(float(own * EACH + i) / float(64u * EACH) * float(steps));
         if (first + 1u >= ray_end)
             continue;

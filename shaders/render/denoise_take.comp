@@ -30,7 +30,7 @@ void main()
     if (second_count > 0.0)
         noise = (light_of_half(first_half[slot]) - mean) * sqrt(first_count / second_count);
     float depth = normal.w;
-    // fully covered: otherwise the background would be spread over the edge, too
+    // Fully covered: otherwise the background would be spread over the edge, too.
     bool there = depth > 0.0 && albedo.a <= 1.0;
     guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a + (count - noted) / count, 1.0), 0.0,
                     sqrt(luminance(albedo.rgb)));

@@ -64,7 +64,7 @@ void camera_ray_lens(vec2 view_place, vec2 on_lens, out vec3 origin, out vec3 di
     float focus = frame.lens.y;
     bool orthographic = frame.extent_near.w != 0.0;
     vec3 on_view = vec3(frame.lens.x * on_lens + (orthographic ? place : vec2(0.0)), 0.0);
-    // direction to the point in focus, up to distance 1 along the view
+    // Direction to the point in focus, up to distance 1 along the view.
     vec3 towards = vec3((orthographic ? vec2(0.0) : place) - frame.lens.x * on_lens / focus, -1.0);
     float stretch = length(towards);
     origin = eye_world() + world_from_view_vector(on_view);

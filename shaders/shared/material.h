@@ -26,7 +26,7 @@ struct material {
     uint texture_clearcoat, texture_clearcoat_roughness;
     uint texture_clearcoat_normal, texture_iridescence, texture_iridescence_thickness;
     float dispersion; /* 20 / Abbe number */
-    /* strength and index of the film; thickness, nm */
+    /* Strength and index of the film; thickness, nm. */
     float iridescence, iridescence_ior, iridescence_minimum, iridescence_maximum;
     float sheen_red, sheen_green, sheen_blue, sheen_roughness;
     uint texture_sheen, texture_sheen_roughness, texture_diffuse_transmission, texture_diffuse_transmission_colour;

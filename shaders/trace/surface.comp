@@ -12,7 +12,7 @@ layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels per ray
 #ifdef HAS_MOTION
 layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #endif
-// three texels per hit; the first one is the intersection
+// Three texels per hit; the first one is the intersection.
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits;
 
 bool is_triangle(candidate found)
@@ -42,7 +42,7 @@ void main()
         found.barycentrics =
             candidate_triangle(found.instance_index, found.primitive, origin, direction, time).barycentrics;
     hit h = surface_of(found, origin, direction, time);
-    // bits of a tracer over a view's visible surfaces, else 0
+    // Bits of a tracer over a view's visible surfaces, else 0.
     uint known = intersection.y & (HIT_UNKNOWN | HIT_LAYER_MASK);
     imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material | known, h.primitive, h.instance));
     imageStore(hits, int(3u * k + 1u), h.uv01_or_sample);

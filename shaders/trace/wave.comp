@@ -68,7 +68,7 @@ layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer intersecti
 #ifdef RAYS_GO_ON
 uniform uint is_first_part;
 #ifdef ANY_HIT
-// exact, as visibilities are rounded
+// Exact, as visibilities are rounded.
 layout(std430, binding = BIND_OPTICAL_DEPTHS) buffer depth_block { vec4 optical_depths[]; };
 #endif
 #endif

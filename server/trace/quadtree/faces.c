@@ -84,7 +84,7 @@ static unsigned beyond(const struct raster_camera *camera, const float world[3],
 {
     float v[3];
     view_of(v, camera, world);
-    /* slightly wider, for rounding */
+    /* Slightly wider, for rounding. */
     const float reach = (camera->orthographic ? 1.0f : -v[2]) * 1.0001f;
     unsigned sides = 0;
     for (int k = 0; k < 2; k++) {

@@ -20,7 +20,7 @@ struct quadtree_layers {
     struct gpu_framebuffer framebuffer;
     struct raster_span *spans; /* primitives that the face may see */
     uint32_t span_count, span_capacity;
-    /* the next primitive to draw */
+    /* The next primitive to draw. */
     struct raster_view drawing;
     uint32_t face, layer;
     bool begun; /* the pass has cleared its layers and bound its framebuffer */

@@ -64,7 +64,7 @@ static uint64_t stage_items(const struct quadtree_uniforms *uniforms, uint32_t s
     const uint32_t level = stage_level(uniforms, stage);
     return has_levels(uniforms) && stage + 1 == stage_count(uniforms)
                ? uniforms->faces
-               /* four leaves per invocation */
+               /* Four leaves per invocation. */
                : (uint64_t)(slice_texels(uniforms) >> 2 * (level > 0 ? level : 1)) * slices;
 }
 

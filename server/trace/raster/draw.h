@@ -38,7 +38,7 @@ struct axes_draw {
     uint32_t plain_along;         /* texels along a side of it; 0: not made yet */
     struct gpu_buffer drawn;      /* raster/layout.h */
     struct gpu_buffer commands;
-    /* contents of the last list */
+    /* Contents of the last list. */
     struct axes_run *runs;
     struct axes_command *listed; /* mirror of `commands` */
     uint32_t *instances;         /* listed instances, ascending */
@@ -63,7 +63,8 @@ bool axes_draw_bind_plain(struct axes_draw *draw, uint32_t along, struct error *
 /* A pass over the listed instances. */
 struct axes_pass {
     const char *fragment; /* a shader that reads the output of raster/draw.geom; NULL: depths only */
-    /* defines besides PRIMITIVE_KIND, HAS_CUTOUT and HAS_SPHERES, which follow from what is drawn; end with {0} */
+    /* Defines besides PRIMITIVE_KIND, HAS_CUTOUT and HAS_SPHERES, which follow from what is drawn; end with {0}.
+     */
     const struct gpu_define *defines;
     bool cutouts_ignored;             /* every primitive is drawn whole, without cutouts */
     float lower_world[3], cell_world; /* place of the cube */
@@ -71,7 +72,7 @@ struct axes_pass {
     uint32_t first_row, end_row;      /* rows of each image that are drawn; 0, 0: all */
     float overlap; /* a normal's component along an axis, as a share of its largest one, above which a triangle
                       is in that axis' image; not with ALL_IMAGES */
-    /* sets further uniforms of each program; may be NULL */
+    /* Sets further uniforms of each program; may be NULL. */
     void (*set)(const void *context, const struct gpu_program *program);
     const void *context;
 };

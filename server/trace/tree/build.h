@@ -116,8 +116,8 @@ struct bvh_tree {
     float *primitives; /* 4 x primitive_texels floats, see tree/layout.h; NULL: stored elsewhere */
     size_t primitive_texels;
     float lower[3], upper[3]; /* padded bounds of the tree */
-    /* surfaces of all elements' boxes over those of each primitive's own box, for deforming shapes. The wear of
-     * a refitted tree grows as its boxes come to overlap, and not where the whole shape grows */
+    /* Surfaces of all elements' boxes over those of each primitive's own box, for deforming shapes. The wear of
+     * a refitted tree grows as its boxes come to overlap, and not where the whole shape grows. */
     float wear;
     struct bvh_refit_plan plan; /* empty: the shape does not deform, or the tree cannot be refitted */
     struct bvh_draft *draft;    /* kept until the tree is written */
