@@ -32,6 +32,7 @@ AT_MOST = {
     "client/helper": (4, 0),
     "client/import": (13, 5),
     "client/lib": (17, 6),
+    "client/options": (23, 0),
     "client/output": (14, 3),
     "client/video": (25, 1),
     "client/viewer": (26, 2),
