@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Checks of single values against the rules of the table. */
 #include "protocol/check.h"
 
 #include <inttypes.h>
@@ -7,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Appends "parent.name[index]"; cut off where it does not fit. */
+/* Writes "parent.name[index]", cut off where it does not fit. */
 static void path_text(const struct path *path, char *out, size_t out_bytes)
 {
     if (path->parent) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Messages to payload bytes and back. Table-driven: nothing here knows a single message.
+/* The codec: messages to payload bytes and back. Driven by the table; no message is treated specially.
  *
  * Payload, little-endian, nothing aligned but bulk data:
  *   u16 struct_bytes   size of the fixed fields that follow (these 2 bytes not counted)
@@ -22,11 +22,11 @@
 extern "C" {
 #endif
 
-#define CODEC_CONTROL_PAYLOAD_MAX_BYTES 65536u         /* of a message without bulk data */
-#define CODEC_BULK_PAYLOAD_MAX_BYTES (262144u + 4096u) /* of a message with bulk data */
+#define CODEC_CONTROL_PAYLOAD_MAX_BYTES 65536u         /* limit for a message without bulk data */
+#define CODEC_BULK_PAYLOAD_MAX_BYTES (262144u + 4096u) /* limit for a message with bulk data */
 
-/* Where decoded strings and record arrays go: a bump allocator over the caller's buffer. A payload of n bytes
- * never takes more than 2 n + 8 bytes, hence SCRATCH_BYTES for any message. */
+/* Memory for decoded strings and record arrays: a bump allocator over the caller's buffer. A payload of n bytes
+ * needs at most 2 n + 8 bytes, hence SCRATCH_BYTES for any message. */
 #define SCRATCH_BYTES (2u * CODEC_CONTROL_PAYLOAD_MAX_BYTES + 8u)
 
 struct scratch {
@@ -36,7 +36,7 @@ struct scratch {
 };
 
 void scratch_init(struct scratch *scratch, void *data, size_t capacity_bytes);
-void scratch_reset(struct scratch *scratch); /* what was decoded into it is gone */
+void scratch_reset(struct scratch *scratch); /* invalidates everything that was decoded into it */
 
 /* Appends the payload of *message to the writer (which must be at a multiple of 8 from the start of the payload's
  * buffer only if the reader of that buffer wants bulk data aligned in memory). Checks every rule that the decoder

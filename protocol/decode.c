@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Decoding of payloads. */
 #include "protocol/codec.h"
 
 #include <inttypes.h>
@@ -8,7 +9,7 @@
 #include "protocol/reader.h"
 
 struct decoder {
-    struct reader reader; /* the whole payload */
+    struct reader reader; /* over the whole payload */
     struct scratch *scratch;
     struct decode_error *error;
 };
@@ -26,7 +27,7 @@ void scratch_reset(struct scratch *scratch)
     scratch->used_bytes = 0;
 }
 
-/* NULL: does not fit. */
+/* NULL: the scratch memory is exhausted. */
 static void *scratch_alloc(struct scratch *scratch, size_t bytes, size_t alignment)
 {
     size_t pad = 0;
@@ -47,7 +48,7 @@ static bool fail_truncated(struct decoder *decoder, const struct path *path, siz
     return check_fail(decoder->error, PROTOCOL_ERROR_PROTOCOL, path, "%zu bytes where %zu are left", wanted, left);
 }
 
-/* One fixed field out of `reader`, whose bytes are known to suffice. */
+/* Reads a fixed field; the caller has checked that `reader` has enough bytes. */
 static void read_fixed(struct reader *reader, const struct field_desc *field, char *place)
 {
     const uint8_t *bytes = reader_view(reader, (size_t)field->width_bytes * field->count);
@@ -73,7 +74,7 @@ static bool decode_fixed(struct decoder *decoder, struct reader *reader, const s
     return check_fixed(field, body + field->offset, parent, decoder->error);
 }
 
-/* The count before a counted field. */
+/* Reads the count before a counted field. */
 static bool decode_count(struct decoder *decoder, const struct field_desc *field, uint32_t *count,
                          const struct path *path)
 {
@@ -98,7 +99,7 @@ static bool decode_string(struct decoder *decoder, const struct field_desc *fiel
         return fail_truncated(decoder, path, count, left);
     }
     if (count == 0) {
-        return true; /* "" from the defaults */
+        return true; /* the default, an empty string */
     }
     if (!check_text(bytes, count, path, decoder->error)) {
         return false;
@@ -138,7 +139,7 @@ static bool decode_array(struct decoder *decoder, const struct field_desc *field
     if (count == 0) {
         return true;
     }
-    /* Nothing is reserved for elements that cannot have come. */
+    /* Memory is allocated only for elements that the remaining bytes can hold. */
     size_t left = reader_left(&decoder->reader);
     if (count > left / record->wire_min_bytes) {
         return check_fail(decoder->error, PROTOCOL_ERROR_PROTOCOL, path,
@@ -195,7 +196,7 @@ static bool decode_counted(struct decoder *decoder, const struct field_desc *fie
     }
 }
 
-/* The fixed part of a message: may be shorter than ours (an older peer) or longer (a newer one). */
+/* Decodes the fixed part, which is shorter than ours from an older peer and longer from a newer one. */
 static bool decode_fixed_part(struct decoder *decoder, const struct struct_desc *desc, char *body,
                               const struct path *root)
 {

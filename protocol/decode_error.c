@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Errors of decoding. */
 #include "protocol/decode_error.h"
 
 #include <stdarg.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The tables of the protocol, generated from words.def, tracers.def and messages.def. */
 #include "protocol/describe.h"
 
 #include <inttypes.h>
@@ -117,7 +118,7 @@ enum enum_index {
 #define BULK(field, max_bytes, field_doc)                                                                         \
     {.name = #field, .doc = field_doc, .kind = FIELD_BULK, .offset = offsetof(owner, field),                      \
      .count_offset = offsetof(owner, field##_bytes), .max = max_bytes},
-/* Of the fields of a message they stand in the member `settings`. */
+/* Settings lie in the member `settings` of the message that carries them. */
 #define SETTING(owned, field, field_doc)                                                                    \
     .name = #owned "_" #field, .doc = field_doc, .tracer = #owned,                  \
     .width_bytes = 4, .count = 1, .offset = offsetof(owner, settings.owned.field)
@@ -142,7 +143,7 @@ const struct struct_desc *(*const protocol_records[])(void) = {
 };
 const size_t protocol_record_count = LENGTH(protocol_records);
 
-/* The shortest payload of a type is that of the oldest peer: no fixed fields at all. */
+/* A payload from the oldest peer has no fixed fields at all, which is the shortest payload of a type. */
 const struct message_desc protocol_messages[] = {
 #define MESSAGE(NAME, name, number, from, doc)                                                                    \
     {{number, #name, MESSAGE_FROM_##from, 2 + wire_counted_message_##name,                                        \
@@ -273,7 +274,7 @@ void field_default(const struct field_desc *field, void *place)
     case FIELD_BYTES:
     case FIELD_ARRAY:
     case FIELD_BULK:
-        break; /* zero already */
+        break; /* memory is zero already */
     }
 }
 

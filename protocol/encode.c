@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Encoding of messages into payloads. */
 #include "protocol/codec.h"
 
 #include <inttypes.h>
@@ -8,7 +9,7 @@
 
 struct encoder {
     struct writer *writer;
-    size_t payload_start; /* position in the writer's buffer */
+    size_t payload_start; /* offset in the writer's buffer */
 };
 
 static bool encode_struct(struct encoder *encoder, const struct struct_desc *desc, const char *body,

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Headers of messages, and cutting a stream of bytes into messages. */
 #include "protocol/framing.h"
 
 #include <inttypes.h>
@@ -33,7 +34,7 @@ void framing_header_decode(struct framing_header *out, const uint8_t bytes[FRAMI
     out->channel = reader_u32(&reader);
 }
 
-/* Everything that can be said before the payload has come. */
+/* Checks everything that the header shows, before the payload has arrived. */
 static bool header_allowed(const struct framing_header *header, const struct message_info *info, uint32_t accept,
                            struct decode_error *error)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The handshake of an open connection. */
 #include "protocol/handshake.h"
 
 #include <stddef.h>
@@ -8,11 +9,11 @@
 #include "protocol/reader.h"
 #include "protocol/writer.h"
 
-#define LIMITS_MAX_BYTES 256u /* of a newer peer's */
+#define LIMITS_MAX_BYTES 256u /* room for a newer peer's limits */
 
 static const struct {
     const char *name, *what;
-    size_t offset; /* in struct handshake_limits */
+    size_t offset; /* offset in struct handshake_limits */
     unsigned bytes;
 } limits[] = {
 #define LIMIT(type, name, what)                                                                                   \
@@ -104,8 +105,8 @@ static enum handshake_result fatal(struct decode_error *error, const char *field
     return HANDSHAKE_FATAL;
 }
 
-/* A reader that has failed ran out of bytes, which is no fault of the peer as long as more may come. Every layout
- * is bounded by its length bytes, so more can never be needed than the stated maximum. */
+/* A reader that has failed ran out of bytes, which is no fault of the peer while more may arrive. Length bytes
+ * bound every layout, so the stated maximum always suffices. */
 static enum handshake_result get_magic(struct reader *reader, struct decode_error *error)
 {
     for (size_t i = 0; i < sizeof(magic) && i < reader->size_bytes; i++) {
@@ -116,7 +117,7 @@ static enum handshake_result get_magic(struct reader *reader, struct decode_erro
     return reader_skip(reader, sizeof(magic)) ? HANDSHAKE_CONSUMED : HANDSHAKE_NEED_MORE;
 }
 
-/* `out` holds max_bytes and the NUL. */
+/* `out` has space for max_bytes and the NUL. */
 static enum handshake_result get_text(struct reader *reader, char *out, size_t max_bytes, const char *field,
                                       struct decode_error *error)
 {
@@ -162,7 +163,7 @@ static enum handshake_result parse_hello(struct handshake_hello *out, struct rea
     return result == HANDSHAKE_CONSUMED ? get_padding(reader, error) : result;
 }
 
-/* Limits that the peer does not know stay 0. */
+/* Limits that an older peer does not send stay 0. */
 static void get_limits(struct handshake_limits *out, const uint8_t *bytes, size_t count)
 {
     struct reader reader;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Words of enumerations as text, and defaults of messages. */
 #include "protocol/messages.h"
 
 #include <ctype.h>
@@ -66,7 +67,7 @@ bool protocol_layers_parse(const char *text, unsigned *layers)
     return found;
 }
 
-/* The first of the words "x0", "x1", .. that a word is one of; itself, if it is one of none. */
+/* For a word of a series "x0", "x1", .. the index of its first word; else i. */
 static size_t series_start(const struct enum_desc *desc, size_t i)
 {
     const char *word = desc->values[i].text;
@@ -95,7 +96,7 @@ const char *protocol_enum_list(const char *enum_name, char *out, size_t out_byte
         int written = snprintf(out + used, out_bytes - used, "%s%.*s", i == 0 ? "" : ", ",
                                (int)(strlen(desc->values[i].text) - (begins ? 1 : 0)), desc->values[i].text);
         if (written < 0 || (size_t)written >= out_bytes - used) {
-            break; /* cut off, NUL-terminated */
+            break; /* cut off, but terminated */
         }
         used += (size_t)written;
     }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Text from outside, made harmless. */
 #include "protocol/plain_text.h"
 
 #include <string.h>
@@ -39,7 +40,7 @@ bool plain_text_allows(uint32_t code)
         {0x00, 0x1f},       /* C0 */
         {0x7f, 0x9f},       /* DEL and C1: some terminals take U+009B for ESC [ */
         {0x61c, 0x61c},     /* Arabic letter mark */
-        {0x200b, 0x200f},   /* without width; marks of direction */
+        {0x200b, 0x200f},   /* zero width; marks of direction */
         {0x2028, 0x202e},   /* separators of lines and paragraphs, embeddings, overrides */
         {0x2060, 0x206f},   /* invisible operators, isolates, deprecated format characters */
         {0xfeff, 0xfeff},   /* byte order mark */

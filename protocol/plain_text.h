@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Text from outside, made harmless for terminals and logs. */
 #ifndef FARLIGHT_PROTOCOL_PLAIN_TEXT_H
 #define FARLIGHT_PROTOCOL_PLAIN_TEXT_H
 
@@ -7,29 +8,29 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* Text from outside (names of peers, models and files), made harmless where a person reads it: on a terminal and
- * in a log. No state, any thread. */
+/* Texts from outside are the names of peers, models and files. The functions have no state; any thread. */
 
-/* The length in bytes of the UTF-8 character at `text`, of which `bytes` may be read, and its number; 0 if it is
- * none or zero. A terminated text may be given as UTF8_BYTES_MAX: nothing is read behind its end. */
+/* Reads the UTF-8 character at `text`, where `bytes` may be read: returns its length in bytes and sets *code; 0
+ * if the bytes are invalid or the character is zero. For a terminated text, UTF8_BYTES_MAX may be passed:
+ * nothing is read beyond its end. */
 size_t utf8_read(const void *text, size_t bytes, uint32_t *code);
 
-/* Whether the character shows itself and nothing else: no control character (C0, DEL, C1), no override, embedding,
- * isolate or mark of direction, no line or paragraph separator, and nothing without width that makes two names
- * look the same. */
+/* True for a character that shows itself and nothing else: no control character (C0, DEL, C1), no override,
+ * embedding, isolate or mark of direction, no separator of lines or paragraphs, and no zero-width character
+ * that makes two names look the same. */
 bool plain_text_allows(uint32_t code);
 
 #define UTF8_BYTES_MAX 4
 
-/* Moves *text, which does not end there, behind its next character and returns how many bytes of `shown` show it:
- * the character if it is plain; '?' if it is not, or is a byte that is no UTF-8. */
+/* Moves *text, which must not be at its end, past the next character, and writes its visible form to `shown`:
+ * the character if it is plain, else '?', also for bytes that are not UTF-8. Returns the length of that form. */
 size_t plain_text_next(const char **text, char shown[UTF8_BYTES_MAX]);
 
-/* Copies as much as fits in whole characters, as plain_text_next shows them. `out` may be `text`, as nothing
+/* Copies whole characters as plain_text_next shows them, as many as fit. `out` may be `text`, as nothing
  * becomes longer. Returns the length in bytes. */
 size_t plain_text_copy(char *out, size_t out_bytes, const char *text);
 
-/* Prints it likewise. */
+/* Prints text as plain_text_next shows it. */
 void plain_text_print(FILE *stream, const char *text);
 
 #endif

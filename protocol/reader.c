@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* A bounds-checked cursor over bytes from outside. */
 #include "protocol/reader.h"
 
 #include <string.h>

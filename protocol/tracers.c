@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Checks and defaults of the tracers' settings. */
 #include "protocol/tracers.h"
 
 #include "protocol/check.h"
@@ -15,7 +16,7 @@ const struct tracer_desc tracer_descs[] = {
 };
 const size_t tracer_desc_count = sizeof(tracer_descs) / sizeof(tracer_descs[0]);
 
-/* Whole numbers of which one is not above the other. */
+/* Pairs of whole numbers where `field` may not exceed `other`. */
 static const struct rule {
     const char *field, *other;
 } rules[] = {
@@ -44,7 +45,7 @@ static void *place_of(const struct tracer_settings *settings, const struct field
     return (char *)(uintptr_t)settings + (field->offset - offsetof(struct message_render, settings));
 }
 
-/* The name as it is typed: --ldc-form behind the prefix "--". */
+/* The name as it is typed: --ldc-form for the prefix "--". */
 static const char *named(const char *prefix, const char *name, char *out, size_t out_bytes)
 {
     snprintf(out, out_bytes, "%s%s", prefix, name);
@@ -75,7 +76,7 @@ static bool is_zero(const struct field_desc *field, const void *place)
     return field->kind == FIELD_REAL ? !(real > 0.0f || real < 0.0f) : field_load_int(field, place) == 0;
 }
 
-/* `settings` are resolved. */
+/* `settings` must be resolved. */
 static bool check_rule(const struct tracer_settings *settings, const struct rule *rule, const char *prefix,
                        struct setting_fault *fault)
 {

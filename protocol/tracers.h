@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What tracers.def says, as structs and functions for everybody: the server, which knows no messages below its
- * sessions, the client and the tests. */
+/* The tracers of tracers.def and their settings, as structs and functions for everybody: the client, the tests,
+ * and the server, which knows no messages below its sessions. */
 #ifndef FARLIGHT_PROTOCOL_TRACERS_H
 #define FARLIGHT_PROTOCOL_TRACERS_H
 
@@ -8,8 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* struct ldc_settings and its like. 32-bit words alone, so that two can be compared byte by byte; a choice has the
- * number of its value. All-zero is the default of each. */
+/* struct ldc_settings and the like have 32-bit members only, so that two can be compared byte by byte; a choice
+ * is the number of its value. All zero is the default of each. */
 /* clang-format off */
 #define SETTINGS(tracer) struct tracer##_settings {
 #define SETTINGS_END(tracer) };
@@ -19,13 +19,13 @@
 #define SETTING_CHOICE(tracer, field, choices, doc) uint32_t field;
 #include "protocol/tracers.def"
 
-/* Those of all tracers; a tracer looks at its own. */
+/* The settings of all tracers; a tracer reads its own. */
 struct tracer_settings {
 #define SETTINGS(tracer) struct tracer##_settings tracer;
 #include "protocol/tracers.def"
 };
 
-/* What the daemon allows, words likewise: <tracer>_mebibytes of device memory and counts; 0: no limit. */
+/* The daemon's limits, as 32-bit words too: <tracer>_mebibytes of device memory, and counts; 0: no limit. */
 struct tracer_limits {
 #define MEMORY_LIMIT(tracer, doc) uint32_t tracer##_mebibytes;
 #define TRACER_LIMIT(tracer, field, min, max, doc) uint32_t tracer##_##field;
@@ -37,7 +37,7 @@ struct tracer_desc {
     const char *name;
     uint32_t number;
     bool is_for_tests;
-    const char *needs; /* what a build may lack; "": nothing */
+    const char *needs; /* a dependency that a build may lack; "": none */
     const char *doc;
 };
 
@@ -50,16 +50,16 @@ extern const size_t tracer_desc_count;
 const struct tracer_desc *tracer_describe(uint32_t number); /* NULL: there is none */
 
 struct setting_fault {
-    char field[64];   /* behind the prefix: "options.ldc_form" */
-    char text[192];   /* what is wrong, with the value, and what is allowed */
+    char field[64];   /* with the prefix: "options.ldc_form" */
+    char text[192];   /* a sentence with the value and the allowed ones */
     char remedy[128]; /* may be empty */
 };
 
-/* Whether every setting is allowed, alone and beside the others. False: *fault says why not. Fields are named
- * `prefix` and their name, behind the prefix "--" as on the command line. */
+/* Checks every setting alone and against the others. False: *fault has the reason. Fields are named `prefix`
+ * and their name, with the prefix "--" as on the command line. */
 bool tracer_settings_check(const struct tracer_settings *settings, const char *prefix,
                            struct setting_fault *fault);
-/* Puts the defaults in the place of zeros that stand for them. */
+/* Replaces zeros that stand for defaults by the defaults. */
 void tracer_settings_resolve(struct tracer_settings *settings);
 
 #ifdef __cplusplus

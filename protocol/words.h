@@ -18,17 +18,18 @@ extern "C" {
 #include "protocol/words.def"
 /* clang-format on */
 
-/* Per enum: the value's text ("bvh"; "?" outside the enum), and back (false: no such text; *out untouched). */
+/* For each enum: the value's text ("bvh"; "?" outside the enum), and the value of a text (false: no such text;
+ * *out is unchanged). */
 #define ENUMERATION(PREFIX, name, doc)                                                                            \
     const char *protocol_##name##_text(enum protocol_##name value);                                               \
     bool protocol_##name##_parse(const char *text, enum protocol_##name *out);
 #include "protocol/words.def"
 
-/* Adds to a set of layers that of the text, or all that are the text and a digit. */
+/* Adds the layer `text` to a set, or all layers named `text` and a digit. */
 bool protocol_layers_parse(const char *text, unsigned *layers);
 
-/* For help texts and error messages: "bvh, naive" for the enum called "tracer"; "x" for the words "x0", "x1".
- * Writes at most out_bytes with the NUL, cut off if too long; empty for an unknown enum. Returns out. */
+/* Lists an enum's texts for help and errors: "bvh, naive" for the enum called "tracer"; "x" for the words "x0",
+ * "x1". Writes at most out_bytes with the NUL, cut off if too long; empty for an unknown enum. Returns out. */
 const char *protocol_enum_list(const char *enum_name, char *out, size_t out_bytes);
 
 #ifdef __cplusplus

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* A bounds-checked cursor that writes into a caller's buffer. */
 #include "protocol/writer.h"
 
 #include <string.h>
@@ -10,7 +11,7 @@ void writer_init(struct writer *writer, void *data, size_t capacity_bytes)
     writer->capacity_bytes = capacity_bytes;
 }
 
-/* Where the next `count` bytes go; NULL: failed. */
+/* Space for the next `count` bytes; NULL: there is none. */
 static uint8_t *reserve(struct writer *writer, size_t count)
 {
     if (writer->failed) {

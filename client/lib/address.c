@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Connecting a socket to the address of a daemon. */
 #include "lib/address.h"
 #include "lib/stream.h"
 #include "lib/text.h"
@@ -33,7 +34,7 @@ static int connect_by(int fd, const struct sockaddr *address, socklen_t address_
 
 static int refuse(const char *address, int failure, struct fl_error *error)
 {
-    /* What the address itself or the rights to it forbid stays so; a daemon may still come. */
+    /* An invalid address or missing rights do not change by themselves; a daemon may still start. */
     const bool is_final = failure == EACCES || failure == EPERM || failure == ENOTDIR || failure == ELOOP ||
                           failure == ENAMETOOLONG || failure == EPROTOTYPE || failure == EAFNOSUPPORT;
     if (failure > 0) {

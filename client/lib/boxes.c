@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Bounding boxes of a model's nodes, from the boxes of their meshes. */
 #include "lib/boxes.h"
 #include "lib/catalogue.h"
 #include "protocol/common/box.h"
@@ -8,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NODES_MAX (1u << 20) /* as many as the catalogue has */
+#define NODES_MAX (1u << 20) /* the catalogue's limit */
 #define DEPTH_MAX 256u       /* the daemon's limit */
 
 struct fl_box_node {
@@ -46,7 +47,7 @@ bool fl_boxes_add(struct fl_boxes *boxes, const struct message_import_bounds *bo
 
 /* ---- placing ---- */
 
-/* One array of nodes by number, for parents; the order of the file stays in the other. */
+/* Nodes sorted by number, for looking up parents; `boxes` keeps the order of the file. */
 static int by_node(const void *a, const void *b)
 {
     const struct fl_box_node *const *first = a, *const *second = b;

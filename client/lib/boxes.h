@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a model's geometry is: boxes of its objects, through its nodes, into the world. Does no I/O. The importer
- * is not trusted: nodes beyond those of the catalogue are left out, cycles have no place. */
+/* Bounding boxes of a model's nodes in world space, from the boxes of its meshes. Does no I/O. The importer is
+ * not trusted: nodes beyond the catalogue's limit are left out, and nodes in a cycle get no box. */
 #ifndef FARLIGHT_CLIENT_LIB_BOXES_H
 #define FARLIGHT_CLIENT_LIB_BOXES_H
 
@@ -18,7 +18,7 @@ struct fl_boxes {
 
 bool fl_boxes_add_node(struct fl_boxes *boxes, const struct message_set_node *node, struct fl_error *error);
 bool fl_boxes_add(struct fl_boxes *boxes, const struct message_import_bounds *bounds, struct fl_error *error);
-/* Sets the boxes of info->node_list, and that of all. The boxes are of no further use. */
+/* Sets the boxes of info->node_list and of the whole model, and uses up `boxes`. */
 bool fl_boxes_place(struct fl_boxes *boxes, struct fl_model_info *info, struct fl_error *error);
 void fl_boxes_finish(struct fl_boxes *boxes);
 

@@ -13,7 +13,7 @@
 #define BUFFER_BYTES 262144u
 #define CONNECT_NS 30000000000ull
 
-/* One direction. Descriptors may block: poll has said that they are ready. */
+/* A direction of the bridge. Its descriptors may block, so they are used only after poll. */
 struct direction {
     int from, to;
     bool to_is_socket;
@@ -45,7 +45,7 @@ static bool drain(struct direction *way, short revents, struct fl_error *error)
 {
     if (revents != 0 && way->end > way->start) {
         const size_t left = way->end - way->start;
-        /* A pipe that is ready takes at least PIPE_BUF without blocking. */
+        /* A pipe accepts at least PIPE_BUF without blocking once poll reports it. */
         const ssize_t put = way->to_is_socket
                                 ? send(way->to, way->data + way->start, left, MSG_NOSIGNAL | MSG_DONTWAIT)
                                 : write(way->to, way->data + way->start, left < 4096 ? left : 4096);

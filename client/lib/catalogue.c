@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The names of an import's objects, and looking them up. */
 #include "lib/catalogue.h"
 #include "lib/text.h"
 

@@ -16,8 +16,8 @@ enum fl_catalogue_list {
 
 struct fl_catalogue_entry {
     uint32_t id;
-    uint32_t name; /* where it begins in `text` */
-    bool has_size; /* of a light by itself: it is a rectangle or a sphere */
+    uint32_t name; /* offset of the name in `text` */
+    bool has_size; /* lights only: a rectangle or a sphere */
 };
 
 struct fl_catalogue {
@@ -31,24 +31,25 @@ struct fl_catalogue {
     struct fl_clip_info *clips;
     size_t clip_count, clip_capacity;
     uint32_t max_id[PROTOCOL_OBJECT_COUNT];
-    bool is_lit; /* it has a light or an environment */
+    bool is_lit; /* the import has a light or an environment */
 };
 
-/* Looks at one message of an importer's. */
+/* Records the names in a message of the importer's. */
 bool fl_catalogue_observe(struct fl_catalogue *catalogue, const struct message *message, struct fl_error *error);
 void fl_catalogue_finish(struct fl_catalogue *catalogue);
 
-/* As fl_scene_find_object() and fl_scene_find_clip(). */
+/* Implement fl_scene_find_object() and fl_scene_find_clip(). */
 bool fl_catalogue_find(const struct fl_catalogue *catalogue, enum protocol_object_kind kind, const char *which,
                        uint32_t *id, struct fl_error *error);
 bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *which, uint32_t *clip,
                             const struct fl_clip_info **info, struct fl_error *error);
-/* As fl_scene_light_has_size(). */
+/* Implements fl_scene_light_has_size(). */
 bool fl_catalogue_light_has_size(const struct fl_catalogue *catalogue, uint32_t light);
-/* As fl_scene_new_id(). */
+/* Implements fl_scene_new_id(). */
 uint32_t fl_catalogue_new_id(struct fl_catalogue *catalogue, enum protocol_object_kind kind);
 
-/* Lists names, as far as they fit: "it has 3 clips: 'Run', 'Survey', 'Walk'". */
+/* A list of names for an error's remedy, cut off where it does not fit: "it has 3 clips: 'Run', 'Survey',
+ * 'Walk'". */
 struct fl_listing {
     char text[sizeof((struct fl_error *)0)->remedy];
     size_t used, listed;

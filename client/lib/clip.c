@@ -27,7 +27,7 @@ static size_t numbers_per_key(const struct fl_channel *channel)
     return (size_t)channel->width * (has_handles ? 3 : 1);
 }
 
-/* One blob: of each channel its times, then its values. */
+/* Puts the numbers of all channels into one blob: the times of a channel, then its values. */
 static bool gather(struct clip *clip, const struct fl_channel *channels, size_t channel_count,
                    struct fl_error *error)
 {
@@ -55,7 +55,7 @@ static bool gather(struct clip *clip, const struct fl_channel *channels, size_t 
     return true;
 }
 
-/* All chunks of a blob carry one request, which is answered once. */
+/* Sends the blob in chunks under a single request, which gets a single answer. */
 static bool send_blob(const struct clip *clip, uint64_t deadline_ns, struct fl_error *error)
 {
     struct fl_connection *connection = clip->scene->connection;
@@ -92,7 +92,7 @@ static bool upload(const struct clip *clip, uint64_t deadline_ns, struct fl_erro
            (received.message.blob_need.needed_count == 0 || send_blob(clip, deadline_ns, error));
 }
 
-/* One edit of the transaction. */
+/* Sends one edit of the transaction. */
 static bool edit(const struct clip *clip, uint32_t request, const struct message *message, uint64_t deadline_ns,
                  struct fl_error *error)
 {
@@ -125,8 +125,7 @@ static bool send_channels(const struct clip *clip, uint32_t request, uint32_t id
     return true;
 }
 
-/* Remembers a clip that was added. If there is no memory for that, it stays in the scene even if that belongs to
- * others. */
+/* Records an added clip for removal. Without memory for it the clip stays, even in another client's scene. */
 static bool take_note(struct fl_scene *scene, uint32_t id, uint64_t revision)
 {
     if (revision > scene->revision)

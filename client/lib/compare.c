@@ -11,7 +11,7 @@
 
 #define DEFAULT_TIMEOUT_MS 600000u
 
-/* One comparison: the program lives as long as this. */
+/* A comparison and the program that makes it, which ends with it. */
 struct judge {
     struct fl_stream stream;
     struct fl_process process;
@@ -141,7 +141,7 @@ static void take(struct fl_comparison *to, const struct message_images_compared 
     to->picture_height = from->picture_height;
 }
 
-/* Impossible counts would give impossible shares and positions. */
+/* False for impossible counts, which would give impossible shares and positions. */
 static bool is_sound(const struct message_images_compared *answer)
 {
     const uint64_t pixels = (uint64_t)answer->width * answer->height;
@@ -204,7 +204,8 @@ bool fl_compare(const struct fl_compare_options *options, struct fl_comparison *
                                                                       : FL_THRESHOLD_DEFAULT};
     const bool done = start(&judge, error) && send_request(&judge, error) && receive(&judge, comparison, error);
     fl_stream_finish(&judge.stream);
-    /* It may be busy with a picture that is no longer wanted; on a signal it removes unfinished files. */
+    /* After a failure the program may be drawing a picture that is no longer needed; it removes unfinished
+     * files on a signal. */
     fl_process_end(&judge.process, done ? 5000 : 0);
     return done;
 }

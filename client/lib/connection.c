@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* A connection to a daemon: handshake, messages, silence, loss. */
 #include "lib/connection.h"
 #include "lib/address.h"
 
@@ -64,8 +65,8 @@ bool fl_error_from_message(struct fl_error *error, const struct message_error *m
                  message->text[0] != '\0' ? message->text : protocol_error_code_text(message->code));
     fl_error_remedy(error, "%s", message->remedy);
     error->server_code = message->code;
-    /* These codes speak of the daemon's state, which changes, or of which another daemon at its address is free.
-     */
+    /* These codes describe a state of the daemon that passes, or that another daemon at its address does not
+     * share. */
     error->retryable = message->retryable != 0 || message->code == PROTOCOL_ERROR_SHUTTING_DOWN ||
                        message->code == PROTOCOL_ERROR_DEVICE_LOST || message->code == PROTOCOL_ERROR_BUSY;
     error->retry_after_ms = message->retry_after_ms;
@@ -125,7 +126,7 @@ void fl_connection_send_late(struct fl_connection *connection, uint32_t request,
         fl_connection_break(connection, &error);
 }
 
-/* Two pings at least before the daemon counts as lost, and one in time for the daemon's own limit of silence. */
+/* At least two pings fit in before the daemon counts as lost, and one before the daemon's own limit of silence. */
 static uint64_t silence_ns(const struct fl_connection *connection)
 {
     const uint64_t third_ns = connection->lost_after_ns / 3;
@@ -138,21 +139,21 @@ static bool push_ping(struct fl_connection *connection, struct fl_error *error)
 {
     struct message ping = {.type = MESSAGE_PING};
     ping.ping.sent_ns = monotonic_now_ns();
-    /* Without room there is a message before it that the daemon has not taken. */
+    /* A full buffer holds a message that the daemon has not read yet, so a ping would add nothing. */
     return !fl_stream_has_room(&connection->stream) ||
            fl_stream_push(&connection->stream, PING_REQUEST, 0, &ping, error);
 }
 
-bool fl_connection_heed_silence(struct fl_connection *connection, struct fl_error *error)
+bool fl_connection_check_silence(struct fl_connection *connection, struct fl_error *error)
 {
     /* While our buffer is full we hear nothing, whatever was sent. */
     const bool heard = connection->stream.heard || (fl_stream_events(&connection->stream) & POLLIN) == 0;
-    if (connection->lost_after_ns == 0 || (!heard && monotonic_now_ns() < connection->look_ns))
+    if (connection->lost_after_ns == 0 || (!heard && monotonic_now_ns() < connection->check_ns))
         return true;
     connection->stream.heard = false;
     /* The daemon was not silent while nobody listened, as when this process was stopped. */
     connection->silent_ns = heard ? 0 : connection->silent_ns + silence_ns(connection);
-    connection->look_ns = monotonic_now_ns() + silence_ns(connection);
+    connection->check_ns = monotonic_now_ns() + silence_ns(connection);
     if (heard)
         return true;
     if (connection->silent_ns < connection->lost_after_ns)
@@ -165,17 +166,17 @@ bool fl_connection_heed_silence(struct fl_connection *connection, struct fl_erro
     return fl_connection_break(connection, error);
 }
 
-/* One round of poll and transfer. */
+/* Runs one round of poll and transfer. */
 static bool serve(struct fl_connection *connection, uint64_t deadline_ns, struct fl_error *error)
 {
     if (!fl_connection_push_late(connection, error))
         return false;
-    const uint64_t until_ns = connection->look_ns < deadline_ns ? connection->look_ns : deadline_ns;
+    const uint64_t until_ns = connection->check_ns < deadline_ns ? connection->check_ns : deadline_ns;
     struct pollfd polled = {.fd = connection->stream.fd, .events = fl_stream_events(&connection->stream)};
     const bool is_late = !fl_wait(&polled, 1, connection->interrupt_fd, until_ns, error);
     if ((is_late && error->code != FL_ERROR_TIMEOUT) || !fl_stream_transfer(&connection->stream, error))
         return fl_connection_break(connection, error);
-    if (!fl_connection_heed_silence(connection, error))
+    if (!fl_connection_check_silence(connection, error))
         return false;
     if (is_late && until_ns == deadline_ns)
         return fl_connection_break(connection, error);
@@ -338,7 +339,7 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
 
 /* ---- beginning and end ---- */
 
-static bool tell_key_needed(const struct fl_connection *connection, struct fl_error *error)
+static bool report_key_needed(const struct fl_connection *connection, struct fl_error *error)
 {
     fl_error_set(error, FL_ERROR_REFUSED, connection->address, "the daemon accepts only clients with its key");
     error->server_code = PROTOCOL_ERROR_DENIED;
@@ -357,9 +358,9 @@ static bool read_key(struct sealed_key *key, const char *key_file, struct fl_err
                    : "a key file has 32 bytes; 'farlight key FILE' creates one");
 }
 
-/* Shows the first line of what came, which says who has answered. */
-static void tell_other_server(const struct fl_connection *connection, const struct decode_error *why,
-                              struct fl_error *error)
+/* Reports the first line of the peer's bytes, which shows what kind of server answered. */
+static void report_other_server(const struct fl_connection *connection, const struct decode_error *why,
+                                struct fl_error *error)
 {
     const struct fl_stream *stream = &connection->stream;
     char came[61], shown[sizeof(came)];
@@ -403,13 +404,13 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
         const enum handshake_result result = handshake_reply_parse(
             &reply, stream->in + stream->in_start, stream->in_end - stream->in_start, &consumed, &why);
         if (result == HANDSHAKE_FATAL) {
-            tell_other_server(connection, &why, error);
+            report_other_server(connection, &why, error);
             return false;
         }
         if (result == HANDSHAKE_CONSUMED) {
             stream->in_start += consumed;
             if (reply.version == 0 && (reply.capabilities & HANDSHAKE_NEEDS_KEY) != 0)
-                return tell_key_needed(connection, error);
+                return report_key_needed(connection, error);
             if (fl_stream_is_turned_away(&reply, error)) {
                 snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
                          connection->address);
@@ -435,7 +436,7 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
     const char *path = where[host_bytes] == ':' ? where + host_bytes + 1 : DEFAULT_REMOTE_SOCKET;
     if (host_bytes == 0 || host_bytes >= sizeof(host) || where[0] == '-' || *path == '\0')
         return fl_error_set(error, FL_ERROR_ARGUMENT, connection->address, "is not ssh:HOST[:SOCKET]");
-    /* ssh passes its words to a shell on the remote host. */
+    /* ssh passes its arguments to a shell on the remote host. */
     const char *harmless = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+@%,=";
     if (path[strspn(path, harmless)] != '\0' ||
         snprintf(socket_address, sizeof(socket_address), "unix:%s", path) >= (int)sizeof(socket_address))
@@ -444,7 +445,7 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
             "the socket's path has characters with a meaning for the shell; use letters, digits and /._-+@%%,=");
     snprintf(host, sizeof(host), "%.*s", (int)host_bytes, where);
     const char *const arguments[] = {"-T", "--", host, "farlight", "bridge", socket_address, NULL};
-    connection->process.keeps_environment = true; /* its agent's among them */
+    connection->process.keeps_environment = true; /* an ssh agent needs its variables */
     return fl_process_start(&connection->process, "ssh", FL_WIRING_STANDARD, arguments, fd, error);
 }
 
@@ -500,7 +501,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     connection->interrupt_fd = options->interrupt_fd;
     connection->can_h264 = options->can_h264;
     connection->last_channel = FL_UPLOAD_CHANNEL;
-    connection->look_ns = UINT64_MAX;
+    connection->check_ns = UINT64_MAX;
     snprintf(connection->address, sizeof(connection->address), "%s",
              options->server ? options->server : "private");
     if (!open_link(connection, options, deadline_ns, error) ||
@@ -515,7 +516,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     }
     connection->lost_after_ns =
         (options->lost_after_ms > 0 ? options->lost_after_ms : DEFAULT_LOST_AFTER_MS) * UINT64_C(1000000);
-    connection->look_ns = monotonic_now_ns() + silence_ns(connection);
+    connection->check_ns = monotonic_now_ns() + silence_ns(connection);
     connection->start_ns = monotonic_now_ns() - begin_ns;
     return connection;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Inside of a connection, for the files of this folder. */
+/* The inside of a connection, for the files of this folder. */
 #ifndef FARLIGHT_CLIENT_LIB_CONNECTION_H
 #define FARLIGHT_CLIENT_LIB_CONNECTION_H
 
@@ -7,7 +7,7 @@
 #include "lib/stream.h"
 #include "protocol/handshake.h"
 
-/* The channel of blob data; jobs have those above. */
+/* Channel of blob data; jobs use the channels above it. */
 #define FL_UPLOAD_CHANNEL 1u
 
 /* A message without texts or arrays that did not fit into the buffer. */
@@ -34,17 +34,17 @@ struct fl_connection {
     int interrupt_fd;
     uint32_t last_request, last_scene, last_channel;
     uint64_t upload_credit;           /* the daemon's total for the upload channel */
-    uint64_t upload_sent;             /* bytes of blob data sent on it so far */
+    uint64_t upload_sent;             /* bytes of blob data sent so far */
     struct fl_receiver *receivers;    /* not owned */
-    bool has_job, has_view;           /* one of each may run */
-    struct fl_late *late, **late_end; /* owned: sent before everything else as soon as the buffer has space */
-    bool read_only;                   /* the daemon lets it change nothing */
-    bool can_h264;                    /* this client and the daemon */
+    bool has_job, has_view;           /* a connection runs at most one of each */
+    struct fl_late *late, **late_end; /* owned; sent first as soon as the buffer has space */
+    bool read_only;                   /* the daemon rejects this client's edits */
+    bool can_h264;                    /* true if this client and the daemon both can */
     struct fl_error broken;           /* why the connection is broken; code NONE: it works */
     struct message_stats_reply stats; /* the last answer */
-    uint64_t lost_after_ns;           /* of silence; 0: messages may not be sent yet */
-    uint64_t silent_ns;               /* counted while we listen, at most a part of it at a time */
-    uint64_t look_ns;                 /* when the next part of silence is over; UINT64_MAX: none is counted yet */
+    uint64_t lost_after_ns;           /* maximum silence of the daemon; 0: the handshake is not finished */
+    uint64_t silent_ns; /* the silence so far, counted only while the client listens, a limited share at a time */
+    uint64_t check_ns;  /* end of the current share of silence; UINT64_MAX: none is being counted */
     uint64_t start_ns;
     bool local;
     bool said_goodbye;
@@ -57,8 +57,8 @@ struct fl_received {
     struct message message;
 };
 
-/* Marks the connection as unusable, for reasons of the stream or the peer; adds what is known about a private
- * daemon's end. Returns false. */
+/* Marks the connection as unusable, for a fault of the stream or the peer, and adds the last output of a
+ * private daemon to the error. Returns false. */
 bool fl_connection_break(struct fl_connection *connection, struct fl_error *error);
 /* False, with the reason, if the connection is broken. */
 bool fl_connection_check(const struct fl_connection *connection, struct fl_error *error);
@@ -67,45 +67,45 @@ uint32_t fl_connection_next_request(struct fl_connection *connection);
 /* Sends one message and waits until the kernel has it. */
 bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
                         const struct message *message, struct fl_error *error);
-/* For messages that release something, which cannot be retried: sent now, or as soon as the buffer has space. The
- * message has no texts and no arrays. If there is no memory for it, the connection is marked as broken, as its end
- * releases everything. */
+/* Queues a message that releases something and so must not fail: it is sent now, or as soon as the buffer has
+ * space. The message has no texts and no arrays. Without memory for it the connection is marked as broken,
+ * since its end releases everything. */
 void fl_connection_send_late(struct fl_connection *connection, uint32_t request, const struct message *message);
 /* Moves delayed messages to the stream as far as they fit. False: the connection is broken. */
 bool fl_connection_push_late(struct fl_connection *connection, struct fl_error *error);
-/* Until it is removed, the receiver is offered what is not for the connection itself. */
+/* Register and remove a receiver, which is offered messages that are not for the connection itself. */
 void fl_connection_add(struct fl_connection *connection, struct fl_receiver *receiver);
 void fl_connection_remove(struct fl_connection *connection, struct fl_receiver *receiver);
 /* Handles messages for the connection itself (ping, credit for uploads, blocked, goodbye, an error of request 0)
- * or a receiver: 1: handled; 0: it is for the caller; -1: the connection is broken, *error says why. */
+ * or a receiver. 1: handled; 0: the message is the caller's; -1: the connection is broken, and *error says why. */
 int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error);
 enum fl_step {
-    FL_STEP_MESSAGE, /* for the caller */
-    FL_STEP_SERVED,  /* bytes came or went, or a message was for the connection or a receiver */
+    FL_STEP_MESSAGE, /* the message is the caller's */
+    FL_STEP_SERVED,  /* bytes moved, or a message was for the connection or a receiver */
     FL_STEP_FAILED
 };
-/* One message, or one round of waiting if there is none. */
+/* Returns a message if one has arrived, else runs one round of waiting. */
 enum fl_step fl_connection_step(struct fl_connection *connection, struct fl_received *received,
                                 uint64_t deadline_ns, struct fl_error *error);
-/* The next message that is for the caller. */
+/* Waits for the next message that is the caller's. */
 bool fl_connection_receive(struct fl_connection *connection, struct fl_received *received, uint64_t deadline_ns,
                            struct fl_error *error);
 /* Serves the connection until the daemon lets `total` bytes in all be uploaded and a message fits into the buffer.
  * An ERROR that answers `request` is FL_ERROR_REFUSED; other messages are dropped. */
 bool fl_connection_wait_upload(struct fl_connection *connection, uint32_t request, uint64_t total,
                                uint64_t deadline_ns, struct fl_error *error);
-/* The answer to `request`; other messages are dropped. An ERROR is FL_ERROR_REFUSED. */
+/* Waits for the answer to `request`; other messages are dropped. An ERROR is FL_ERROR_REFUSED. */
 bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
                           struct fl_received *received, uint64_t deadline_ns, struct fl_error *error);
-/* Sends a question of one message and waits for its answer, for half a minute. */
+/* Sends a one-message request and waits for its answer, for half a minute. */
 bool fl_connection_ask(struct fl_connection *connection, const struct message *question,
                        enum message_type expected, struct fl_received *received, struct fl_error *error);
-/* Ends a round of waiting, which lasts until connection->look_ns at most: pings a daemon that was not heard for a
- * while, which also keeps the daemon from disconnecting us for our silence. False: nothing was heard from it for
+/* Ends a round of waiting, which lasts until connection->check_ns at most: pings a silent daemon, which also
+ * keeps the daemon from disconnecting this client for its silence. False: the daemon was silent for
  * lost_after_ns, and the connection is broken. */
-bool fl_connection_heed_silence(struct fl_connection *connection, struct fl_error *error);
-/* The daemon's error as ours; returns false. */
+bool fl_connection_check_silence(struct fl_connection *connection, struct fl_error *error);
+/* Converts the daemon's error; returns false. */
 bool fl_error_from_message(struct fl_error *error, const struct message_error *message);
 
 #endif

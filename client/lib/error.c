@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Errors of the library. */
 #include "lib/farlight.h"
 
 #include <stdarg.h>

@@ -12,10 +12,10 @@ struct fl_exporter {
     struct fl_helper helper;
     bool waiting; /* the answer to the last request has not arrived */
     char model[4096];
-    char path[160]; /* of the request, or its end */
+    char path[160]; /* path of the requested file, or the end of a long one */
 };
 
-/* The program's first answer. */
+/* Checks the program's first answer, about the colours that it can write. */
 static bool has_colours(struct fl_exporter *exporter, const struct fl_exporter_options *options,
                         struct fl_error *error)
 {

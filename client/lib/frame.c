@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Assembling a frame from a daemon's messages, and checking each of them. */
 #include "lib/frame.h"
 #include "lib/frame_decode.h"
 #include "lib/stream.h"
@@ -11,14 +12,14 @@
 
 /* The size of a JPEG beyond the worst case of its pixels: tables and markers. */
 #define JPEG_EXTRA_BYTES 65536u
-#define H264_EXTRA_BYTES 65536u /* likewise */
+#define H264_EXTRA_BYTES 65536u /* tables and markers, as of a JPEG */
 #define ATTACHMENT_PIXEL_BYTES 4u
 
 /* Bytes of all layers together; 0: more than a size_t holds. */
 static size_t pixels_bytes_of(const struct message_frame_begin *begin)
 {
     const uint64_t layers =
-        (uint64_t)__builtin_popcount(begin->layers); /* at most 31, of 8192 x 8192 x 16 bytes */
+        (uint64_t)__builtin_popcount(begin->layers); /* at most 31 layers of 8192 x 8192 x 16 bytes */
     const uint64_t bytes = layers * begin->width * begin->height * fl_bytes_per_pixel(begin->format);
     return bytes <= SIZE_MAX ? (size_t)bytes : 0;
 }
@@ -65,7 +66,7 @@ static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_
     }
 }
 
-/* Whether the sizes of attachments match the flags; `maximum` is that of the largest. */
+/* True if the sizes of attachments match the flags; `maximum` is the size of the largest. */
 static bool check_attachments(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
                               struct fl_error *error)
 {
@@ -145,7 +146,7 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
     return check_attachments(assembly, begin, error);
 }
 
-/* The caller decodes it. */
+/* True for frames that the caller decodes. */
 static bool stays_encoded(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
 {
     return begin->encoding == PROTOCOL_ENCODING_H264 ||
@@ -225,12 +226,12 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
     return true;
 }
 
-bool fl_assembly_parts(struct fl_assembly *assembly, const struct message_frame_parts *told,
+bool fl_assembly_parts(struct fl_assembly *assembly, const struct message_frame_parts *announced,
                        struct fl_error *error)
 {
     if (!assembly->frame || !assembly->expected.parts)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_parts", "parts of a frame arrived unasked");
-    if (!fl_parts_tell(&assembly->parts, &assembly->begin, told, error))
+    if (!fl_parts_set(&assembly->parts, &assembly->begin, announced, error))
         return false;
     const uint64_t bytes = fl_parts_sum(&assembly->parts);
     uint8_t *encoded =
@@ -239,7 +240,7 @@ bool fl_assembly_parts(struct fl_assembly *assembly, const struct message_frame_
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     assembly->encoded = encoded;
     assembly->encoded_bytes = bytes;
-    assembly->frame->parts = told->parts_count;
+    assembly->frame->parts = announced->parts_count;
     return true;
 }
 
@@ -258,7 +259,7 @@ bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_d
     return true;
 }
 
-/* NULL for no bytes, too. */
+/* Copies into malloc'ed memory; NULL also for no bytes. */
 static void *copy(const void *data, size_t bytes)
 {
     void *made = bytes > 0 ? malloc(bytes) : NULL;
@@ -312,7 +313,7 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     return true;
 }
 
-/* What has come so far. */
+/* Decodes the parts that have arrived. */
 static bool decode(const struct fl_assembly *assembly, struct fl_frame *frame, struct fl_error *error)
 {
     const uint64_t begin_ns = monotonic_now_ns();
@@ -326,9 +327,9 @@ static bool decode(const struct fl_assembly *assembly, struct fl_frame *frame, s
                                        .coarse_depth = coarse_depth,
                                        .sticking =
                                            coarse_depth + parts->bytes.of[PROTOCOL_FRAME_PART_COARSE_DEPTH],
-                                       .come = fl_parts_come(parts),
+                                       .come = fl_parts_received(parts),
                                        .all = parts->bytes};
-    frame->parts_come = parts->told ? parts->come : 1;
+    frame->parts_come = parts->in_parts ? parts->come : 1;
     frame->wire_bytes = assembly->received_bytes;
     frame->depth_bytes =
         encoded.come.of[PROTOCOL_FRAME_PART_DEPTH] + encoded.come.of[PROTOCOL_FRAME_PART_COARSE_DEPTH];
@@ -341,7 +342,7 @@ static bool decode(const struct fl_assembly *assembly, struct fl_frame *frame, s
 
 bool fl_assembly_has_first_parts(const struct fl_assembly *assembly)
 {
-    return assembly->frame && assembly->frame->pixels && assembly->parts.told &&
+    return assembly->frame && assembly->frame->pixels && assembly->parts.in_parts &&
            assembly->parts.come < assembly->parts.count && fl_parts_are_enough(&assembly->parts);
 }
 

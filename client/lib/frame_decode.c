@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Decoding of a frame's colours, depth, normals and marks of sticking. */
 #include "lib/frame_decode.h"
 
 #include "lib/sticking.h"
@@ -70,7 +71,7 @@ static bool decode_whole_jpeg(struct fl_frame *frame, const uint8_t *jpeg, size_
         fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "a JPEG of %dx%d arrived, but %ux%u was expected", width,
                      height, frame->width, frame->height);
     } else {
-        /* Of scans, each of which takes time for all pixels, a hostile one may have any number. */
+        /* A hostile JPEG may have any number of scans, each of which costs time for all pixels. */
         good = good && tjDecompress2(decoder, jpeg, (unsigned long)bytes, frame->pixels, width, 0, height,
                                      TJPF_RGBA, TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS) == 0;
         if (!good)
@@ -81,7 +82,7 @@ static bool decode_whole_jpeg(struct fl_frame *frame, const uint8_t *jpeg, size_
     return good;
 }
 
-/* Its first scans are a JPEG, but for the end that they lack. */
+/* Decodes the first scans of a progressive JPEG, which lack only the end marker. */
 static bool decode_jpeg(struct fl_frame *frame, const struct fl_encoded *encoded, struct fl_error *error)
 {
     static const uint8_t end_of_image[] = {0xff, 0xd9};
@@ -119,7 +120,7 @@ static bool decode_pixels(struct fl_frame *frame, const struct fl_encoded *encod
 
 /* ---- what is attached ---- */
 
-/* malloc'ed; NULL on failure. */
+/* The result is malloc'ed; NULL on failure. */
 static void *decode_attachment(const struct fl_frame *frame, const uint8_t *encoded, uint64_t bytes,
                                uint32_t pixel_bytes, struct fl_error *error)
 {
@@ -133,7 +134,7 @@ static void *decode_attachment(const struct fl_frame *frame, const uint8_t *enco
     return NULL;
 }
 
-/* malloc'ed, *off steps off at most; NULL on failure. */
+/* The result is malloc'ed, with an error of at most *off steps; NULL on failure. */
 static uint16_t *decode_coarse_depth(const struct fl_frame *frame, const struct fl_encoded *encoded, uint16_t *off,
                                      struct fl_error *error)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Cutting a part out of a frame. */
 #include "lib/frame_part.h"
 
 #include "protocol/messages.h"

@@ -5,14 +5,15 @@
 
 #include "lib/farlight.h"
 
-/* In pixels from the frame's top left; `eye`: how far its eye is from the frame's, along its right and up. */
+/* A rectangle in pixels from the frame's top left; `eye` is the offset of its eye from the frame's, along right
+ * and up. */
 struct fl_frame_part {
     uint32_t x, y, width, height;
     float eye[2];
 };
 
-/* What describes a frame, for one of another size: without pixels, times, comparisons, structure and attachments,
- * which are `frame`'s. */
+/* Copies the description of a frame to one of another size, without pixels, times, comparisons, structure and
+ * attachments, which stay `frame`'s. */
 void fl_frame_alike(struct fl_frame *to, const struct fl_frame *frame, uint32_t width, uint32_t height);
 /* A copy of a part of all layers of a decoded frame, without times, comparisons, structure and attachments. NULL:
  * there is no such part, or no memory. */

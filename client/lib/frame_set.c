@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Ranges of frames: shards, chunks and missing frames. */
 #include "lib/frame_set.h"
 #include "lib/text.h"
 
@@ -47,7 +48,7 @@ bool fl_frame_run_shard(const struct fl_frame_run *range, uint32_t part, uint32_
     const uint64_t step = (uint64_t)range->step * parts;
     run->first = range->first + (uint32_t)(begin * range->step);
     run->last = range->first + (uint32_t)(last * range->step);
-    /* One frame needs no step, and the step of several lies within the range. */
+    /* A single frame needs no step, and the step between several lies within the range. */
     run->step = run->first == run->last ? 1 : (uint32_t)step;
     return true;
 }
@@ -60,7 +61,7 @@ bool fl_frame_run_chunk(const struct fl_frame_run *range, uint32_t part, uint32_
         return false;
     run->first = range->first + (uint32_t)(begin * range->step);
     run->last = range->first + (uint32_t)((end - 1) * range->step);
-    run->step = run->first == run->last ? 1 : range->step; /* as of a shard */
+    run->step = run->first == run->last ? 1 : range->step; /* the step as in fl_frame_run_shard */
     return true;
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Talking to a helper program that receives frames. */
 #include "lib/helper.h"
 #include "protocol/common/clock.h"
 

@@ -12,8 +12,8 @@ struct fl_helper {
     const char *program; /* "farlight-export" */
     const char *what;    /* "the image writer" */
     int interrupt_fd;    /* 0: nothing interrupts */
-    uint64_t answer_ns;  /* so long it may be silent; 0: 5 minutes */
-    uint32_t request;    /* of what is sent */
+    uint64_t answer_ns;  /* maximum time without an answer; 0: 5 minutes */
+    uint32_t request;    /* number of the current request */
     bool lost;           /* the program has ended */
 };
 
@@ -27,14 +27,14 @@ void fl_helper_finish(struct fl_helper *helper);
 bool fl_helper_send(struct fl_helper *helper, const struct message *message, struct fl_error *error);
 /* The same for a whole frame, raw. */
 bool fl_helper_send_frame(struct fl_helper *helper, const struct fl_frame *frame, struct fl_error *error);
-/* Waits until the kernel has everything: the program must get it while we do other things. */
+/* Waits until the kernel has everything, so that the program can work while the caller continues. */
 bool fl_helper_flush(struct fl_helper *helper, struct fl_error *error);
 /* The next answer to the current request, if it has arrived. */
 enum fl_stream_result fl_helper_poll(struct fl_helper *helper, struct message *message, struct fl_error *error);
 /* Waits for the next answer to the current request. */
 bool fl_helper_receive(struct fl_helper *helper, struct message *message, struct fl_error *error);
 
-/* The path, or the end of a long one: names the file at fault. */
+/* Copies the path, or the end of a long one, for errors that name a file. */
 void fl_shorten_path(const char *path, char *out, size_t out_bytes);
 
 #endif

@@ -49,7 +49,7 @@ static uint64_t little_endian(const uint8_t *at, unsigned count)
     return value;
 }
 
-/* Whether the file ends with these bytes. */
+/* True if the file ends with these bytes. */
 static bool ends_with(const struct head *head, const void *bytes, size_t count)
 {
     uint8_t tail[16];
@@ -96,8 +96,8 @@ static bool jpeg_size(const struct head *head, uint32_t *width, uint32_t *height
 struct exr_header {
     bool has_window, has_compression;
     uint32_t width, height;
-    uint32_t lines; /* in a chunk */
-    size_t end;     /* where the table of chunks begins */
+    uint32_t lines; /* lines of a chunk */
+    size_t end;     /* offset of the table of chunks */
 };
 
 static bool exr_window(const uint8_t *value, struct exr_header *header)
@@ -180,7 +180,7 @@ static bool hdr_size(const struct head *head, uint32_t *width, uint32_t *height)
     return sscanf(line, "-Y %9u +X %9u", height, width) == 2;
 }
 
-/* A container that says how long it is; its first chunk is one of three. */
+/* The RIFF container holds its length; its first chunk is one of three. */
 static bool webp_size(const struct head *head, uint32_t *width, uint32_t *height)
 {
     const uint8_t *bytes = head->bytes, *chunk = bytes + 12;

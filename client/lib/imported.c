@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* A hash table of digests of imported objects. */
 #include "lib/imported.h"
 
 #include <stdlib.h>
@@ -53,7 +54,7 @@ static bool object_of(const struct message *message, struct fl_imported_object *
         object->kind = PROTOCOL_OBJECT_CHANNEL;
         object->id = message->set_channel.channel;
         return true;
-    case MESSAGE_SET_ENVIRONMENT: /* it has no identifier, as there is one */
+    case MESSAGE_SET_ENVIRONMENT: /* a scene has a single environment, without an identifier */
         object->kind = PROTOCOL_OBJECT_ENVIRONMENT;
         return true;
     default:

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The client's side of the importer program. */
 #include "lib/importer.h"
 #include "protocol/common/clock.h"
 
@@ -13,7 +14,7 @@
 #define DEFAULT_TIMEOUT_MS 600000u
 /* Further cameras cannot be chosen by name; this bounds the work that a hostile model can cause. */
 #define CAMERAS_MAX 4096u
-/* Likewise of files that a model names. */
+/* Bounds the files that a hostile model can name. */
 #define FILES_MAX 65536u
 
 bool fl_importer_check_file(const char *path, struct fl_error *error)
@@ -30,7 +31,7 @@ bool fl_importer_check_file(const char *path, struct fl_error *error)
 
 #define ARGUMENTS_MAX (16 + 4 * FL_MODELS_MAX)
 
-/* The program's words; those that are made here are freed with it. */
+/* Arguments of the program; `made` ones are freed with it. */
 struct command {
     const char *words[ARGUMENTS_MAX];
     size_t count;
@@ -65,7 +66,7 @@ static bool is_input(const struct fl_load_options *options, const char *path)
     return options->input_fd > 0 && strcmp(path, "-") == 0;
 }
 
-/* A name may begin with '-'. */
+/* Adds a model's arguments; a path may begin with '-'. */
 static bool add_model(struct command *command, const struct fl_load_options *options, const struct fl_model *model,
                       struct fl_error *error)
 {
@@ -132,7 +133,7 @@ static bool take_model(struct fl_importer *importer, const struct fl_model *mode
            (fl_importer_check_file(model->path, error) && remember_file(importer, NULL, model->path, error));
 }
 
-/* One model is the only one of several. */
+/* Treats a single model as the only one of several. */
 static bool take_models(struct fl_importer *importer, struct fl_error *error)
 {
     struct fl_load_options *options = &importer->options;
@@ -157,7 +158,7 @@ static bool start(struct fl_importer *importer, struct fl_error *error)
 {
     struct command command = {.count = 0};
     int fd = -1;
-    /* The program reads the bytes from their begin, each time. */
+    /* The program reads the input from its beginning on every start. */
     importer->process.input_fd = importer->options.input_fd;
     importer->process.has_large_arrays = true;
     if (importer->process.input_fd > 0)

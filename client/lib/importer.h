@@ -18,27 +18,27 @@ struct fl_importer {
     struct fl_stream stream;
     struct fl_process process;
     struct fl_load_options options; /* `model` is one of `models` here */
-    struct fl_model only;           /* which it is then */
+    struct fl_model only;           /* storage of a single model in `models` */
     uint64_t begin_ns, deadline_ns;
-    bool done; /* it has said that all is well */
+    bool done; /* the importer has reported success */
     struct fl_import_stats stats;
     struct fl_camera_info *cameras;
-    uint32_t *camera_objects; /* beside `cameras` */
+    uint32_t *camera_objects; /* parallel to `cameras` */
     size_t camera_count, camera_capacity;
     struct fl_camera_object *objects;
     size_t object_count, object_capacity;
     struct fl_catalogue catalogue;
     char **files; /* paths: what the options name, then what the models name */
     size_t file_count, file_capacity;
-    struct fl_error complaint; /* of its last note of severity error */
+    struct fl_error complaint; /* the importer's last note of severity error */
 };
 
-/* Whether it is a file that can be read: a fault is named before a program is started for it. */
+/* False, with a reason, if the file cannot be read; this reports a fault before a program is started for it. */
 bool fl_importer_check_file(const char *path, struct fl_error *error);
 /* Starts the program; it begins to read at once and waits only for the answers that it needs. */
 bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options,
                        struct fl_error *error);
-/* The path of the first model, or of the environment that is alone, for people. */
+/* The path of the first model, or of the environment if there is no model, for people. */
 const char *fl_importer_name(const struct fl_importer *importer);
 /* Records cameras, clips and names; notes and progress go to the options' callbacks. */
 bool fl_importer_observe(struct fl_importer *importer, const struct message *message, struct fl_error *error);

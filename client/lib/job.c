@@ -17,9 +17,9 @@ struct fl_job {
     uint64_t next_frame; /* 64 bits: one step beyond the last frame cannot wrap */
     uint32_t last_frame, frame_step;
     bool answered;           /* the daemon has sent its only answer: nothing more follows */
-    struct fl_error failure; /* why it ended early; code NONE: it did not */
+    struct fl_error failure; /* the reason of an early end; code NONE: there was none */
     struct fl_assembly assembly;
-    struct fl_frame_queue done; /* that nobody has asked for yet */
+    struct fl_frame_queue done; /* frames ready for the caller */
 };
 
 static fl_take_fn take_message;
@@ -100,7 +100,7 @@ static bool conclude(struct fl_job *job, const struct message *message, struct f
     return true;
 }
 
-/* One message of the job's. */
+/* Handles one message of the job. */
 static bool take(struct fl_job *job, const struct message *message, struct fl_error *error)
 {
     struct fl_frame *frame = NULL;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* JSON files with line numbers. */
 #include "lib/json_text.h"
 
 #include <stdio.h>
@@ -77,7 +78,7 @@ static void skip_value(struct scan *scan)
     }
 }
 
-/* Whether the string from `begin` to `end`, quotes included, says `key`. */
+/* True if the string from `begin` to `end`, quotes included, is `key`. */
 static bool is_key(const char *begin, const char *end, const char *key)
 {
     const size_t length = (size_t)(end - begin);
@@ -100,7 +101,7 @@ static bool next_entry(struct scan *scan)
     return true;
 }
 
-/* From the value at `scan` to the member or element; *found is the start of its key or element. */
+/* Moves from the value at `scan` to the member or element; *found is the start of its key or element. */
 static bool descend(struct scan *scan, const struct fl_json_place *place, const char **found)
 {
     const char open = place->key ? '{' : '[';

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A JSON file together with its text, so that an error can name the line: Jansson knows lines only of what is not
- * JSON at all. Any thread. */
+/* A JSON file together with its text, so that errors can name the line; Jansson knows lines only of syntax
+ * errors. Any thread. */
 #ifndef FARLIGHT_CLIENT_LIB_JSON_TEXT_H
 #define FARLIGHT_CLIENT_LIB_JSON_TEXT_H
 
@@ -9,7 +9,7 @@
 #include <jansson.h>
 
 struct fl_json {
-    char *text; /* as it was read */
+    char *text; /* text of the file */
     size_t length;
     json_t *root;
 };
@@ -18,17 +18,17 @@ struct fl_json {
 bool fl_json_load(struct fl_json *json, const char *path, size_t max_bytes, struct fl_error *error);
 void fl_json_finish(struct fl_json *json);
 
-/* One step on the path from the root to a value: a member of an object or an element of an array. NULL: the root.
- */
+/* A step on the path from the root to a value: a member of an object or an element of an array. NULL: the root. */
 struct fl_json_place {
     const struct fl_json_place *outer;
     const char *key; /* NULL: an element */
     size_t index;
 };
 
-/* The line, from 1, of the member's key or the element; of a missing one, that of the innermost existing place. */
+/* The line, from 1, of the member's key or the element; if it is missing, the line of the innermost existing
+ * place. */
 unsigned fl_json_line(const struct fl_json *json, const struct fl_json_place *place);
-/* "lights[2].colour"; cut off where it does not fit. Empty for the root. */
+/* Writes "lights[2].colour", cut off where it does not fit; empty for the root. */
 void fl_json_path(const struct fl_json_place *place, char *path, size_t path_bytes);
 
 #endif

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* Merging the parts of a picture, in the program that writes images. */
 #include "lib/merge.h"
 #include "lib/helper.h"
 #include "protocol/common/squares.h"
 
-#define ANSWER_NS 3600000000000ull /* of 512 parts of the largest pictures */
+#define ANSWER_NS 3600000000000ull /* enough for 512 parts of the largest pictures */
 
 static bool take_answer(struct fl_helper *helper, struct fl_error *error)
 {

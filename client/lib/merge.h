@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The parts of a picture, which several commands have rendered, become one file. */
+/* Merging the parts of a picture, which several commands have rendered, into one file. */
 #ifndef FARLIGHT_CLIENT_LIB_MERGE_H
 #define FARLIGHT_CLIENT_LIB_MERGE_H
 
@@ -8,7 +8,7 @@
 struct fl_merge_options {
     const char *const *parts; /* paths, in any order */
     size_t part_count;        /* at most SQUARES_PARTS_MAX */
-    const char *folder;       /* of the picture */
+    const char *folder;       /* folder of the picture */
     const char *path;         /* the picture's, EXR */
     bool any_device;          /* parts of different devices are no error */
     int interrupt_fd;

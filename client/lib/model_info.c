@@ -15,7 +15,7 @@ struct listing {
     struct fl_importer importer;
     struct fl_model_info *info;
     size_t note_capacity, variant_capacity;
-    struct fl_relay relay; /* the same rules as towards a daemon */
+    struct fl_relay relay; /* the rules that apply towards a daemon */
     uint64_t revision;
     struct fl_boxes boxes;
 };
@@ -95,7 +95,7 @@ static bool list(struct listing *listing, const struct message *message, struct 
     return true;
 }
 
-/* The answer of a daemon that already has all blobs. */
+/* Answers like a daemon that already has all blobs. */
 static bool answer(struct listing *listing, const struct frame *frame, const struct message *message,
                    struct fl_error *error)
 {
@@ -186,7 +186,7 @@ struct fl_model_info *fl_model_info(const struct fl_load_options *options, int i
                                     struct fl_error *error)
 {
     struct fl_load_options quiet = *options;
-    quiet.note = NULL; /* they are in the result */
+    quiet.note = NULL; /* the notes are in the result */
     struct listing listing = {.relay = {.scene = 1}, .info = calloc(1, sizeof(*listing.info))};
     if (!listing.info) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");

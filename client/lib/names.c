@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Unique names of objects. */
 #include "lib/names.h"
 
 #include <stdio.h>
@@ -6,14 +7,14 @@
 #include <string.h>
 
 #define PATH_BYTES 4096
-#define DEPTH_MAX 64 /* of a path; above it nodes are left out */
+#define DEPTH_MAX 64 /* limit of a path; nodes above it are left out */
 
 struct named {
     const struct fl_object *object;
     char **name;
 };
 
-/* Those of the same name side by side, in the order of their identifiers. */
+/* Sorts objects of one name side by side, ascending by identifier. */
 static int by_name(const void *a, const void *b)
 {
     const struct named *one = a, *other = b;
@@ -35,14 +36,14 @@ static void own_name(const struct fl_object *object, char *name, size_t name_byt
         snprintf(name, name_bytes, "#%u", object->id);
 }
 
-/* Nodes below a model's own have its name in theirs already. */
+/* True if the name of an object below contains the name above already, as below a model's own node. */
 static bool is_in_name(const struct fl_object *above, const struct fl_object *below)
 {
     const size_t length = strlen(above->name);
     return strncmp(below->name, above->name, length) == 0 && (length == 0 || below->name[length] == '/');
 }
 
-/* "car/wheel"; nodes above it without a name are left out. `objects` ascend by id. */
+/* Builds a path, "car/wheel", and leaves out nodes without a name. `objects` ascend by id. */
 static void path_name(const struct fl_object *objects, size_t count, const struct fl_object *object, char *path,
                       size_t path_bytes)
 {
@@ -81,7 +82,8 @@ static size_t end_of_same(const struct named *named, size_t count, size_t from)
     return end;
 }
 
-/* Objects that share a name get their identifiers behind it, each of them: so a name stays as others come. */
+/* Appends the identifier to every object that shares a name, so that a name does not change when other objects
+ * are added. */
 static bool number_all(struct named *named, size_t count, struct fl_error *error)
 {
     char text[PATH_BYTES + 16];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The order in which a frame's bytes come: as a whole, colours, depth and normals one behind the other, or in
+/* The order of a frame's bytes on the wire: the whole frame with colours, depth and normals in sequence, or
  * parts. No I/O. */
 #ifndef FARLIGHT_CLIENT_LIB_PARTS_H
 #define FARLIGHT_CLIENT_LIB_PARTS_H
@@ -15,24 +15,25 @@ struct fl_parts_bytes {
 struct fl_parts {
     struct record_frame_part parts[FL_PARTS_MAX];
     uint32_t count;
-    struct fl_parts_bytes bytes; /* of all */
-    bool told;                   /* by the daemon: it is a frame in parts */
-    uint32_t come;               /* so many are whole */
-    uint64_t come_bytes;         /* of the next one */
+    struct fl_parts_bytes bytes; /* sizes of all parts together */
+    bool in_parts;               /* true for a frame in parts, which the daemon announced */
+    uint32_t come;               /* number of complete parts */
+    uint64_t come_bytes;         /* received bytes of the next part */
 };
 
 void fl_parts_init(struct fl_parts *parts, const struct message_frame_begin *begin);
-/* Before any bytes; false: the frame of `begin` cannot have those. */
-bool fl_parts_tell(struct fl_parts *parts, const struct message_frame_begin *begin,
-                   const struct message_frame_parts *told, struct fl_error *error);
-/* Puts bytes that come next to where they belong: the kinds one behind the other, in the order of their numbers.
- * There are no more bytes than the frame has. */
+/* Sets the parts that the daemon announced, before any bytes arrive. False: a frame with this `begin` cannot
+ * have them. */
+bool fl_parts_set(struct fl_parts *parts, const struct message_frame_begin *begin,
+                  const struct message_frame_parts *announced, struct fl_error *error);
+/* Stores the next bytes: kinds follow each other in memory, in the order of their numbers. The caller passes no
+ * more bytes than the frame has. */
 void fl_parts_put(struct fl_parts *parts, uint8_t *to, const uint8_t *bytes, size_t count);
-/* In whole parts. */
-struct fl_parts_bytes fl_parts_come(const struct fl_parts *parts);
-/* All that will come. */
+/* Bytes in complete parts, by kind. */
+struct fl_parts_bytes fl_parts_received(const struct fl_parts *parts);
+/* Bytes of all parts. */
 uint64_t fl_parts_sum(const struct fl_parts *parts);
-/* What has come is an answer: colours, and depth if there is any. */
+/* True if the complete parts show something: colours, and depth if the frame has any. */
 bool fl_parts_are_enough(const struct fl_parts *parts);
 
 #endif

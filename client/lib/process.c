@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Child programs: starting, ending, and reading their last output. */
 #include "lib/process.h"
 #include "lib/stream.h"
 #include "protocol/common/clock.h"
@@ -18,9 +19,9 @@
 
 extern char **environ;
 
-#define TRY_AGAIN_STATUS 75     /* of our programs */
+#define TRY_AGAIN_STATUS 75     /* exit status of our programs for a failure that may pass */
 #define FIRST_SIGNAL_STATUS 128 /* 128 + signal; ssh: 255 */
-#define ARGUMENTS_MAX 560       /* of a picture of many parts */
+#define ARGUMENTS_MAX 560       /* enough for a picture of many parts */
 #define CHILD_SOCKET 3
 
 static bool is_program(const char *folder, size_t folder_bytes, const char *name, char *path, size_t path_bytes)
@@ -54,7 +55,7 @@ bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_
         error, "put it into this program's folder or into PATH, or name its folder in FARLIGHT_LIBEXEC");
 }
 
-/* The child's descriptors, and no other: our own parent may have left some open. */
+/* Gives the child these descriptors and no other, as our own parent may have left some open. */
 static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, const struct fl_process *process,
                  int socket_fd)
 {
@@ -63,8 +64,8 @@ static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, con
         return posix_spawn_file_actions_adddup2(actions, socket_fd, STDIN_FILENO) == 0 &&
                posix_spawn_file_actions_adddup2(actions, socket_fd, STDOUT_FILENO) == 0 &&
                posix_spawn_file_actions_addclosefrom_np(actions, CHILD_SOCKET) == 0;
-    /* What is given over was moved to where it cannot be overwritten: our descriptors may be 0..3 themselves. The
-     * input was not, and is the first. */
+    /* talk_fd and socket_fd were moved above 3, since descriptors of ours may be 0 to 3 themselves and would be
+     * overwritten. input_fd was not moved, so it is duplicated first. */
     const int has_input = input_fd > 0
                               ? posix_spawn_file_actions_adddup2(actions, input_fd, STDIN_FILENO)
                               : posix_spawn_file_actions_addopen(actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
@@ -74,9 +75,9 @@ static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, con
            posix_spawn_file_actions_addclosefrom_np(actions, CHILD_SOCKET + 1) == 0;
 }
 
-/* The child starts, unless it may need the terminal, in a process group of its own: a Ctrl-C is for us, and we end
- * the child properly. Signals that we handle are the child's to end by; those that were ignored when we were
- * started, as by nohup, stay ignored, but for the one with which we end it. */
+/* A child that needs no terminal starts in a process group of its own: Ctrl-C is for us, and we end the child
+ * properly. Signals that we handle get their default in the child. Signals that were ignored when we were
+ * started, as by nohup, stay ignored, except the one with which we end the child. */
 static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
 {
     sigset_t none, reset;
@@ -92,8 +93,9 @@ static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
            posix_spawnattr_setflags(attributes, (short)flags) == 0;
 }
 
-/* What a program needs that reads files of others: the language of messages, the time zone, where libraries lie,
- * and the settings of the C library and of sanitizers. A name that ends with * stands for all that begin so. */
+/* Variables for a program that reads other people's files: the language of messages, the time zone, where
+ * libraries lie, and settings of the C library and of sanitizers. A name that ends with * stands for all with
+ * this prefix. */
 static const char *const passed_names[] = {"PATH",
                                            "LANG",
                                            "LANGUAGE",
@@ -120,9 +122,9 @@ static bool is_passed(const char *variable)
     return false;
 }
 
-/* Of ours what the program needs: tokens and passwords are not for one that reads files of others. One with large
- * arrays gets what glibc reads when it starts: a page of 4 KB costs a fault, and faults were a fifth of an
- * import's time. NULL: no memory. */
+/* Selects the environment of a child: a program that reads other people's files must not see tokens and
+ * passwords. A program with large arrays also gets a setting that glibc reads at its start: each page of 4 KB
+ * costs a fault, and faults were a fifth of an import's time. NULL: no memory. */
 static char **make_environment(const struct fl_process *process)
 {
     size_t count = 0;
@@ -242,7 +244,7 @@ bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms)
         const uint64_t now_ns = monotonic_now_ns();
         if (ended || now_ns >= deadline_ns)
             break;
-        /* Without a pidfd (an old kernel) this polls every 5 ms. */
+        /* Without a pidfd (an old kernel) the loop polls every 5 ms. */
         struct pollfd polled = {.fd = fd, .events = POLLIN};
         const int left_ms = (int)((deadline_ns - now_ns) / 1000000) + 1;
         poll(&polled, 1, fd >= 0 || left_ms < 5 ? left_ms : 5);
@@ -276,7 +278,7 @@ int fl_process_end(struct fl_process *process, unsigned grace_ms)
     return status;
 }
 
-/* Where the line begins that ends before `end`. */
+/* Start of the line that ends before `end`. */
 static size_t line_start(const char *text, size_t end)
 {
     while (end > 0 && text[end - 1] != '\n')
@@ -284,15 +286,15 @@ static size_t line_start(const char *text, size_t end)
     return end;
 }
 
-/* How many bytes of "NAME: " a line begins with, as our programs say what is wrong. */
+/* Length of the prefix "NAME: ", with which our programs begin their errors; 0: the line has another. */
 static size_t name_bytes(const char *name, const char *line, size_t bytes)
 {
     const size_t count = strlen(name);
     return bytes > count + 2 && memcmp(line, name, count) == 0 && line[count] == ':' ? count + 2 : 0;
 }
 
-/* The last non-empty line of the child's log; of several that have the program's name in front, which are an error
- * and its remedy, all, without the name. */
+/* Copies the last non-empty line of the child's log. Lines with the program's name in front are an error and
+ * its remedy: they are copied together, without the name. */
 static void last_lines(const struct fl_process *process, char *words, size_t words_bytes)
 {
     char tail[2049];
@@ -308,7 +310,7 @@ static void last_lines(const struct fl_process *process, char *words, size_t wor
     while (end > 0 && (tail[end - 1] == '\n' || tail[end - 1] == ' '))
         end--;
     size_t start = line_start(tail, end);
-    if (end - start >= 5 && memcmp(tail + start, "READY", 5) == 0) /* of a daemon that starts */
+    if (end - start >= 5 && memcmp(tail + start, "READY", 5) == 0) /* output of a daemon that starts */
         return;
     for (size_t before = start; before > 0 && name_bytes(process->name, tail + start, end - start) > 0;) {
         before = line_start(tail, before - 1);

@@ -8,18 +8,20 @@
 #include <sys/types.h>
 
 enum fl_wiring {
-    FL_WIRING_DESCRIPTOR, /* the socket is descriptor 3 ("--fd 3" comes first); the program's output is logged */
-    FL_WIRING_STANDARD,   /* the socket is standard input and output; the program talks to our standard error and
-                             may ask the terminal for a passphrase */
+    FL_WIRING_DESCRIPTOR, /* the socket is descriptor 3 ("--fd 3" comes first); output is recorded */
+    /* the socket is standard input and output; the program writes to our standard error and may ask the
+     * terminal for a passphrase */
+    FL_WIRING_STANDARD,
 };
 
 struct fl_process {
-    pid_t pid;             /* 0: none */
-    int input_fd;          /* > 0: its standard input, set by the caller; it stays the caller's. 0: none */
-    int talk_fd;           /* a memory file with its standard output and error; -1: none */
-    bool has_large_arrays; /* set by the caller: its memory comes in huge pages, where the C library can do that */
-    bool keeps_environment; /* set by the caller: it gets all variables, as a program that reads no files of others
-                             */
+    pid_t pid;    /* 0: none */
+    int input_fd; /* > 0: the program's standard input, set by the caller, who keeps it; 0: none */
+    int talk_fd;  /* memory file with the program's standard output and error; -1: none */
+    /* set by the caller: the program's memory comes in huge pages, if the C library can do that */
+    bool has_large_arrays;
+    /* set by the caller: the program gets all variables, as it reads no files of other people */
+    bool keeps_environment;
     char name[32];
 };
 
@@ -32,18 +34,18 @@ bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiri
 /* Waits until the program ends by itself, sends SIGTERM after `grace_ms`, kills it 2 s later. Returns its wait
  * status; 0 if there is none. Closes the log: call `fl_process_last_words` before. */
 int fl_process_end(struct fl_process *process, unsigned grace_ms);
-/* Whether it has ended, after waiting this long for it; it is not reaped. */
+/* True if the program has ended, after a wait of at most timeout_ms; it is not reaped. */
 bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms);
-void fl_process_kill(struct fl_process *process); /* at once; fl_process_end must follow */
-/* Waits up to `grace_ms` for its end, then writes how it ended and its last line into `text`: "farlightd was ended
- * by signal 11: ..."; still running: its last line alone. An error and its remedy are in lines of their own. */
+void fl_process_kill(struct fl_process *process); /* kills at once; fl_process_end must follow */
+/* Waits up to `grace_ms` for the program's end, then writes how it ended and its last line into `text`:
+ * "farlightd was ended by signal 11: ..."; the last line alone if it is still running. An error and its remedy
+ * are in lines of their own. */
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes);
-/* Whether it has ended by itself with a status after which another start would end the same way: neither success,
- * nor 75, nor that of a signal or of ssh without a connection (255). */
+/* True if the program has ended by itself with a status that another start would repeat: neither success, nor
+ * 75, nor a signal's, nor the 255 of ssh without a connection. */
 bool fl_process_has_refused(const struct fl_process *process);
 
-/* The rest of the log's line with this index among those that begin with `start`. False: there is none.
- */
+/* Copies the rest of the index-th recorded line that begins with `start`. False: there is none. */
 bool fl_process_find_line(const struct fl_process *process, const char *start, size_t index, char *text,
                           size_t text_bytes);
 

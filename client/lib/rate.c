@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Exact frame rates from decimal numbers. */
 #include "lib/rate.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The relay's decisions: which messages an importer may send. */
 #include "lib/relay.h"
 
 #define IMPORTER_SCENE 1u

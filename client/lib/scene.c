@@ -49,8 +49,8 @@ void fl_scene_forget_import(struct fl_scene *scene)
     fl_imported_finish(&scene->imported);
 }
 
-/* Removes own clips from a scene of others. */
-static void take_clips_away(const struct fl_scene *scene)
+/* Removes this client's clips from another client's scene. */
+static void remove_clips(const struct fl_scene *scene)
 {
     struct message begin = {.type = MESSAGE_EDIT_BEGIN}, remove = {.type = MESSAGE_REMOVE},
                    commit = {.type = MESSAGE_EDIT_COMMIT};
@@ -72,7 +72,7 @@ void fl_scene_destroy(struct fl_scene *scene)
         return;
     struct message close = {.type = MESSAGE_SCENE_CLOSE};
     if (scene->clip_count > 0)
-        take_clips_away(scene);
+        remove_clips(scene);
     close.scene_close.scene = scene->scene;
     fl_connection_send_late(scene->connection, fl_connection_next_request(scene->connection), &close);
     fl_connection_remove(scene->connection, &scene->receiver);

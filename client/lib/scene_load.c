@@ -19,13 +19,14 @@ struct load {
     uint64_t credit_passed;           /* the upload credit that the importer was given */
     uint64_t upload_begin_ns;         /* 0: nothing was sent */
     uint64_t commit_begin_ns;         /* 0: no commit is waiting for its answer */
-    uint32_t commit_request;          /* as the daemon knows it */
+    uint32_t commit_request;          /* number of the commit at the daemon */
     struct fl_error refusal;          /* the daemon's first error for an importer's request */
-    struct fl_imported *imported;     /* of this import; NULL: it is not remembered */
-    const struct fl_imported *before; /* of the one before it; NULL: all is new */
-    struct message commit;            /* that waits until what is gone is removed; type 0: none does */
+    struct fl_imported *imported;     /* this import's record; NULL: none is kept */
+    const struct fl_imported *before; /* the previous import's record; NULL: everything is new */
+    struct message commit;            /* the commit, queued until missing objects are removed; type 0: none */
     size_t gone_cursor;
-    bool removes, abandoned; /* something of `before` is gone; nothing was changed */
+    /* true if an object of `before` is missing; true if the load was given up unchanged */
+    bool removes, abandoned;
 };
 
 /* ---- from the importer to the daemon ---- */
@@ -58,7 +59,7 @@ static bool abandon(struct load *load, struct fl_error *error)
                           &cancel, error);
 }
 
-/* Removes what is gone, in the transaction of the rest, then commits it. */
+/* Removes missing objects in the same transaction, then commits it. */
 static bool remove_gone(struct load *load, struct fl_error *error)
 {
     struct fl_stream *daemon = &load->connection->stream;
@@ -66,7 +67,7 @@ static bool remove_gone(struct load *load, struct fl_error *error)
     while (fl_stream_has_room(daemon) &&
            (gone = fl_imported_gone(load->imported, load->before, &load->gone_cursor))) {
         struct message removal = {.type = MESSAGE_REMOVE, .remove = {.kind = gone->kind, .object = gone->id}};
-        if (gone->kind == PROTOCOL_OBJECT_ENVIRONMENT) /* which stays, as each scene has one */
+        if (gone->kind == PROTOCOL_OBJECT_ENVIRONMENT) /* which cannot be removed, as each scene has one */
             return abandon(load, error);
         if (!fl_stream_push(daemon, load->commit_request, 0, &removal, error))
             return false;
@@ -79,13 +80,13 @@ static bool remove_gone(struct load *load, struct fl_error *error)
     return fl_stream_push(daemon, load->commit_request, 0, &commit, error);
 }
 
-/* Whether the daemon has what the edit says. */
+/* True if the daemon has this edit already. */
 static bool is_known(struct load *load, const struct frame *frame, const struct message *message)
 {
     return load->before && fl_imported_has(load->before, frame, message);
 }
 
-/* One message of the importer's. */
+/* Handles one message of the importer's. */
 static bool pass_on(struct load *load, const struct frame *frame, struct message *message, struct fl_error *error)
 {
     uint32_t request = 0;
@@ -112,7 +113,7 @@ static bool pass_on(struct load *load, const struct frame *frame, struct message
     return true;
 }
 
-/* As many as the daemon's side can queue. */
+/* Handles as many messages as the daemon's side can queue. */
 static bool drain_importer(struct load *load, struct fl_error *error)
 {
     if (!fl_connection_push_late(load->connection, error) || (load->commit.type != 0 && !remove_gone(load, error)))
@@ -192,7 +193,7 @@ static bool exchange(struct load *load, struct fl_error *error)
     struct pollfd polled[2] = {{.fd = daemon->fd, .events = fl_stream_events(daemon)},
                                {.fd = importer->fd, .events = fl_stream_events(importer)}};
     const uint64_t deadline_ns = load->importer->deadline_ns;
-    const uint64_t until_ns = connection->look_ns < deadline_ns ? connection->look_ns : deadline_ns;
+    const uint64_t until_ns = connection->check_ns < deadline_ns ? connection->check_ns : deadline_ns;
     if (!fl_wait(polled, 2, connection->interrupt_fd, until_ns, error)) {
         if (error->code == FL_ERROR_TIMEOUT && until_ns == deadline_ns)
             fl_error_set(error, FL_ERROR_TIMEOUT, fl_importer_name(load->importer), "the import timed out");
@@ -204,7 +205,7 @@ static bool exchange(struct load *load, struct fl_error *error)
         return fl_connection_break(connection, error);
     if (!fl_stream_transfer(importer, error))
         return fl_importer_explain(load->importer, error);
-    return fl_connection_heed_silence(connection, error);
+    return fl_connection_check_silence(connection, error);
 }
 
 static bool relay_all(struct load *load, struct fl_error *error)
@@ -302,7 +303,7 @@ static void adopt_callbacks(struct fl_importer *importer, const struct fl_load_o
     importer->begin_ns = monotonic_now_ns(); /* `load_ns` is what the caller waits */
 }
 
-/* What the import has told of the scene, in place of what an earlier one has. */
+/* Moves the import's results into the scene, in place of an earlier import's. */
 static void adopt_import(struct fl_scene *scene, struct fl_importer *importer, struct fl_imported *imported)
 {
     fl_scene_forget_import(scene);
@@ -368,7 +369,7 @@ uint64_t fl_scene_import_digest(const struct fl_scene *scene)
     return sum;
 }
 
-/* *abandoned: something is gone that cannot be removed; nothing has changed. */
+/* Reloads by differences. *abandoned: a missing object cannot be removed; nothing has changed. */
 static bool load_changes(struct fl_scene *scene, struct fl_importer *importer, bool *abandoned,
                          struct fl_error *error)
 {

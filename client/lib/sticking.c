@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Decoding of the share of a pixel's colour that moves with the eye. */
 #include "lib/sticking.h"
 
 #include "protocol/pixels/sticking.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Messages over one non-blocking descriptor, sealed or not. */
 #include "lib/stream.h"
 
 #include "protocol/sealed/link.h"
@@ -184,7 +185,7 @@ bool fl_stream_write(struct fl_stream *stream, struct fl_error *error)
     return true;
 }
 
-static bool tell_refusal(enum sealed_status status, struct fl_error *error)
+static bool report_refusal(enum sealed_status status, struct fl_error *error)
 {
     fl_error_set(error, FL_ERROR_REFUSED, "", "%s", sealed_status_text(status));
     if (status == SEALED_WRONG_KEY)
@@ -206,8 +207,8 @@ bool fl_stream_is_turned_away(const struct handshake_reply *reply, struct fl_err
     return error->retryable = true;
 }
 
-static bool tell_broken_seal(const struct fl_stream *stream, const struct decode_error *why,
-                             struct fl_error *error)
+static bool report_broken_seal(const struct fl_stream *stream, const struct decode_error *why,
+                               struct fl_error *error)
 {
     if (why->code == PROTOCOL_ERROR_OUT_OF_MEMORY)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
@@ -239,8 +240,8 @@ static bool open_records(struct fl_stream *stream, struct fl_error *error)
             return true;
     }
     if (result == SEALED_REFUSED)
-        return tell_refusal(sealed_status(stream->link->sealed), error);
-    return result != SEALED_FATAL || tell_broken_seal(stream, &why, error);
+        return report_refusal(sealed_status(stream->link->sealed), error);
+    return result != SEALED_FATAL || report_broken_seal(stream, &why, error);
 }
 
 /* Accepts received bytes: opens them if the stream is sealed. */
@@ -301,7 +302,7 @@ enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *fra
         if (result == FRAMING_FATAL)
             return broken(stream, &why, error);
         if (result == FRAMING_NEED_MORE && stream->link && sealed_link_has_record(stream->link)) {
-            /* It had no space before, and poll() will not report these bytes again. */
+            /* The record found no space before, and poll() will not report these bytes again. */
             compact(stream->in, &stream->in_start, &stream->in_end);
             if (!open_records(stream, error))
                 return FL_STREAM_ERROR;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The parts of a tracer's structure, as lines for people. */
 #include "lib/farlight.h"
 
 #include <inttypes.h>
@@ -7,7 +8,7 @@
 
 #include "protocol/plain_text.h"
 
-/* Behind the name of the part. */
+/* The row's own name, which follows the name of the part. */
 static const char *own_name(const struct record_structure_row *row)
 {
     const char *slash = strchr(row->name, '/');
@@ -20,7 +21,7 @@ static void append(char *text, size_t text_bytes, const char *more)
     snprintf(text + length, text_bytes - length, "%s", more);
 }
 
-/* A length, with a unit that suits it. */
+/* Prints a length with a suitable unit. */
 static void print_length(char *text, size_t text_bytes, double metres)
 {
     if (metres >= 1000)
@@ -31,7 +32,7 @@ static void print_length(char *text, size_t text_bytes, double metres)
         snprintf(text, text_bytes, "%.4g mm", metres * 1e3);
 }
 
-/* "layers kept 6" */
+/* Appends a row, as "layers kept 6". */
 static void append_row(char *text, size_t text_bytes, const struct record_structure_row *row)
 {
     char name[FL_STRUCTURE_NAME_BYTES], value[32];

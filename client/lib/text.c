@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Reading of numbers, sizes, ranges and patterns that people type. */
 #include "lib/text.h"
 
 #include <errno.h>
@@ -13,7 +14,7 @@
 #include "protocol/plain_text.h"
 
 #define EDGE_MAX 8192  /* the protocol's maximum of a picture */
-#define NEAREST_MAX 2u /* further off it is another word */
+#define NEAREST_MAX 2u /* a larger distance means another word */
 #define NEAREST_BYTES_MAX 32u
 #define FRAME_MAX 10000000 /* the protocol's maximum of a frame number */
 
@@ -234,8 +235,8 @@ void fl_text_utf8(const char *text, char *out, size_t out_bytes)
     out[used] = '\0';
 }
 
-/* The length of the conversion at a '%': 0 if it is invalid, 1 for "%%", else that of "%d" or "%0Nd" with its
- * *digits. */
+/* Length of the conversion at a '%': 0 if it is invalid, 1 for "%%", else the length of "%d" or "%0Nd", with
+ * its *digits. */
 static size_t read_conversion(const char *at, unsigned *digits)
 {
     if (at[1] == '%')

@@ -12,7 +12,7 @@
 struct fl_video {
     struct fl_helper helper;
     char folder[4097];
-    char path[160];     /* of the file, or its end */
+    char path[160];     /* path of the file, or the end of a long one */
     char temporary[65]; /* name of the unfinished file in the folder; empty: none */
     uint32_t frames;    /* sent whole */
     bool ending;        /* video_end is sent */
@@ -154,7 +154,7 @@ bool fl_video_write(struct fl_video *video, const struct fl_frame *frame, struct
         return fl_error_set(error, FL_ERROR_ARGUMENT, video->path, "this video has ended");
     if (!check(video, error) || !fl_helper_send_frame(&video->helper, frame, error))
         return false;
-    video->frames++; /* it arrives complete, even if we are interrupted now */
+    video->frames++; /* the frame arrives complete, even if the call is interrupted now */
     return fl_helper_flush(&video->helper, error);
 }
 

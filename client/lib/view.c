@@ -30,22 +30,22 @@ struct fl_view {
     uint32_t scene, channel;
     uint64_t credit;     /* frames that the daemon may have sent by now */
     uint32_t next_frame; /* the minimum number of the next one */
-    uint32_t last_frame; /* the last one that came whole .. */
+    uint32_t last_frame; /* the last complete frame, .. */
     bool has_frame;      /* .. if there is one */
-    bool owes_ack;       /* of that frame, and .. */
-    bool owes_credit;    /* .. there was no room to send it */
+    bool ack_pending;    /* its acknowledgement, and .. */
+    bool credit_pending; /* .. its credit, found no space to be sent */
     struct asked asked[ASKED_MAX];
     size_t asked_count;
     uint64_t changes;
     uint64_t last_command;
-    uint64_t command_sent_ns[COMMANDS_REMEMBERED]; /* by number, modulo */
+    uint64_t command_sent_ns[COMMANDS_REMEMBERED]; /* by number, modulo the size */
     struct fl_error failure; /* why a render was refused; reported once while an older one continues */
     struct fl_assembly assembly;
     uint32_t assembled_request;
-    bool delivers_parts; /* as soon as they show something .. */
-    bool delivered;      /* .. as the frame's that is assembled */
+    bool delivers_parts; /* parts are delivered as soon as they show something; set by the caller */
+    bool delivered;      /* the assembled frame's first parts were delivered */
     bool keeps_jpeg;
-    struct fl_frame_queue done; /* that nobody has asked for yet */
+    struct fl_frame_queue done; /* frames ready for the caller */
 };
 
 /* ---- going out ---- */
@@ -71,8 +71,8 @@ static void fill_render(struct message_render *render, const struct fl_view *vie
     render->first_frame = render->last_frame = 0;
 }
 
-/* Of all renders of the view together. */
-static bool tell_credit(struct fl_view *view, struct fl_error *error)
+/* Sends the credit of the view's channel, which all its requests share. */
+static bool grant_credit(struct fl_view *view, struct fl_error *error)
 {
     struct message credit = {.type = MESSAGE_CREDIT};
     credit.credit.channel = view->channel;
@@ -80,7 +80,7 @@ static bool tell_credit(struct fl_view *view, struct fl_error *error)
     return fl_connection_send(view->connection, 0, 0, &credit, error);
 }
 
-/* One more render on the view's channel. */
+/* Sends a request on the view's channel. */
 static bool ask(struct fl_view *view, const struct message_render *wanted, struct fl_error *error)
 {
     struct message message = {.type = MESSAGE_RENDER, .render = *wanted};
@@ -138,7 +138,7 @@ struct fl_view *fl_view_start(struct fl_scene *scene, const struct message_rende
     return view;
 }
 
-/* Why nothing comes any more. */
+/* False, with the reason, if the view can deliver nothing any more. */
 static bool check(const struct fl_view *view, struct fl_error *error)
 {
     if (!fl_connection_check(view->connection, error))
@@ -160,7 +160,7 @@ bool fl_view_change(struct fl_view *view, const struct message_render *wanted, s
             return false;
     }
     view->changes++;
-    return ask(view, wanted, error) && tell_credit(view, error);
+    return ask(view, wanted, error) && grant_credit(view, error);
 }
 
 bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
@@ -205,14 +205,15 @@ bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error)
 
 /* ---- coming in ---- */
 
-/* At once, before the frame is decoded: the daemon measures the link with it, not our decoder. */
+/* Acknowledges before the frame is decoded: the daemon measures the link with it, not our decoder. */
 static bool acknowledge(struct fl_view *view, uint32_t frame, bool whole, struct fl_error *error)
 {
     struct message message;
     fill_ack(&message, view, frame, whole);
-    /* Not during an upload. A later acknowledgement of the first kind would say nothing. */
+    /* A full buffer holds an upload. An acknowledgement that is not of a whole frame would come too late to be
+     * useful. */
     const bool has_room = fl_stream_has_room(&view->connection->stream);
-    view->owes_ack = whole ? !has_room : view->owes_ack;
+    view->ack_pending = whole ? !has_room : view->ack_pending;
     if (!has_room)
         return true;
     return fl_stream_push(&view->connection->stream, 0, 0, &message, error) &&
@@ -220,14 +221,14 @@ static bool acknowledge(struct fl_view *view, uint32_t frame, bool whole, struct
 }
 
 /* Sends acknowledgements that did not fit before: the daemon may wait for them. */
-static bool send_owed(struct fl_view *view, struct fl_error *error)
+static bool send_pending(struct fl_view *view, struct fl_error *error)
 {
     struct fl_error ignored;
     if (!fl_stream_has_room(&view->connection->stream))
         return true;
-    if (view->owes_ack && !acknowledge(view, view->last_frame, true, error))
+    if (view->ack_pending && !acknowledge(view, view->last_frame, true, error))
         return fl_connection_break(view->connection, error);
-    view->owes_credit = view->owes_credit && !tell_credit(view, &ignored);
+    view->credit_pending = view->credit_pending && !grant_credit(view, &ignored);
     return true;
 }
 
@@ -241,7 +242,7 @@ void fl_view_keep_jpeg(struct fl_view *view, bool keep)
     view->keeps_jpeg = keep;
 }
 
-/* It shows nothing. */
+/* Drops a frame that ended with nothing to show. */
 static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *error)
 {
     const struct fl_frame *frame = view->assembly.frame;
@@ -254,7 +255,7 @@ static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *erro
     return true;
 }
 
-/* A frame to be asked for; NULL: it failed. */
+/* Queues a frame for the caller; NULL: decoding failed. */
 static bool deliver(struct fl_view *view, uint64_t change, struct fl_frame *frame, struct fl_error *error)
 {
     if (!frame)
@@ -293,7 +294,7 @@ static bool take_end(struct fl_view *view, uint64_t change, const struct message
     return deliver(view, change, fl_assembly_end(&view->assembly, &message->frame_end, now_ns, error), error);
 }
 
-/* The only answer to a render: ok if a newer one replaced it. */
+/* Handles the only answer to a request: ok if a newer request replaced it. */
 static bool conclude(struct fl_view *view, size_t index, const struct message *message, struct fl_error *error)
 {
     const bool is_newest = index + 1 == view->asked_count;
@@ -355,7 +356,7 @@ static int take_message(struct fl_receiver *receiver, const struct framing_heade
         return 0;
     if (take(view, index, message, &why))
         return 1;
-    /* Without memory for a frame, its remaining messages would look like a broken protocol. */
+    /* A frame dropped for lack of memory must not make its remaining messages look like a broken protocol. */
     fl_assembly_finish(&view->assembly);
     *error = why;
     return -1;
@@ -367,7 +368,7 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
     *error = (struct fl_error){0};
     while (view->done.count == 0) {
         struct fl_received ignored; /* a late answer to something given up */
-        if (!check(view, error) || !send_owed(view, error))
+        if (!check(view, error) || !send_pending(view, error))
             return NULL;
         if (view->failure.code != FL_ERROR_NONE) {
             *error = view->failure;
@@ -387,7 +388,7 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
     if (frame->more_follows)
         return frame;
     view->credit++;
-    view->owes_credit = !tell_credit(view, &ignored);
+    view->credit_pending = !grant_credit(view, &ignored);
     return frame;
 }
 

@@ -47,8 +47,7 @@ struct fl_y4m *fl_y4m_begin(const struct fl_y4m_options *options, struct fl_erro
 
 /* ---- bytes ---- */
 
-/* As write(), without SIGPIPE: the signal is sent to the thread (POSIX), so it can be blocked and consumed.
- */
+/* Writes without SIGPIPE: the signal is sent to the thread (POSIX), so it can be blocked and consumed. */
 static ssize_t write_quietly(int fd, const uint8_t *bytes, size_t count)
 {
     sigset_t pipe_signal, before, waiting;
@@ -142,7 +141,7 @@ bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_er
 {
     if (!check_frame(y4m, frame, error))
         return false;
-    y4m->broken = true; /* until it is not */
+    y4m->broken = true; /* cleared after the whole frame is written */
     if (!y4m->frame && !write_header(y4m, frame, error))
         return false;
     const struct ycbcr_target planes = planes_of(y4m);

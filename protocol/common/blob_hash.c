@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* Hashes that name blobs. */
 #include "protocol/common/blob_hash.h"
 
 #include <sodium.h>
 
 void blob_hash_chunk(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes)
 {
-    /* Picks the fast implementation for this processor; hashing works without it, too. */
+    /* Picks the fastest implementation for this processor; hashing works without it, too. */
     int status = sodium_init();
     (void)status;
     crypto_generichash(hash, BLOB_HASH_BYTES, data, size_bytes, NULL, 0);

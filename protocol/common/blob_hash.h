@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The names of blobs: BLAKE2b-256 over the BLAKE2b-256 hashes of their 1 MiB chunks, so that threads can share the
- * work. By libsodium's crypto_generichash; any thread. */
+/* Hashes that name blobs: BLAKE2b-256 over the BLAKE2b-256 hashes of their 1 MiB chunks, so that threads can
+ * share the work. Computed by libsodium's crypto_generichash; any thread. */
 #ifndef FARLIGHT_PROTOCOL_COMMON_BLOB_HASH_H
 #define FARLIGHT_PROTOCOL_COMMON_BLOB_HASH_H
 
@@ -15,7 +15,7 @@ static inline uint64_t blob_chunk_count(uint64_t size_bytes)
     return size_bytes / BLOB_CHUNK_BYTES + (size_bytes % BLOB_CHUNK_BYTES != 0);
 }
 
-/* Of the chunk that begins at `at_bytes`. */
+/* Size of the chunk that begins at `at_bytes`. */
 static inline size_t blob_chunk_bytes(uint64_t size_bytes, uint64_t at_bytes)
 {
     uint64_t left_bytes = size_bytes - at_bytes;
@@ -23,9 +23,9 @@ static inline size_t blob_chunk_bytes(uint64_t size_bytes, uint64_t at_bytes)
 }
 
 void blob_hash_chunk(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes);
-/* The name, from the hashes of all chunks one behind the other. */
+/* Computes a blob's name from the concatenated hashes of all chunks. */
 void blob_hash_chunks(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *chunk_hashes, size_t chunk_count);
-/* Both steps. */
+/* Computes a blob's name from its bytes. */
 void blob_hash(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, uint64_t size_bytes);
 
 #endif

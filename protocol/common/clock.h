@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* The monotonic clock. */
 #ifndef FARLIGHT_PROTOCOL_COMMON_CLOCK_H
 #define FARLIGHT_PROTOCOL_COMMON_CLOCK_H
 
 #include <stdint.h>
 #include <time.h>
 
-/* Comparable between threads and processes of a machine until it is started again. */
+/* Nanoseconds since the machine started; comparable between its threads and processes. */
 static inline uint64_t monotonic_now_ns(void)
 {
     struct timespec now = {0};

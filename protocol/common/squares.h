@@ -1,23 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Which pixels of a picture belong to which of several parts, as the command that renders a part and the program
- * that merges them have it. Squares of whole tiles are numbered so that those with numbers close together lie far
- * apart; a part has a run of numbers, and so squares all over the picture: as many as any other part, or one more.
- */
+/* The division of a picture's pixels into parts, shared by the command that renders a part and the program that
+ * merges them. Squares of whole tiles are numbered so that consecutive numbers lie far apart; a part has a run
+ * of numbers, and so squares all over the picture. The numbers of squares of two parts differ by at most one. */
 #ifndef FARLIGHT_PROTOCOL_COMMON_SQUARES_H
 #define FARLIGHT_PROTOCOL_COMMON_SQUARES_H
 
 #include <stdint.h>
 
 #define SQUARES_TILE 8u /* pixels; a part renders whole tiles */
-/* A part has at least so many, where the picture is large enough, so that parts take about as long as each other.
- */
+/* Minimum number of squares of a part, if the picture is large enough, so that parts take about equally long. */
 #define SQUARES_EACH 8u
-#define SQUARES_PARTS_MAX 512u /* all of whose files are open at once */
+#define SQUARES_PARTS_MAX 512u /* the files of all parts are open at once */
 
 struct squares {
-    uint32_t width, height; /* of the picture */
+    uint32_t width, height; /* size of the picture */
     uint32_t side, across, count;
-    uint32_t step; /* from a number's square to the next one's, row by row; prime to count */
+    uint32_t step; /* distance, row by row, from a number's square to the next number's; coprime with count */
 };
 
 /* Pixels from the picture's top left. */
@@ -40,7 +38,8 @@ static inline uint32_t squares_common_divisor(uint32_t a, uint32_t b)
     return a;
 }
 
-/* `width` and `height` at most 8192, `parts` at least 1. There may be fewer squares than parts. */
+/* Divides a picture of at most 8192 x 8192 pixels into squares for at least one part. There may be fewer
+ * squares than parts. */
 static inline struct squares squares_of(uint32_t width, uint32_t height, uint32_t parts)
 {
     struct squares squares = {width, height, SQUARES_TILE, 0, 0, 1};
@@ -49,16 +48,16 @@ static inline struct squares squares_of(uint32_t width, uint32_t height, uint32_
         squares.side = (uint32_t)side;
     squares.across = squares_along(width, squares.side);
     squares.count = squares.across * squares_along(height, squares.side);
-    /* Multiples of the golden ratio are spread evenly, however many there are (Knuth. The Art of Computer
-     * Programming 3, section 6.4, theorem S). As the step is prime to `across`, too, a run of so many is in as
-     * many columns. */
+    /* Multiples of the golden ratio are spread evenly, for any number of them (Knuth. The Art of Computer
+     * Programming 3, section 6.4, theorem S). The step is coprime with `across`, too, so a run of `across`
+     * numbers visits every column once. */
     squares.step = (uint32_t)((uint64_t)squares.count * 618034 / 1000000);
     while (squares_common_divisor(squares.step, squares.count) != 1)
         squares.step++;
     return squares;
 }
 
-/* The first number of a part, counted from 0; that of the part behind the last one: how many there are. */
+/* The first number of a part, counted from 0. For the part behind the last one: the number of squares. */
 static inline uint32_t squares_first(const struct squares *squares, uint32_t part, uint32_t parts)
 {
     return (uint32_t)((uint64_t)part * squares->count / parts);

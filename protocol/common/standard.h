@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a program does first with what it was started with: descriptors 0 to 2, and signals. */
+/* The first steps of every program: standard descriptors and inherited signals. */
 #ifndef FARLIGHT_PROTOCOL_COMMON_STANDARD_H
 #define FARLIGHT_PROTOCOL_COMMON_STANDARD_H
 
@@ -9,19 +9,19 @@
 #include <stddef.h>
 #include <unistd.h>
 
-/* Opens those of the standard descriptors that are closed: what is opened later would take their numbers, and a
- * message for the terminal would be written into a socket or a file. */
+/* Opens closed standard descriptors: files opened later would get their numbers, and a message for the terminal
+ * would be written into a socket or a file. */
 static inline void open_standard_descriptors(void)
 {
     int fd = 0;
-    while (fd >= 0 && fd <= STDERR_FILENO) /* the lowest free number is taken */
+    while (fd >= 0 && fd <= STDERR_FILENO) /* open() returns the lowest free number */
         fd = open("/dev/null", O_RDWR);    /* NOLINT: programs that are started need it too */
     if (fd > STDERR_FILENO)
         close(fd);
 }
 
-/* Whether the program was started with the signal ignored, as by nohup or as a shell's background command: then it
- * stays ignored. To be asked before a handler is set. */
+/* True if the program was started with the signal ignored, as by nohup or as a shell's background command; it
+ * then stays ignored. Must be called before a handler is set. */
 static inline bool signal_is_ignored(int number)
 {
     struct sigaction action;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Writing of trace events as JSON. */
 #include "protocol/common/trace_event.h"
 
 #include "protocol/plain_text.h"
@@ -16,7 +17,7 @@ static void write_text(FILE *out, const char *text)
 {
     fputc('"', out);
     while (*text) {
-        uint32_t code = 0xfffd; /* U+FFFD: a byte that is no UTF-8 */
+        uint32_t code = 0xfffd; /* U+FFFD replaces bytes that are not UTF-8 */
         size_t length = utf8_read(text, UTF8_BYTES_MAX, &code);
         if (code == '"' || code == '\\')
             fprintf(out, "\\%c", (char)code);
@@ -67,7 +68,7 @@ void trace_write_event(struct trace_writer *writer, const struct trace_event *ev
     fputs("}}", out);
 }
 
-/* Whether the lane can hold the event; then it does. */
+/* Adds the event to the lane if it nests within or follows the lane's events. False: it overlaps. */
 static bool lane_add(struct trace_lane *lane, uint64_t start_ns, uint64_t end_ns)
 {
     unsigned depth = lane->depth;

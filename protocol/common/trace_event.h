@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#define TRACE_LANES_MAX 16u /* more events that overlap are drawn over those of the last lane */
+#define TRACE_LANES_MAX 16u /* further overlapping events are drawn over those of the last lane */
 #define TRACE_DEPTH_MAX 8u
 #define TRACE_ARGUMENTS_MAX 4u
 
@@ -19,7 +19,7 @@
 #define TRACE_FILE_END "\n]\n"
 
 struct trace_argument {
-    const char *name; /* NULL: this and the rest are none */
+    const char *name; /* NULL: this and all later arguments are unused */
     uint64_t value;
 };
 
@@ -31,20 +31,20 @@ struct trace_event {
     struct trace_argument arguments[TRACE_ARGUMENTS_MAX];
 };
 
-/* Events of one file, or of a part of it; errors stay with the stream. */
+/* Writes events into a file, or into a part of one; errors stay with the stream. */
 struct trace_writer {
     FILE *out;
-    const char *before; /* what comes before the next event: TRACE_FILE_BEGIN in an empty file */
-    uint64_t *threads;  /* how many threads were named in the file */
+    const char *before; /* text before the next event: TRACE_FILE_BEGIN in an empty file, later a separator */
+    uint64_t *threads;  /* number of threads named in the file so far */
 };
 
 struct trace_lane {
     uint64_t thread, last_start_ns;
-    uint64_t ends_ns[TRACE_DEPTH_MAX]; /* of the events that the last one is within, and its own */
+    uint64_t ends_ns[TRACE_DEPTH_MAX]; /* end times of the last event and of the events that enclose it */
     unsigned depth;
 };
 
-/* Begins as zeros. */
+/* The lanes of one track; initially zero. */
 struct trace_track {
     unsigned lane_count;
     struct trace_lane lanes[TRACE_LANES_MAX];
@@ -52,11 +52,11 @@ struct trace_track {
 
 void trace_write_process_name(struct trace_writer *writer, uint64_t process, const char *name);
 void trace_write_event(struct trace_writer *writer, const struct trace_event *event);
-/* Gives the event the thread of a lane that can hold it. A new one is named `name`, with its number from the
- * second on. */
+/* Assigns the event to a lane that can hold it, and so to a thread. A new lane's thread is called `name`, with
+ * its number from the second on. */
 void trace_place_event(struct trace_writer *writer, struct trace_track *track, const char *name,
                        struct trace_event *event);
-/* By start; an event that contains others comes before them. */
+/* Sorts by start; an event that encloses others comes before them. */
 void trace_sort_events(struct trace_event *events, size_t count);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One triangle, a light, a picture of 2 x 2 pixels. What the daemon says varies in a few places; the integration
- * tests send the client's bytes to a daemon and hold its answers against the others. */
+/* A session with one triangle, a light and a picture of 2 x 2 pixels. The daemon's bytes vary in a few places;
+ * the integration tests send the client's bytes to a daemon and compare its answers with the others. */
 #include "protocol/docs/example.h"
 
 #include <inttypes.h>
@@ -17,11 +17,11 @@
 #define BYTES_A_LINE 16
 #define ANSWER_TO(request) "Daemon, in answer to request " #request
 
-/* Covers all that the camera below sees. */
+/* A triangle that covers the camera's whole picture. */
 static const float positions[] = {-1, -1, 0, 3, -1, 0, -1, 3, 0};
 static const uint32_t indices[] = {0, 1, 2};
-/* Of a base colour of 0.8, 0.4, 0.2, face on in the light that makes white 1: what is left of it beside the 4 %
- * that the surface reflects, as sRGB. */
+/* The base colour is 0.8, 0.4, 0.2, and a light that makes white 1 shines perpendicularly. The surface reflects
+ * 4 %; the rest of the light gives these colours in sRGB. */
 static const uint8_t pixels[] = {232, 171, 126, 255, 232, 171, 126, 255, 232, 171, 126, 255, 232, 171, 126, 255};
 
 static void print_bytes(const char *what, const uint8_t *bytes, size_t count)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The document's session, written out byte by byte. */
+/* The session in the document, written out byte by byte. */
 #ifndef FARLIGHT_PROTOCOL_DOCS_EXAMPLE_H
 #define FARLIGHT_PROTOCOL_DOCS_EXAMPLE_H
 
-/* To standard output, in Markdown. */
+/* Prints it to standard output, in Markdown. */
 void docgen_print_example(void);
 
 #endif

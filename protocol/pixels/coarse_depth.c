@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Encoding and decoding of coarse depths. */
 #include "protocol/pixels/coarse_depth.h"
 
 #include <stdbool.h>
@@ -7,14 +8,14 @@
 
 #define SIDE COARSE_DEPTH_SIDE
 #define OFF_BYTES 2u
-#define LEVEL 9u /* of zstd at least: there are few bytes, and a tenth of them goes */
+#define LEVEL 9u /* minimum level of zstd: the data are small, and this level saves a tenth */
 #define SHARES                                                                                                    \
-    (2 * SIDE)   /* of the way from the middle of a square to that of the next one: texels lie at odd ones */
-#define ALIKE 8u /* four depths are one surface if they differ by at most this part of the nearest */
+    (2 * SIDE)   /* divisions of the way from a square's middle to the next one's: texels lie at the odd ones */
+#define ALIKE 8u /* four depths belong to one surface if they differ by at most this share of the nearest */
 
 /* The nearest depth of each square. */
 struct squares {
-    uint32_t width, height; /* of the picture */
+    uint32_t width, height; /* size of the picture */
     uint32_t across, down;
     uint16_t *nearest;
 };
@@ -24,7 +25,7 @@ static uint32_t squares_along(uint32_t texels)
     return texels / SIDE + (texels % SIDE != 0);
 }
 
-/* False: no memory. */
+/* False: out of memory. */
 static bool squares_init(struct squares *squares, uint32_t width, uint32_t height)
 {
     *squares = (struct squares){width, height, squares_along(width), squares_along(height), NULL};
@@ -49,7 +50,7 @@ static uint16_t lesser_of(uint16_t a, uint16_t b)
 
 /* ---- from squares to texels ---- */
 
-/* The four squares whose middles lie round some texels, and where their row lies between those. */
+/* The four squares whose middles surround some texels, and the position of the texels' row between them. */
 struct corners {
     uint16_t above[2], below[2];
     uint32_t share_y;
@@ -63,7 +64,7 @@ static bool are_alike(const struct corners *corners)
     return ((uint32_t)greatest - least) * ALIKE <= greatest;
 }
 
-/* SIDE texels from the middle of one square to that of the next. */
+/* Interpolates the SIDE texels between the middles of two neighbouring squares. */
 static void fill_between(const struct corners *corners, uint16_t texels[SIDE])
 {
     const uint32_t below = corners->share_y, above = SHARES - below;
@@ -80,7 +81,7 @@ static void fill_between(const struct corners *corners, uint16_t texels[SIDE])
         texels[i] = own[i >= SIDE / 2];
 }
 
-/* Row y of the picture, and up to SIDE texels on both of its sides. */
+/* Fills row y of the picture, and up to SIDE texels beyond both of its ends. */
 static void fill_row(const struct squares *squares, uint32_t y, uint16_t *row)
 {
     const uint32_t from_first = y + SIDE / 2, below = from_first / SIDE, across = squares->across;
@@ -93,7 +94,7 @@ static void fill_row(const struct squares *squares, uint32_t y, uint16_t *row)
     }
 }
 
-/* With room for what fill_row() fills; the picture's first texel is that at SIDE / 2. */
+/* Allocates the row that fill_row() fills; the picture's first texel is at SIDE / 2. */
 static uint16_t *row_create(const struct squares *squares)
 {
     return malloc(((size_t)squares->across + 1) * SIDE * sizeof(uint16_t));
@@ -108,7 +109,7 @@ size_t coarse_depth_bound(uint32_t width, uint32_t height)
     return bound == 0 || bound > SIZE_MAX - OFF_BYTES ? 0 : OFF_BYTES + bound;
 }
 
-/* `row` has the nearest of each column. */
+/* Finds the nearest depths of a row of squares; `row` is memory for the nearest of each column. */
 static void find_nearest_of_row(struct squares *squares, const uint16_t *depths, uint32_t rows, uint16_t *row,
                                 uint16_t *nearest)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Rounding of depths to multiples of a step of 1 / depth. */
 #include "protocol/pixels/inverse_depth.h"
 
 #include <math.h>
@@ -6,7 +7,8 @@
 float inverse_depth_step(float pixels, float radius, uint32_t height, float fov_y)
 {
     const double pixels_a_radian = (double)height / (2.0 * tan((double)fov_y / 2.0));
-    return (float)(2.0 * (double)pixels / (pixels_a_radian * (double)radius)); /* off by half of it at most */
+    /* the error is at most half of it */
+    return (float)(2.0 * (double)pixels / (pixels_a_radian * (double)radius));
 }
 
 bool inverse_depth_round(const float *depths, size_t count, float step, uint16_t *rounded)

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The encoding `predicted`. */
 #include "protocol/pixels/predicted.h"
 
 #include <stdbool.h>
@@ -37,8 +38,8 @@ size_t predicted_bound(const struct predicted_form *form)
     return ZSTD_isError(bound) ? 0 : bound;
 }
 
-/* The minimum of left and above where the third is at least both, their maximum where it is at most both, else
- * left + above - third; written without branches, for vector instructions. */
+/* The minimum of left and above if the third is at least both, their maximum if it is at most both, else left +
+ * above - third; written without branches, for vector instructions. */
 static inline uint8_t predict(uint8_t left, uint8_t above, uint8_t above_left)
 {
     uint8_t minimum = left < above ? left : above;
@@ -49,7 +50,7 @@ static inline uint8_t predict(uint8_t left, uint8_t above, uint8_t above_left)
 
 /* ---- encode ---- */
 
-/* `row` and `above` have a byte before the first one: its left neighbour. */
+/* `row` and `above` have a byte before the first one, as its left neighbour. */
 static void predict_row(uint8_t *restrict out, const uint8_t *restrict row, const uint8_t *restrict above,
                         size_t width)
 {
@@ -63,7 +64,7 @@ static void predict_row(uint8_t *restrict out, const uint8_t *restrict row, cons
         out[x] = (uint8_t)(row[x] - predict(left[x], above[x], above_left[x]));
 }
 
-/* Pixels of four bytes are the common ones: read as words, for vector instructions. */
+/* Pixels of four bytes, the usual ones, are read as words, for vector instructions. */
 static void copy_channel_of_4(uint8_t *restrict row, const uint8_t *restrict pixels, size_t width, size_t channel)
 {
     size_t x = 0;
@@ -86,7 +87,7 @@ static void copy_channel(uint8_t *restrict row, const uint8_t *restrict pixels, 
 struct residuals {
     const struct predicted_form *form;
     const uint8_t *pixels;
-    uint8_t *row, *above; /* of one channel; before the first byte lies a 0 */
+    uint8_t *row, *above; /* rows of one channel; the byte before the first is 0 */
     uint8_t *out;
 };
 
@@ -104,7 +105,7 @@ static struct residuals *residuals_create(const struct predicted_form *form, con
     return residuals;
 }
 
-/* For rows of one channel in turn, from the first on. */
+/* Computes the residuals of a row. Called for the rows of a channel in turn, from the first on. */
 static void residuals_of_row(struct residuals *residuals, size_t channel, size_t y)
 {
     size_t width = residuals->form->width, step = residuals->form->pixel_bytes;
@@ -121,8 +122,8 @@ static void residuals_of_row(struct residuals *residuals, size_t channel, size_t
     predict_row(residuals->out, row, residuals->above, width);
 }
 
-/* Row by row: all residuals at once would take as much memory as the picture. *left: 0, an error of zstd's, or how
- * many bytes did not fit into `out`. False: it was given up. */
+/* Packs row by row, since all residuals at once would take as much memory as the picture. *left: 0, an error of
+ * zstd's, or the number of bytes that did not fit into `out`. False: the work was given up. */
 static bool pack(ZSTD_CCtx *context, struct residuals *residuals, const struct predicted_source *source,
                  ZSTD_outBuffer *out, size_t *left)
 {
@@ -171,8 +172,8 @@ struct predicted_result predicted_encode(const struct predicted_source *source, 
 
 /* ---- decode ---- */
 
-/* All channels of a row in one go: each byte waits for the one left of it, but not for those beside that. Inlined
- * where `step` is known. */
+/* Adds all channels of a row in one pass: a byte depends on its left neighbour, but not on the channels beside
+ * that. Inlined for constant values of `step`. */
 static inline __attribute__((always_inline)) void add_row(uint8_t *pixels, const uint8_t *above,
                                                           const uint8_t *residuals, size_t plane_bytes,
                                                           size_t width, size_t step)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The encoding `predicted`, both ways; lossless: each byte less its prediction from its neighbours, packed by
+/* The lossless encoding `predicted`, both ways: each byte minus its prediction from its neighbours, compressed by
  * Zstandard. The protocol's document describes the format.
  *
  * The predictor is the median edge detector of LOCO-I (M. J. Weinberger, G. Seroussi, G. Sapiro: The LOCO-I
@@ -27,11 +27,11 @@ enum predicted_status { PREDICTED_DONE, PREDICTED_NO_MEMORY, PREDICTED_FAILED, P
 
 struct predicted_result {
     enum predicted_status status;
-    const char *reason; /* of a failure; else NULL */
-    size_t bytes;       /* that were encoded */
+    const char *reason; /* cause of a failure; else NULL */
+    size_t bytes;       /* number of encoded bytes */
 };
 
-/* All at least 1; rows without gaps. */
+/* Dimensions, all at least 1; rows have no gaps. */
 struct predicted_form {
     uint32_t width, rows, pixel_bytes;
 };
@@ -40,16 +40,16 @@ struct predicted_source {
     struct predicted_form form;
     const uint8_t *pixels;
     unsigned level; /* zstd's, clamped to 1 .. 19 */
-    /* Asked at each row of a channel; true ends the work. NULL: it goes to its end. */
+    /* Called at each row of a channel; true ends the work. NULL: the work is never given up. */
     bool (*is_given_up)(const void *context);
     const void *context;
 };
 
-/* How many bytes predicted_encode() may need; 0: more than a size_t can say. */
+/* Maximum size that predicted_encode() may need; 0: it exceeds a size_t. */
 size_t predicted_bound(const struct predicted_form *form);
-/* Fails where `capacity` is too small. */
+/* Fails if `capacity` is too small. */
 struct predicted_result predicted_encode(const struct predicted_source *source, uint8_t *out, size_t capacity);
-/* Fills width * rows * pixel_bytes bytes. Pixels have 2, 4, 8 or 16 bytes. Fails where `encoded` is damaged, or of
+/* Fills width * rows * pixel_bytes bytes. Pixels have 2, 4, 8 or 16 bytes. Fails if `encoded` is damaged or has
  * another size. */
 struct predicted_result predicted_decode(const struct predicted_form *form, const uint8_t *encoded,
                                          size_t encoded_bytes, uint8_t *pixels);

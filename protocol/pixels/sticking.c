@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Shares of pixels that move with the eye, as block means. */
 #include "protocol/pixels/sticking.h"
 
 #include <string.h>

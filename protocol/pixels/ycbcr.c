@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Conversion of pictures to RGB and Y'CbCr for video. */
 #include "protocol/pixels/ycbcr.h"
 
 #include "protocol/common/srgb.h"
@@ -7,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A column before the first and two after the last: of an odd picture that is made even, and the filter's. */
+/* One column before the first and two after the last, for odd pictures that are made even and for the filter. */
 #define MARGIN_BEFORE 1u
 #define MARGIN_AFTER 2u
 
@@ -47,7 +48,7 @@ void ycbcr_converter_finish(struct ycbcr_converter *converter)
     *converter = (struct ycbcr_converter){0};
 }
 
-/* Three bytes of each four. */
+/* Copies three of every four bytes. */
 static void copy_colours(uint8_t *to, const uint8_t *from, uint32_t width)
 {
     for (uint32_t x = 0; x < width; x++, from += 4, to += 3) {
@@ -67,7 +68,7 @@ static void copy_over_black(const struct ycbcr_converter *converter, uint8_t *to
     }
 }
 
-/* Makes one row of RGB with its margins, and returns its first pixel; rows beyond the last are the last one. */
+/* Makes one row of RGB with its margins, and returns its first pixel; rows beyond the last repeat it. */
 static const uint8_t *make_row(struct ycbcr_converter *converter, unsigned which, const uint8_t *pixels,
                                uint32_t row)
 {
@@ -91,9 +92,9 @@ const uint8_t *ycbcr_opaque_row(struct ycbcr_converter *converter, const uint8_t
 
 /* ---- Y'CbCr ---- */
 
-/* BT.709-6: E'Y = 0.2126 R + 0.7152 G + 0.0722 B, E'Cb = (B - E'Y) / 1.8556, E'Cr = (R - E'Y) / 1.5748; then 219
- * E'Y + 16 and 224 E'C + 128. Fixed point: with 22 bits a luma is off by less than 1e-4 of a step; chroma is taken
- * of sums over 8 weights, so that 19 bits stay within 31 (off by less than 1e-3). */
+/* BT.709-6: E'Y = 0.2126 R + 0.7152 G + 0.0722 B, E'Cb = (B - E'Y) / 1.8556, E'Cr = (R - E'Y) / 1.5748; then
+ * 219 E'Y + 16 and 224 E'C + 128. Fixed point: with 22 bits the error of a luma is below 1e-4 of a step; chroma
+ * comes from sums over 8 weights, so that 19 bits stay within 31 (error below 1e-3). */
 #define LUMA_BITS 22
 #define CHROMA_BITS 19
 #define FIXED(value, bits) ((int32_t)((value) * (1 << (bits)) + ((value) < 0 ? -0.5 : 0.5)))
@@ -107,7 +108,7 @@ static uint8_t luma_of(const uint8_t rgb[3])
                      LUMA_BITS);
 }
 
-/* Of sums: 8 times the colour. */
+/* Computes chroma from sums, which are 8 times the colour. */
 static void chroma_of(const int32_t sum[3], uint8_t *cb, uint8_t *cr)
 {
     const int32_t half_and_128 = (257 << (CHROMA_BITS + 2));

@@ -17,26 +17,26 @@
 enum ycbcr_alpha { YCBCR_ALPHA_IGNORED, YCBCR_ALPHA_OVER_BLACK };
 
 struct ycbcr_converter {
-    uint8_t (*over_black)[256]; /* by alpha and value; NULL: alpha is ignored */
-    uint32_t width, height;     /* of the pictures */
+    uint8_t (*over_black)[256]; /* table by alpha and value; NULL: alpha is ignored */
+    uint32_t width, height;     /* size of the pictures */
     uint8_t *rows[2];           /* RGB, with margins */
 };
 
 struct ycbcr_target {
     uint8_t *y, *cb, *cr;
     size_t y_stride_bytes, c_stride_bytes;
-    uint32_t width, height; /* of the luma: the picture's or more, which repeats the edge */
+    uint32_t width, height; /* size of the luma; larger than the picture: the edge is repeated */
     bool half_chroma;       /* Cb and Cr have (width + 1) / 2 x (height + 1) / 2 samples */
 };
 
-/* Width and height at most 8192; widths of targets at most one more than that. False: no memory. */
+/* Sizes are at most 8192; widths of targets at most one more than that. False: out of memory. */
 bool ycbcr_converter_init(struct ycbcr_converter *converter, uint32_t width, uint32_t height,
                           enum ycbcr_alpha alpha);
-void ycbcr_converter_finish(struct ycbcr_converter *converter); /* accepts one of zeros */
+void ycbcr_converter_finish(struct ycbcr_converter *converter); /* accepts a zeroed struct */
 
-/* `pixels`: rgba8, rows from the top without gaps. */
+/* Converts `pixels`: rgba8, rows from the top without gaps. */
 void ycbcr_convert(struct ycbcr_converter *converter, const uint8_t *pixels, const struct ycbcr_target *target);
-/* One row as it is seen: red, green, blue; valid until the next call. */
+/* One row as displayed: red, green, blue; valid until the next call. */
 const uint8_t *ycbcr_opaque_row(struct ycbcr_converter *converter, const uint8_t *pixels, uint32_t row);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Files of keys. */
 #include "protocol/sealed/key.h"
 
 #include <errno.h>
@@ -20,7 +21,7 @@ static bool denied(struct decode_error *error, const char *path, const char *wha
     return decode_error_set(error, PROTOCOL_ERROR_DENIED, path, "%s", what);
 }
 
-/* The open file, whatever its name leads to. */
+/* Checks the open file, so that its name cannot lead elsewhere meanwhile. */
 static bool check(int fd, const char *path, struct decode_error *error)
 {
     struct stat status;
@@ -62,7 +63,7 @@ static bool read_whole(int fd, struct sealed_key *key)
 bool sealed_key_read(struct sealed_key *key, const char *path, struct decode_error *error)
 {
     memset(key, 0, sizeof(*key));
-    /* Without waiting for whoever writes to a pipe. */
+    /* O_NONBLOCK avoids waiting for the writer of a pipe. */
     const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
     if (fd < 0) {
         return invalid(error, path, strerror(errno));

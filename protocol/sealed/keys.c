@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* Keys and proofs of a sealed connection. */
 #include "protocol/sealed/state.h"
 
 #include "protocol/reader.h"
 
-/* What the keys of one connection are for; filled up with zeros. */
+/* Labels that keep the derived keys of a connection apart; filled up with zeros. */
 static const char label_client_proof[LABEL_BYTES] = "farlight sealed client proof";
 static const char label_server_proof[LABEL_BYTES] = "farlight sealed server proof";
 static const char label_client_stream[LABEL_BYTES] = "farlight sealed client stream";
@@ -23,7 +24,7 @@ static void derive(const struct sealed *sealed, const struct sealed_key *key, co
     sodium_memzero(&hash, sizeof(hash));
 }
 
-/* Proof 3 is of `first` alone. */
+/* Proof 3 covers `first` alone. */
 static void prove(const struct sealed *sealed, const struct sealed_key *key, const char label[LABEL_BYTES],
                   const uint8_t *first, size_t first_bytes, const uint8_t *second, size_t second_bytes,
                   uint8_t out[PROOF_BYTES])

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
+/* The buffers of a sealed connection. */
 #include "protocol/sealed/link.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Until the peer is known: the messages of the handshake, and the first record of a client that sends it along. */
+/* Capacity before the peer is known: the messages of the handshake, and the first record that a client sends
+ * with them. */
 #define CLOSED_BYTES 512u
-/* Then a few of the largest records, so that a system call carries much. */
+/* Capacity of an open link: a few of the largest records, so that a system call moves much. */
 #define OPEN_BYTES (4u * (size_t)SEALED_RECORD_MAX_BYTES)
 
 /* ---- life ---- */
@@ -53,7 +55,7 @@ void sealed_link_destroy(struct sealed_link *link)
     }
 }
 
-/* The peer is known, so that it may have more memory. */
+/* Gives the buffers more memory, once the peer is known. */
 static bool widen(struct sealed_link *link)
 {
     uint8_t *in = realloc(link->in, OPEN_BYTES);
@@ -152,7 +154,7 @@ enum sealed_result sealed_link_handshake(struct sealed_link *link, struct decode
     enum sealed_result result = SEALED_CONSUMED;
     while (result == SEALED_CONSUMED && !sealed_is_open(link->sealed)) {
         size_t consumed_bytes = 0, out_bytes = 0;
-        /* At most two messages of the handshake wait at once. */
+        /* At most two messages of the handshake are queued at once. */
         result = sealed_handshake(link->sealed, link->in + link->in_start, sealed_link_unopened(link),
                                   &consumed_bytes, link->out + link->out_end, &out_bytes, error);
         link->in_start += consumed_bytes;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Sealing and opening of records. */
 #include "protocol/sealed/state.h"
 
 #include <string.h>

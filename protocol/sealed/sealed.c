@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The handshake of a sealed connection. */
 #include "protocol/sealed/sealed.h"
 
 #include <string.h>
@@ -26,7 +27,7 @@ const char *sealed_status_text(enum sealed_status status)
 
 static struct sealed *create(const struct sealed_key *keys, size_t key_count, bool is_client)
 {
-    /* It also chooses the fastest code for this processor. */
+    /* sodium_init() also chooses the fastest code for this processor. */
     if (sodium_init() < 0 || key_count < 1 || key_count > SEALED_KEYS_MAX) {
         return NULL;
     }
@@ -165,7 +166,7 @@ enum sealed_result sealed_fatal(struct sealed *sealed, struct decode_error *erro
     return SEALED_FATAL;
 }
 
-/* What is wrong is said as soon as it is seen. *third: version or status. */
+/* Checks a head byte by byte, so that a fault is reported early. *third: version or status. */
 static enum sealed_result get_head(struct sealed *sealed, const uint8_t *bytes, size_t count, unsigned number,
                                    unsigned *third, struct decode_error *error)
 {
@@ -193,7 +194,7 @@ static enum sealed_result refused(struct sealed *sealed, unsigned status, struct
     return SEALED_REFUSED;
 }
 
-/* False: the peer's public key is one with which there is no secret, or our own. */
+/* False: the peer's public key yields no secret, or is our own. */
 static bool exchange(struct sealed *sealed)
 {
     const uint8_t *ours = sealed->hello[sealed->is_client ? 0 : 1] + HEAD_BYTES;
@@ -207,7 +208,7 @@ static bool exchange(struct sealed *sealed)
     return crypto_kx_server_session_keys(sealed->up, sealed->down, ours, sealed->secret_key, theirs) == 0;
 }
 
-/* Server: message 1 in, message 2 out. */
+/* Server: reads message 1, makes message 2. */
 static enum sealed_result take_client_hello(struct sealed *sealed, const uint8_t *bytes, size_t count,
                                             uint8_t *out, size_t *out_bytes, struct decode_error *error)
 {
@@ -232,7 +233,7 @@ static enum sealed_result take_client_hello(struct sealed *sealed, const uint8_t
     return SEALED_CONSUMED;
 }
 
-/* Client: message 2 in, message 3 out. */
+/* Client: reads message 2, makes message 3. */
 static enum sealed_result take_server_hello(struct sealed *sealed, const uint8_t *bytes, size_t count,
                                             uint8_t *out, size_t *out_bytes, struct decode_error *error)
 {
@@ -262,7 +263,7 @@ static enum sealed_result take_server_hello(struct sealed *sealed, const uint8_t
     return SEALED_CONSUMED;
 }
 
-/* Which key fits; key_count: none. All are tried, so that the time does not tell. */
+/* Index of the client's key; key_count: none matches. All are tried, so that the time reveals nothing. */
 static size_t find_key(const struct sealed *sealed)
 {
     size_t found = sealed->key_count;
@@ -276,7 +277,7 @@ static size_t find_key(const struct sealed *sealed)
     return found;
 }
 
-/* Server: message 3 in, message 4 out. */
+/* Server: reads message 3, makes message 4. */
 static enum sealed_result take_client_proof(struct sealed *sealed, const uint8_t *bytes, size_t count,
                                             uint8_t *out, size_t *out_bytes, struct decode_error *error)
 {
@@ -308,7 +309,7 @@ static enum sealed_result take_client_proof(struct sealed *sealed, const uint8_t
     return SEALED_CONSUMED;
 }
 
-/* Client: message 4 in. */
+/* Client: reads message 4. */
 static enum sealed_result take_server_proof(struct sealed *sealed, const uint8_t *bytes, size_t count,
                                             struct decode_error *error)
 {

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Sealed connections: whoever is on the way can neither read nor change what is said, nor say anything, nor repeat
- * what was said before, nor leave off the end unnoticed; and both ends know that the other one has the same key,
- * 32 random bytes. Sans-I/O, for both ends; the caller owns the buffers and the socket. Cryptography is
- * libsodium's.
+/* Sealed connections: an attacker on the network can neither read nor change messages, nor inject or replay any,
+ * nor cut off the end unnoticed, and each end knows that the other one has the same key, 32 random bytes.
+ * Sans-I/O, for both ends; the caller owns the buffers and the socket. Cryptography is libsodium's.
  *
  * Four messages, little-endian; the client is first:
  *   1  client   "SEAL", u8 1, u8 version, u16 0, X25519 public key (32 bytes), nonce (32 bytes)
@@ -18,11 +17,11 @@
  * Proof 3 is BLAKE2b-256, keyed with K("client proof"), of the 32 bytes of message 3 before it; proof 4, keyed
  * with K("server proof"), of message 3 and the 32 bytes of message 4 before it.
  *
- * Then records, u32 sealed_bytes and so many bytes: crypto_secretstream_xchacha20poly1305 with K("client stream")
+ * Then records, u32 sealed_bytes and as many bytes: crypto_secretstream_xchacha20poly1305 with K("client stream")
  * or K("server stream"), the 4 bytes of the length as additional data. A record has 1 to 65,536 bytes of plain
  * text, 17 fewer than sealed; the last one of a direction has none and the tag FINAL, every other the tag MESSAGE.
- * The client may send records right behind message 3. What the records carry is what an open connection carries,
- * from the handshake on; they are cut anywhere. */
+ * The client may send records right after message 3. Together the records carry the bytes of an open connection,
+ * from the handshake on; a record may begin and end anywhere in them. */
 #ifndef FARLIGHT_PROTOCOL_SEALED_SEALED_H
 #define FARLIGHT_PROTOCOL_SEALED_SEALED_H
 
@@ -33,84 +32,86 @@ extern "C" {
 #endif
 
 #define SEALED_KEY_BYTES 32u
-#define SEALED_KEYS_MAX 2u /* that a server may know */
+#define SEALED_KEYS_MAX 2u /* number of keys that a server may know */
 #define SEALED_VERSION 1u
-#define SEALED_MAGIC "SEAL" /* its first byte differs from that of an open handshake */
+#define SEALED_MAGIC "SEAL" /* differs in the first byte from an open handshake */
 #define SEALED_MESSAGE_MAX_BYTES 72u
 #define SEALED_REFUSAL_BYTES 8u
 #define SEALED_PLAIN_MAX_BYTES 65536u
-#define SEALED_RECORD_EXTRA_BYTES 21u /* what a record has beside its plain text */
+#define SEALED_RECORD_EXTRA_BYTES 21u /* record size minus plain text */
 #define SEALED_RECORD_MAX_BYTES (SEALED_PLAIN_MAX_BYTES + SEALED_RECORD_EXTRA_BYTES)
 
 struct sealed_key {
     uint8_t bytes[SEALED_KEY_BYTES];
 };
 
-/* In messages 2 and 4. */
+/* Status in messages 2 and 4. */
 enum sealed_status {
     SEALED_WELCOME = 0,
-    SEALED_WRONG_KEY = 1,     /* message 4: the proof fits no key of the server's */
-    SEALED_NO_KEY = 3,        /* message 2: the server has no key at all */
-    SEALED_OTHER_VERSION = 4, /* message 2: it does not speak this version */
+    SEALED_WRONG_KEY = 1,     /* message 4: the proof matches no key of the server */
+    SEALED_NO_KEY = 3,        /* message 2: the server has no key */
+    SEALED_OTHER_VERSION = 4, /* message 2: the server does not speak this version */
 };
 const char *sealed_status_text(enum sealed_status status);
 
 enum sealed_result {
-    SEALED_CONSUMED,  /* *consumed_bytes bytes were a message, or a record */
-    SEALED_NEED_MORE, /* so far it is the beginning of one */
-    SEALED_NEED_ROOM, /* the record's plain text is larger than what there is for it */
-    SEALED_REFUSED,   /* sealed_status() says why: the client was, or the server has to (sealed_refuse()) */
-    SEALED_FATAL,     /* *error says why: code PROTOCOL. Nothing more can come on this connection */
+    SEALED_CONSUMED,  /* a message or a record was *consumed_bytes bytes */
+    SEALED_NEED_MORE, /* the bytes are the beginning of one */
+    SEALED_NEED_ROOM, /* the record's plain text exceeds plain_capacity */
+    /* sealed_status() has the reason: the client was refused, or the server must refuse (sealed_refuse()) */
+    SEALED_REFUSED,
+    SEALED_FATAL, /* *error has the reason: code PROTOCOL. The connection is unusable */
 };
 
-struct sealed; /* one end of one connection; secrets are wiped when it goes */
+struct sealed; /* one end of a connection; its secrets are wiped when it is destroyed */
 
-/* NULL: no memory, or no random numbers. */
+/* NULL: out of memory, or no random numbers. */
 struct sealed *sealed_client(const struct sealed_key *key);
-/* Knows 1 to SEALED_KEYS_MAX keys, which are copied. */
+/* Copies 1 to SEALED_KEYS_MAX keys. */
 struct sealed *sealed_server(const struct sealed_key *keys, size_t key_count);
 void sealed_destroy(struct sealed *sealed); /* accepts NULL */
 
-/* The client's first message; the number of its bytes. */
+/* Makes the client's first message; returns its size. */
 size_t sealed_begin(struct sealed *sealed, uint8_t out[SEALED_MESSAGE_MAX_BYTES]);
-/* Takes the next message of the handshake. Consumed: *out_bytes bytes of `out`, which may be 0, are to be sent.
- * Anything but NEED_MORE and CONSUMED is final. */
+/* Processes the next message of the handshake. Consumed: *out_bytes bytes of `out`, possibly 0, must be sent.
+ * Every result except NEED_MORE and CONSUMED is final. */
 enum sealed_result sealed_handshake(struct sealed *sealed, const uint8_t *bytes, size_t count,
                                     size_t *consumed_bytes, uint8_t out[SEALED_MESSAGE_MAX_BYTES],
                                     size_t *out_bytes, struct decode_error *error);
-/* Server: what it answers where it lets nobody in; after a wrong key it does well to wait before. */
+/* Makes a server's refusal; after a wrong key the server should wait before sending it. */
 void sealed_refuse(uint8_t out[SEALED_REFUSAL_BYTES], enum sealed_status status);
 
-/* Both have proved that they have the key, which each did with its last message. */
+/* True once both ends have proved that they have the key, each with its last message. */
 bool sealed_is_open(const struct sealed *sealed);
-/* Records may be sent; a client may do so before the server's proof, which is the first thing it reads. */
+/* True once records may be sent: for a client before the server's proof, which is the first thing that it
+ * reads. */
 bool sealed_may_seal(const struct sealed *sealed);
-/* Server, once open: which of its keys the client has. */
+/* Server, once open: index of the client's key. */
 size_t sealed_key_index(const struct sealed *sealed);
 enum sealed_status sealed_status(const struct sealed *sealed);
 
-/* Makes a record of 1 to SEALED_PLAIN_MAX_BYTES bytes, or with none the last one. `out` has room for that and
- * SEALED_RECORD_EXTRA_BYTES, apart from `plain`; the number of its bytes. */
+/* Makes a record of 1 to SEALED_PLAIN_MAX_BYTES bytes, or of none, which is the last record. `out` does not
+ * overlap `plain` and has SEALED_RECORD_EXTRA_BYTES more. Returns the record's size. */
 size_t sealed_seal(struct sealed *sealed, uint8_t *out, const uint8_t *plain, size_t plain_bytes);
 bool sealed_has_sealed_last(const struct sealed *sealed);
 
-/* Another process of the same build may go on with an open end that has not sealed or opened its last record: its
- * streams as sealed_saved_bytes() bytes, secret as they are. The keys of the connection's ends are not in them. */
+/* Save an open end that has neither sealed nor opened its last record, for another process of the same build:
+ * the streams in sealed_saved_bytes() bytes, which are as secret as the streams. Keys are not included. */
 size_t sealed_saved_bytes(void);
 void sealed_save(const struct sealed *sealed, uint8_t *out);
-/* NULL: no memory, or no random numbers. */
+/* NULL: out of memory, or no random numbers. */
 struct sealed *sealed_restore(const uint8_t *saved);
 
-/* Whether sealed_open() would ask for no more bytes. */
+/* True if sealed_open() would not return SEALED_NEED_MORE. */
 bool sealed_has_record(const uint8_t *bytes, size_t count);
-/* Opens one record into `plain`, which lies apart from `bytes`. */
+/* Opens one record into `plain`, which must not overlap `bytes`. */
 enum sealed_result sealed_open(struct sealed *sealed, const uint8_t *bytes, size_t count, size_t *consumed_bytes,
                                uint8_t *plain, size_t plain_capacity, size_t *plain_bytes,
                                struct decode_error *error);
-/* The last record has come: nothing was left off. */
+/* True once the last record was opened: nothing is missing. */
 bool sealed_has_opened_last(const struct sealed *sealed);
 
-/* A number that stands for the key, the same for each connection with it, and says nothing about it. */
+/* A number that identifies the key, the same on every connection, and reveals nothing about it. */
 uint64_t sealed_key_number(const struct sealed_key *key);
 
 #ifdef __cplusplus

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* Memory for keys. */
 #include "protocol/sealed/secret.h"
 
 #include <sodium.h>
 #include <string.h>
 #include <sys/prctl.h>
 
-/* A sanitizer traces its own process to find leaks. */
+/* Sanitizers trace their own process to find leaks. */
 #if defined(__SANITIZE_ADDRESS__)
 #define SANITIZED 1
 #elif defined(__has_feature)
@@ -17,7 +18,7 @@
 #define SANITIZED 0
 #endif
 
-/* sodium_malloc() puts the bytes at the end of a page. */
+/* sodium_malloc() aligns the end of the block with the end of a page. */
 #define ALIGNMENT 16u
 
 static size_t rounded(size_t bytes)
@@ -34,7 +35,7 @@ void *secret_create(size_t bytes)
     if (secret) {
         memset(secret, 0, rounded(bytes));
         if (!SANITIZED) {
-            prctl(PR_SET_DUMPABLE, 0, 0, 0, 0); /* which cannot fail */
+            prctl(PR_SET_DUMPABLE, 0, 0, 0, 0); /* this call cannot fail */
         }
     }
     return secret;

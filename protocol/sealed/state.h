@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Inside of one end of a sealed connection, for its files. */
+/* The inside of one end of a sealed connection, for its files. */
 #ifndef FARLIGHT_PROTOCOL_SEALED_STATE_H
 #define FARLIGHT_PROTOCOL_SEALED_STATE_H
 
@@ -18,7 +18,7 @@
 #define TAG_BYTES 17u
 #define HELLO_BYTES (HEAD_BYTES + PUBLIC_KEY_BYTES + NONCE_BYTES)      /* messages 1 and 2 */
 #define PROVING_BYTES (HEAD_BYTES + STREAM_HEADER_BYTES + PROOF_BYTES) /* messages 3 and 4 */
-#define UNPROVED_BYTES (HEAD_BYTES + STREAM_HEADER_BYTES)              /* of them: what is before the proof */
+#define UNPROVED_BYTES (HEAD_BYTES + STREAM_HEADER_BYTES) /* part before the proof in messages 3 and 4 */
 
 _Static_assert(HELLO_BYTES == SEALED_MESSAGE_MAX_BYTES && PROVING_BYTES <= SEALED_MESSAGE_MAX_BYTES, "sizes");
 _Static_assert(HEAD_BYTES == SEALED_REFUSAL_BYTES, "sizes");
@@ -35,7 +35,7 @@ enum stage {
     STAGE_HELLO,  /* waits for message 1 or 2 */
     STAGE_PROOF,  /* waits for message 3 or 4 */
     STAGE_OPEN,   /* records */
-    STAGE_BROKEN, /* nothing more is believed */
+    STAGE_BROKEN, /* every further byte is rejected */
 };
 
 struct sealed {
@@ -44,7 +44,7 @@ struct sealed {
     struct sealed_key keys[SEALED_KEYS_MAX];
     size_t key_count, key_index;
     enum sealed_status status;
-    uint8_t secret_key[SECRET_BYTES]; /* of the exchange */
+    uint8_t secret_key[SECRET_BYTES]; /* key pair of this connection */
     uint8_t up[SECRET_BYTES], down[SECRET_BYTES];
     uint8_t hello[2][HELLO_BYTES]; /* messages 1 and 2 */
     uint8_t client_proving[PROVING_BYTES];
@@ -52,18 +52,18 @@ struct sealed {
     crypto_secretstream_xchacha20poly1305_state sending, receiving;
 };
 
-/* The client's proof, of its message 3 as far as that is there, with one of the keys. */
+/* Computes the client's proof from its message 3, as far as it is filled in, with one of the keys. */
 void sealed_client_proof(const struct sealed *sealed, const struct sealed_key *key, uint8_t out[PROOF_BYTES]);
-/* The server's, of message 3 and of what is before the proof in message 4. */
+/* Computes the server's proof from message 3 and the part of message 4 before the proof. */
 void sealed_server_proof(const struct sealed *sealed, const uint8_t unproved[UNPROVED_BYTES],
                          uint8_t out[PROOF_BYTES]);
-/* The streams of this end; the header says to the other one how it begins to read. */
+/* Start the streams of this end; the other end needs the header for reading. */
 void sealed_begin_sending(struct sealed *sealed, uint8_t header[STREAM_HEADER_BYTES]);
 void sealed_begin_receiving(struct sealed *sealed, const uint8_t header[STREAM_HEADER_BYTES]);
-/* The exchange is over: what could make its secrets again is wiped. */
+/* Wipes everything from which the secrets of the exchange could be derived again. */
 void sealed_forget_exchange(struct sealed *sealed);
 
-/* Nothing more is believed. */
+/* Ends the connection with an error. */
 enum sealed_result sealed_fatal(struct sealed *sealed, struct decode_error *error, const char *field,
                                 const char *text);
 
