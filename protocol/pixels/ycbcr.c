@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* One column before the first and two after the last, for odd pictures that are made even and for the filter. */
+/* Margins for odd pictures that are made even and for the filter: a column before the first and two after the
+ * last. */
 #define MARGIN_BEFORE 1u
 #define MARGIN_AFTER 2u
 

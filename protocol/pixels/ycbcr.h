@@ -36,7 +36,7 @@ void ycbcr_converter_finish(struct ycbcr_converter *converter); /* accepts a zer
 
 /* Converts `pixels`: rgba8, rows from the top without gaps. */
 void ycbcr_convert(struct ycbcr_converter *converter, const uint8_t *pixels, const struct ycbcr_target *target);
-/* One row as displayed: red, green, blue; valid until the next call. */
+/* A row as displayed: red, green, blue; valid until the next call. */
 const uint8_t *ycbcr_opaque_row(struct ycbcr_converter *converter, const uint8_t *pixels, uint32_t row);
 
 #endif

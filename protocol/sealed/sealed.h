@@ -63,7 +63,7 @@ enum sealed_result {
     SEALED_FATAL, /* *error has the reason: code PROTOCOL. The connection is unusable */
 };
 
-struct sealed; /* one end of a connection; its secrets are wiped when it is destroyed */
+struct sealed; /* an end of a connection; its secrets are wiped when it is destroyed */
 
 /* NULL: out of memory, or no random numbers. */
 struct sealed *sealed_client(const struct sealed_key *key);
