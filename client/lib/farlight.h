@@ -289,7 +289,7 @@ FL_API bool fl_scene_light_has_size(const struct fl_scene *scene, uint32_t light
 /* A new, unused identifier for an edit of the caller's; 0: none is left. */
 FL_API uint32_t fl_scene_new_id(struct fl_scene *scene, enum protocol_object_kind kind);
 
-/* One property of one object over time. The arrays are the caller's and only read. */
+/* A property of an object over time. The arrays are the caller's and only read. */
 struct fl_channel {
     enum protocol_channel_path path;
     uint32_t object; /* node, light or material; 0: the view */
@@ -314,8 +314,8 @@ struct fl_object {
 /* The objects of a kind as the daemon has them now, ascending by id; *objects is malloc'ed. */
 FL_API bool fl_scene_objects(struct fl_scene *scene, enum protocol_object_kind kind, struct fl_object **objects,
                              size_t *count, struct fl_error *error);
-/* One object by its identifier, such as a pixel of the layer `id` holds for nodes and materials. Every kind but
- * `environment` is allowed. */
+/* Gets an object by its identifier, such as a pixel of the layer `id` holds for nodes and materials. Every kind
+ * but `environment` is allowed. */
 FL_API bool fl_scene_object(struct fl_scene *scene, enum protocol_object_kind kind, uint32_t id,
                             struct fl_object *object, struct fl_error *error);
 
@@ -374,7 +374,7 @@ FL_API bool fl_scene_read(struct fl_scene *scene, enum protocol_object_kind kind
 
 enum fl_assignment_way { FL_ASSIGN, FL_ASSIGN_SUM, FL_ASSIGN_PRODUCT };
 
-/* One field of one or several objects and its new value. */
+/* A field of one or several objects and its new value. */
 struct fl_assignment {
     enum protocol_object_kind kind; /* node, material, light, camera or environment */
     uint32_t id; /* identifier; 0: `which` selects the objects. Neither counts for the environment */
@@ -464,7 +464,7 @@ struct fl_job;
  * send ahead. Keys and clips are only read. */
 FL_API struct message_render fl_render_defaults(void);
 
-/* One picture and its costs. The caller owns it; every pointer in it lives as long as it does. */
+/* A picture and its costs. The caller owns it; every pointer in it lives as long as it does. */
 struct fl_frame {
     uint32_t frame, width, height, samples;
     float noise; /* largest error of a tile, if the request sets `noise`; 1e6: not known yet */
@@ -531,7 +531,7 @@ struct fl_frame {
 
 #define FL_STRUCTURE_NAME_BYTES 64
 
-/* One part of a tracer's structure, described in a line for people. */
+/* A part of a tracer's structure, described in a line for people. */
 struct fl_structure_part {
     uint32_t number;
     char name[FL_STRUCTURE_NAME_BYTES]; /* empty: the structure has no parts */
@@ -707,7 +707,7 @@ struct fl_video_options {
     float frames_per_second; /* 0: 24; 23.976, 29.97 and so on mean 24000/1001, 30000/1001 and so on */
     unsigned quality;        /* x264's rate factor, 1 (best) to 51; 0: 18. WebP: 1 to 100 (best); 0: 90 */
     bool lossless;           /* every pixel as it is, .mkv and .webp only */
-    int interrupt_fd;        /* as in fl_connect_options */
+    int interrupt_fd;        /* see fl_connect_options */
 };
 
 struct fl_video_info {
@@ -750,9 +750,9 @@ enum fl_y4m_chroma {
 
 struct fl_y4m_options {
     int fd;                  /* pipe, socket or file; stays the caller's */
-    float frames_per_second; /* as in fl_video_options */
+    float frames_per_second; /* see fl_video_options */
     enum fl_y4m_chroma chroma;
-    int interrupt_fd; /* as in fl_connect_options */
+    int interrupt_fd; /* see fl_connect_options */
 };
 
 /* Nothing is written before the first frame. The samples are 8-bit Y'CbCr by BT.709 in limited range (said in the
@@ -786,7 +786,7 @@ struct fl_compare_options {
     float heat_top;                  /* the error with the brightest colour; 0: the maximum error, at most 1 */
     enum protocol_tone_map tone_map; /* tone map for showing linear files */
     unsigned timeout_ms;             /* 0: 10 minutes */
-    int interrupt_fd;                /* as of fl_connect_options */
+    int interrupt_fd;                /* see fl_connect_options */
 };
 
 /* The difference of two images. An error is the difference of one channel of one pixel, without sign, in units of
