@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Conversion of frames to the colours of their files.
 #include "colour.h"
 #include "layers.hpp"
 #include "library.h"
@@ -16,13 +17,13 @@ namespace
 using matrix = std::array<std::array<double, 3>, 3>; // rows
 using vector = std::array<double, 3>;
 
-// Spaces that need no configuration.
+// Colour spaces that need no configuration.
 struct named_space {
     const char *name;
     float chromaticities[8];
 };
 
-// ITU-R BT.709, BT.2020; SMPTE EG 432-1; SMPTE ST 2065-1; Academy S-2014-004.
+// Chromaticities by ITU-R BT.709, BT.2020; SMPTE EG 432-1; SMPTE ST 2065-1; Academy S-2014-004.
 const named_space known_spaces[] = {
     {"Linear Rec.709", {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f}},
     {"ACEScg", {0.713f, 0.293f, 0.165f, 0.830f, 0.128f, 0.044f, 0.32168f, 0.33767f}},
@@ -31,7 +32,7 @@ const named_space known_spaces[] = {
     {"Linear P3-D65", {0.680f, 0.320f, 0.265f, 0.690f, 0.150f, 0.060f, 0.3127f, 0.3290f}}};
 const named_space &rec709 = known_spaces[0], &aces = known_spaces[2];
 
-// Two matrices of one space: configurations have them of four and more digits.
+// Tolerance for two matrices of one space: configurations list four and more digits.
 constexpr double SAME_SPACE = 2e-3;
 
 matrix multiply(const matrix &a, const matrix &b)
@@ -81,7 +82,7 @@ vector xyz_of(const float chromaticity[2])
     return {x / y, 1, (1 - x - y) / y};
 }
 
-// Its white has Y = 1. Green of ACES2065-1 has x = 0; no primary has y = 0.
+// The white has Y = 1. Green of ACES2065-1 has x = 0; no primary has y = 0.
 matrix xyz_from(const named_space &space)
 {
     matrix primaries = {};
@@ -97,7 +98,7 @@ matrix xyz_from(const named_space &space)
     return primaries;
 }
 
-// Bradford's: Lam. Metamerism and Colour Constancy. 1985; as ACES and OpenColorIO adapt whites.
+// Bradford's adaptation (Lam. Metamerism and Colour Constancy. 1985), as ACES and OpenColorIO adapt whites.
 matrix adaptation(const named_space &from, const named_space &to)
 {
     const matrix cones = {{{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
@@ -117,8 +118,8 @@ matrix from_rec709(const named_space &to)
 
 // The conversion of all frames of this run.
 struct {
-    bool converts, shows; // shows: pictures of 8 bits
-    bool is_linear;       // by the matrix, which is that of the configuration's transform, too
+    bool converts, shows; // `shows`: pictures of 8 bits
+    bool is_linear;       // the matrix converts, and equals the configuration's transform
     matrix by;
     const float *chromaticities = rec709.chromaticities;
 } run;
@@ -152,7 +153,7 @@ void use(const matrix &by)
     }
 }
 
-// A configuration does not say whether a transform is linear: probes do.
+// A configuration does not state whether a transform is linear, so probe colours decide.
 void find_matrix(const struct image_library *library)
 {
     static const float probes[][3] = {
@@ -192,7 +193,7 @@ bool open_configuration(const struct colour_wanted *wanted, char *reason, size_t
     return true;
 }
 
-// Straight colours of a row, as files of that kind have them.
+// Converts a row's pixels, with straight alpha as in image files.
 void convert_row(float *row, size_t width)
 {
     for (size_t i = 0; i < width; i++) {
@@ -265,7 +266,8 @@ bool colour_convert(struct message_frame_begin *begin, uint8_t *pixels, char *re
     }
     if (!run.shows)
         return true;
-    std::transform(values, values + plane_values, pixels, byte_of); // a byte is never beyond what is read
+    // a byte is written only after the float at its place was read
+    std::transform(values, values + plane_values, pixels, byte_of);
     begin->format = PROTOCOL_PIXEL_FORMAT_RGBA8;
     return true;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The colours that files get: from the renderer's linear Rec. 709 to a space of which primaries are known, or to
- * what an OpenColorIO configuration has: a colour space for EXR, a view of a display for pictures of 8 bits. C++
- * behind C. One for all files of a run. */
+/* Colours of files: conversion from the renderer's linear Rec. 709 to a space with known primaries, or by an
+ * OpenColorIO configuration to a colour space for EXR or to a display's view for pictures of 8 bits. C++ behind
+ * C. All files of a run share one conversion. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_COLOUR_H
 #define FARLIGHT_CLIENT_OUTPUT_COLOUR_H
 
@@ -12,19 +12,19 @@ extern "C" {
 #endif
 
 struct colour_wanted {
-    const char *config; /* file of the configuration; NULL: there is none */
-    const char *space;  /* NULL: as the renderer has it */
+    const char *config; /* file of the configuration; NULL: none */
+    const char *space;  /* NULL: the renderer's */
     const char *view;   /* "VIEW" of the default display, or "DISPLAY/VIEW"; NULL: none */
 };
 
 bool colour_is_wanted(const struct colour_wanted *wanted);
-/* Whether the module of library.h does it, by the configuration. */
+/* True if the conversion needs the module of library.h, for the configuration. */
 bool colour_needs_library(const struct colour_wanted *wanted);
-/* Within the sandbox, the module loaded if it is needed. False: `reason` says why. */
+/* Prepares the conversion, within the sandbox and after the module was loaded. False: `reason` is set. */
 bool colour_prepare(const struct colour_wanted *wanted, char *reason, size_t reason_bytes);
-/* Converts the frame, which has the format rgba32f, in place; with a view to rgba8. */
+/* Converts a frame of the format rgba32f in place; a view makes it rgba8. */
 bool colour_convert(struct message_frame_begin *begin, uint8_t *pixels, char *reason, size_t reason_bytes);
-/* x and y of red, green, blue and white that EXR files name; NULL: they are not known. */
+/* x and y of red, green, blue and white, for EXR files; NULL: unknown. */
 const float *colour_chromaticities(void);
 
 #ifdef __cplusplus

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Comparison of two image files, by the module of library.h. */
 #include "compare.h"
 #include "helper/file.h"
 #include "image.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Encoding of EXR files.
 #include "exr_encode.hpp"
 #include "exr_stream.hpp"
 #include "layers.hpp"
@@ -22,7 +23,7 @@
 namespace
 {
 
-// Matrices of EXR stand to the right of row vectors: element [row of the input][column of the output].
+// Matrices of EXR multiply row vectors from the right: element [row of the input][column of the output].
 struct matrix {
     float m[4][4];
 };
@@ -53,8 +54,8 @@ matrix world_to_camera(const float world_from_view[12])
     return made;
 }
 
-// Of OpenEXR's worldToNDC: (0,0) is the upper left corner of the picture, (1,1) the lower right one; z is of no
-// meaning and made 1 / distance here.
+// OpenEXR's worldToNDC: (0,0) is the upper left corner of the picture, (1,1) the lower right one; z has no meaning
+// and is 1 / distance here.
 matrix camera_to_ndc(const struct message_frame_begin &begin, float aspect)
 {
     matrix made = {};
@@ -87,13 +88,13 @@ void add_camera(Imf::Header &header, const struct message_frame_begin &begin)
     const matrix to_ndc = multiply(to_camera, camera_to_ndc(begin, aspect));
     header.insert("worldToCamera", Imf::M44fAttribute(Imath::M44f(to_camera.m)));
     header.insert("worldToNDC", Imf::M44fAttribute(Imath::M44f(to_ndc.m)));
-    // Of the plane at distance 1 for a pinhole, of the picture itself for parallel rays.
+    // Width of the plane at distance 1 for a pinhole, of the picture itself for parallel rays.
     header.screenWindowWidth() =
         aspect * (begin.fov_y > 0 ? 2 * std::tan(begin.fov_y / 2) : std::max(begin.ortho_height, 0.0f));
     header.insert("fieldOfView", Imf::FloatAttribute(begin.fov_y * degrees_per_radian));
 }
 
-// Rates as people mean them: whole numbers, and the television ones over 1001.
+// Adds the exact rate: whole numbers, and the television rates over 1001.
 void add_rate(Imf::Header &header, float frames_per_second)
 {
     Imf::Rational rate(static_cast<int>(std::lround(static_cast<double>(frames_per_second) * 1000)), 1000);
@@ -139,7 +140,7 @@ Imf::Header make_header(const struct image &image, const std::string &date, enum
     return header;
 }
 
-// Colours alone are compressed with loss; what is beside them is a part of its own.
+// DWAA compresses colours with loss, so other layers form a part of their own.
 std::vector<enum exr_part> parts_of(const struct image &image)
 {
     const Imf::ChannelList colours = channels_of_part(image, exr_part::colours),

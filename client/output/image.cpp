@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Encoding of frames and pictures as image files, by format.
 #include "image.h"
 #include "exr_encode.hpp"
 #include "jpeg_encode.h"
@@ -67,7 +68,7 @@ std::vector<uint8_t> bytes_of(const struct raster &raster)
     return bytes;
 }
 
-// With bytes for components, which `bytes` keeps where they have to be made.
+// Converts components to bytes; `bytes` stores them if a conversion is needed.
 struct raster as_bytes(const struct raster &raster, std::vector<uint8_t> &bytes)
 {
     if (raster.component_bytes == 1)
@@ -76,7 +77,7 @@ struct raster as_bytes(const struct raster &raster, std::vector<uint8_t> &bytes)
     return {raster.width, raster.height, raster.channels, 1, bytes.data()};
 }
 
-// What every PNG file of ours says, then `texts`.
+// Writes a PNG with the entries that all our files have, then `texts`.
 bool write_png(const struct raster &raster, const std::vector<std::pair<std::string, std::string>> &texts,
                const std::tm *date, bool other_display, uint8_t **file, size_t *file_bytes, char *reason,
                size_t reason_bytes)
@@ -169,7 +170,7 @@ bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, 
                      reason, reason_bytes);
 }
 
-// Runs what may throw.
+// Runs an encoder and turns exceptions into errors.
 template <typename function> bool guard(function encode, char *reason, size_t reason_bytes)
 {
     try {

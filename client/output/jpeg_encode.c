@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Encoding of JPEG files with comment and Exif. */
 #include "jpeg_encode.h"
 #include "protocol/version.h"
 
@@ -12,7 +13,7 @@
 #define MARKER_EXIF 0xe1
 #define MARKER_HEAD_BYTES 4u
 #define SEGMENT_BYTES_MAX (65535u - 2)
-/* Start of image and JFIF's segment, behind which others may stand. */
+/* Start of image and the JFIF segment; further segments may follow them. */
 #define START_BYTES 20u
 
 static bool fail(char *reason, size_t reason_bytes, const char *text)
@@ -32,7 +33,7 @@ static bool add_text(ExifData *exif, ExifTag tag, const char *text)
         return count == 1;
     entry->tag = tag;
     entry->format = EXIF_FORMAT_ASCII;
-    entry->data = malloc(count); /* which is what the library frees it by */
+    entry->data = malloc(count); /* malloc, because libexif frees it */
     if (entry->data) {
         memcpy(entry->data, text, count);
         entry->components = count;
@@ -61,7 +62,7 @@ static bool make_exif(const struct jpeg *jpeg, unsigned char **bytes, unsigned *
 
 /* ---- the file ---- */
 
-/* What a segment has no room for is left out. */
+/* Size of a segment; contents that are too long for a segment are omitted. */
 static size_t segment_bytes(size_t count)
 {
     return count > 0 && count <= SEGMENT_BYTES_MAX ? MARKER_HEAD_BYTES + count : 0;
@@ -78,7 +79,7 @@ static uint8_t *put_segment(uint8_t *at, uint8_t marker, const void *bytes, size
     return at + sizeof(head) + count;
 }
 
-/* Puts comment and Exif into the coded picture. */
+/* Inserts comment and Exif into the coded picture. */
 static bool join(const struct jpeg *jpeg, const uint8_t *coded, size_t coded_bytes, uint8_t **file,
                  size_t *file_bytes)
 {

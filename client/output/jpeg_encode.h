@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pixels to the bytes of a JPEG file, in memory. */
+/* Encoding of pixels as the bytes of a JPEG file, in memory. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_JPEG_ENCODE_H
 #define FARLIGHT_CLIENT_OUTPUT_JPEG_ENCODE_H
 
@@ -13,13 +13,13 @@ extern "C" {
 #endif
 
 struct jpeg {
-    struct raster raster;    /* of bytes, sRGB; alpha is left out */
+    struct raster raster;    /* bytes, sRGB; alpha is dropped */
     unsigned quality;        /* 1 to 100 */
-    const char *description; /* a comment, and Exif's; "": none */
-    const char *date;        /* "YYYY:MM:DD hh:mm:ss", Exif's; "": none */
+    const char *description; /* comment and Exif description; "": none */
+    const char *date;        /* Exif date "YYYY:MM:DD hh:mm:ss"; "": none */
 };
 
-/* *file is malloc'ed. False: `reason` says why. */
+/* *file is malloc'ed. False: `reason` is set. */
 bool jpeg_encode(const struct jpeg *jpeg, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes);
 
 #ifdef __cplusplus

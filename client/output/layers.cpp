@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Channels of EXR files for the layers of a frame.
 #include "layers.hpp"
 #include "mattes.hpp"
 
@@ -19,12 +20,12 @@ enum class content { colour, exact, number, object, material };
 
 struct layer_channel {
     enum protocol_layer layer;
-    int component; // of the frame's four
+    int component; // index among the frame's four
     const char *name;
     enum content content;
 };
 
-// Names as other programs know them: "Technical Introduction to OpenEXR", Channel Names and Layers.
+// Names that other programs recognise: "Technical Introduction to OpenEXR", Channel Names and Layers.
 const layer_channel known[] = {{PROTOCOL_LAYER_BEAUTY, 0, "R", content::colour},
                                {PROTOCOL_LAYER_BEAUTY, 1, "G", content::colour},
                                {PROTOCOL_LAYER_BEAUTY, 2, "B", content::colour},
@@ -147,7 +148,7 @@ std::vector<layer_channel> channels_of(unsigned layers, enum exr_part part)
     return channels;
 }
 
-// In the file: groups of light may have been named.
+// Name of the channel in the file; light groups may have names of their own.
 std::string name_of(const struct image &image, const layer_channel &channel)
 {
     std::string names = image.light_groups ? image.light_groups : "";
@@ -165,13 +166,13 @@ size_t place_of(enum protocol_layer layer, unsigned layers)
     return static_cast<size_t>(__builtin_popcount(layers & ((1u << layer) - 1)));
 }
 
-// A whole number that came as a float; what is none becomes 0, which no object has.
+// Converts a whole number that is stored as a float; others become 0, which no object has.
 uint32_t number_of(float value)
 {
     return value >= 0 && value < 4294967040.0f ? static_cast<uint32_t>(value) : 0;
 }
 
-// A component of a pixel as a float; `pixels` are of that format.
+// Reads a component of a pixel as a float; `pixels` have this format.
 float component(enum protocol_pixel_format format, const void *pixels, size_t index)
 {
     switch (format) {
@@ -184,7 +185,7 @@ float component(enum protocol_pixel_format format, const void *pixels, size_t in
     }
 }
 
-// Identifiers are hashes of names in the file, as floats of the same bits.
+// Identifiers in the file are hashes of names, stored as floats with the same bits.
 float matte_of(const struct image &image, enum content content, float value)
 {
     const bool is_object = content == content::object, is_material = content == content::material;
@@ -194,7 +195,7 @@ float matte_of(const struct image &image, enum content content, float value)
                             number_of(value));
 }
 
-// One channel of the pixels from `first` on.
+// Writes a channel of a row whose first pixel is `first`.
 void put_row(const struct image &image, size_t first, const layer_channel &channel, Imf::PixelType type, char *to)
 {
     for (size_t x = 0; x < image.begin->width; x++, to += size_of(type)) {
@@ -202,7 +203,7 @@ void put_row(const struct image &image, size_t first, const layer_channel &chann
             component(image.begin->format, image.pixels, 4 * (first + x) + static_cast<size_t>(channel.component));
         const float value = matte_of(image, channel.content, stored);
         const uint32_t number = number_of(stored);
-        const half rounded(std::clamp(value, -half_max, half_max)); // as the renderer does for half floats
+        const half rounded(std::clamp(value, -half_max, half_max)); // rounded as the renderer does
         if (type == Imf::UINT)
             std::memcpy(to, &number, sizeof(number));
         else if (type == Imf::HALF)
@@ -271,7 +272,7 @@ template <typename output> void write_rows(output &file, const struct image &ima
                           Imf::Slice::Make(type, plane.data(),
                                            Imath::V2i(static_cast<int>(whole.x), static_cast<int>(whole.y + top)),
                                            static_cast<int64_t>(width), rows, size_of(type), row_bytes));
-            planes.push_back(std::move(plane)); // what the slice points to
+            planes.push_back(std::move(plane)); // keeps the memory that the slice points to
         }
         file.setFrameBuffer(buffer);
         file.writePixels(static_cast<int>(rows));

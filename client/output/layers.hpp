@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A frame that brings several images, as the channels of one EXR file.
+// Layers of a frame as the channels of one EXR file.
 #pragma once
 
 #include "image.h"
@@ -8,21 +8,22 @@
 
 #include <string>
 
-// Whether it is more than the picture, or something else.
+// True if the frame has layers besides the beauty, or others instead.
 bool has_layers(const struct message_frame_begin &begin);
-// The picture that the frame is a part of; what is told and cannot be is the frame itself.
+// The picture that the frame is a part of; for an impossible window the frame itself.
 struct image_window window_of(const struct image &image);
-// "beauty,depth"
+// Lists layers as "beauty,depth".
 std::string layer_names(unsigned layers);
 
-// Whether it is light or a colour, and not a number of another kind.
+// True for layers that are light or colour.
 bool is_colour_layer(enum protocol_layer layer);
 
-// DWAA loses something of what it takes for colours, and goes by the ends of names: Y of a position would be one.
+// Parts of a file with DWAA, which compresses with loss all channels that look like colours by the end of their
+// names, so that the Y of a position would be one.
 enum class exr_part { whole, colours, data };
 
-// The channels of the file, or of a part of it, and their types. With `half_floats` those are half floats that
-// such numbers suffice for: colours, directions and shares. Distances, places and numbers of objects never are.
+// The channels of a file, or of a part of it, and their types. `half_floats` stores colours, directions and shares
+// as half floats; distances, positions and object numbers stay 32-bit.
 Imf::ChannelList channels_of_part(const struct image &image, enum exr_part part);
-// Writes all rows to an output that has those channels: an OutputFile or an OutputPart.
+// Writes all rows to an OutputFile or an OutputPart with those channels.
 template <typename output> void write_rows(output &file, const struct image &image, enum exr_part part);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Loading of the module of library.h. */
 #include "library.h"
 #include "helper/module.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* farlight-export: takes pictures over a socket that the program that started it has connected already, and
- * writes image files; compares image files. A program of its own so that nothing else links the libraries of image
- * files; it may write beneath one folder, read the files that it was started with, and open nothing else. */
+/* farlight-export: receives pictures over a socket that its parent has connected, and writes image files;
+ * compares and merges image files. It is a program of its own so that nothing else links the libraries of image
+ * formats; its sandbox allows writing below one folder and reading the files named at its start. */
 #include "helper/file.h"
 #include "image.h"
 #include "library.h"
@@ -22,7 +22,7 @@
 #define EXIT_USAGE 2
 #define TEXT_MAX 512
 
-/* The C library looks for it by name, past our hidden visibility. */
+/* argp finds this variable by name, despite our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
 enum {
@@ -46,7 +46,7 @@ enum {
 
 struct options {
     const char *folder;
-    enum image_format format; /* of all files; unknown: any */
+    enum image_format format; /* format of all files; unknown: any */
     bool draws_text, merges;
     struct compare_file files[READ_MAX];
     struct serve_options serve;
@@ -128,7 +128,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-/* An error of a file is reported by the request that needs it. */
+/* Opens the files; the request that needs a file reports its error. */
 static void open_files(struct options *options)
 {
     for (size_t i = 0; i < options->serve.file_count; i++) {
@@ -148,8 +148,8 @@ static bool needs_library(const struct options *options)
            (options->folder && image_needs_library(options->format));
 }
 
-/* The folder of the configuration, which has its tables, too; the caller frees it. Names the file as it is there.
- */
+/* The folder of the configuration and its tables, which the caller frees. Replaces the configuration's path by
+ * its name in there. */
 static char *configuration_folder(struct options *options)
 {
     static char path[PATH_MAX];
@@ -160,7 +160,7 @@ static char *configuration_folder(struct options *options)
     return strndup(path, (size_t)(strrchr(path, '/') - path + 1));
 }
 
-/* The module's libraries start threads, so it is loaded within the sandbox. */
+/* Enters the sandbox, then loads the module, whose libraries start threads. */
 static bool enter_sandbox(struct options *options)
 {
     const char *const write_folders[] = {options->folder};
@@ -179,7 +179,7 @@ static bool enter_sandbox(struct options *options)
                                             .address_space_bytes = UINT64_C(16) << 30};
     char reason[TEXT_MAX] = "";
     open_files(options);
-    tzset(); /* for dates; within the sandbox it could not read the time zone */
+    tzset(); /* reads the time zone, for dates, which the sandbox forbids later */
     const bool entered = sandbox_enter(&sandbox, reason, sizeof(reason));
     free(modules);
     free(configuration);
@@ -223,7 +223,7 @@ int main(int argc, char **argv)
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&argp, argc, argv, 0, NULL, &options) != 0)
         return EXIT_USAGE;
-    /* A limit on file sizes is an error of write(), not the end. */
+    /* A limit on file sizes becomes an error of write() instead of ending the program. */
     signal(SIGXFSZ, SIG_IGN);
     file_clean_up_on_end();
     return enter_sandbox(&options) && serve(&options.serve) ? EXIT_SUCCESS : EXIT_FAILURE;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Cryptomatte's identifiers and metadata.
 #include "mattes.h"
 #include "mattes.hpp"
 
@@ -10,7 +11,7 @@
 namespace
 {
 
-constexpr size_t names_max = size_t(1) << 22; // of a scene; more come from no client of ours
+constexpr size_t names_max = size_t(1) << 22; // limit for a scene; our clients send fewer
 
 struct matte {
     std::string name;
@@ -43,8 +44,8 @@ uint32_t murmur3(const std::string &text)
     return hash ^ hash >> 16;
 }
 
-// No infinity, no NaN and no denormal number: the lowest bit of such exponents is turned over, as the
-// specification says.
+// Infinity, NaN and denormal numbers are avoided by flipping the lowest bit of such exponents, as the
+// specification demands.
 float identifier_of(const std::string &name)
 {
     uint32_t bits = murmur3(name);
@@ -70,7 +71,7 @@ std::string hex_of(float identifier)
     return hex_of(bits);
 }
 
-// A string of JSON; bytes above 127 stay as they are, as names are UTF-8.
+// Quotes a string for JSON; bytes above 127 are kept, as names are UTF-8.
 std::string quoted(const std::string &text)
 {
     std::string out = "\"";

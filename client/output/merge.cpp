@@ -26,12 +26,12 @@
 namespace
 {
 
-constexpr int edge_max = 8192;      // as of frames
-constexpr int channels_max = 256;   // more than there are of all layers
+constexpr int edge_max = 8192;      // the frames' limit
+constexpr int channels_max = 256;   // more than all layers have
 constexpr uint32_t band_rows = 64u; // a multiple of the rows that are compressed together
 constexpr char part_name[] = "farlight/part";
-constexpr uint64_t rays_max = UINT64_MAX / SQUARES_PARTS_MAX; // so that their sum is one
-// Counts that each part has of its own rays; the whole has their sum.
+constexpr uint64_t rays_max = UINT64_MAX / SQUARES_PARTS_MAX; // the sum over all parts still fits
+// Attributes that count the rays of a part; the whole picture gets their sum.
 constexpr const char *counts[] = {"farlight/primary_rays", "farlight/shadow_rays", "farlight/secondary_rays"};
 
 struct part {
@@ -44,7 +44,7 @@ struct part {
     uint64_t rays[std::size(counts)];
 };
 
-// Why the files cannot be merged; `path` is that of the file at fault, empty: of none.
+// The reason why files cannot be merged; `path` is the file at fault, empty: no single one.
 struct refusal : std::runtime_error {
     refusal(std::string of, const std::string &why, const char *what_to_do = nullptr)
         : std::runtime_error(why), path(std::move(of)), remedy(what_to_do)
@@ -66,7 +66,7 @@ bool is_size(const Imath::Box2i &box)
            box.max.y < edge_max;
 }
 
-// Other files may be EXR files, too.
+// Rejects EXR files that are no parts of a picture.
 void check_form(const part &one)
 {
     const Imf::Header &header = one.file->header();
@@ -82,7 +82,7 @@ void check_form(const part &one)
         throw refusal(one.path, "is cut off", "render this part again");
 }
 
-// A number without a sign at the beginning of `text`, up to a character that ends it and is taken, too.
+// Reads an unsigned number at the beginning of `text`, up to the character `end`, and removes both.
 template <typename number> bool take_number(std::string &text, number &value, char end, int base = 10)
 {
     const char *last = text.data() + text.size();
@@ -148,7 +148,7 @@ std::vector<uint8_t> bytes_of(const Imf::Attribute &attribute)
     return stream.file;
 }
 
-// The first attribute in `a` that `b` has not, or has otherwise; NULL: none.
+// The first attribute of `a` that `b` lacks or has with another value; NULL: none.
 const char *difference(const Imf::Header &a, const Imf::Header &b)
 {
     for (auto each = a.begin(); each != a.end(); ++each) {
@@ -161,7 +161,7 @@ const char *difference(const Imf::Header &a, const Imf::Header &b)
     return nullptr;
 }
 
-// Whether it belongs to the same picture as the first one.
+// Checks that a part belongs to the same picture as the first one.
 void check_same(const part &one, const part &first, bool any_device)
 {
     const std::string *version = text_of(one.file->header(), "Software");
@@ -187,7 +187,7 @@ void check_same(const part &one, const part &first, bool any_device)
                       "render it again by the same device, or give --any-device: pixels then differ by rounding");
 }
 
-// "part 3", "parts 3, 5 and 6"
+// Lists parts as "part 3" or "parts 3, 5 and 6".
 std::string listed(const std::vector<uint32_t> &numbers)
 {
     constexpr size_t most = 12;
@@ -197,7 +197,7 @@ std::string listed(const std::vector<uint32_t> &numbers)
     return numbers.size() > most ? text + " and " + std::to_string(numbers.size() - most) + " more" : text;
 }
 
-// Each part once, in the order of their numbers.
+// Sorts the parts by number; each must occur once.
 std::vector<part> sorted(std::vector<part> parts)
 {
     const uint32_t count = parts[0].parts;
@@ -234,7 +234,7 @@ Imf::Header header_of_whole(const std::vector<part> &parts)
     return header;
 }
 
-// Some rows of all channels.
+// A band of rows with all channels.
 struct band {
     explicit band(const Imf::Header &header) : width(static_cast<uint32_t>(header.dataWindow().max.x) + 1u)
     {
@@ -263,7 +263,7 @@ struct band {
     std::vector<channel> channels;
 };
 
-// Rows of a square that lie in the band from `top` on.
+// Copies those rows of a square that lie in the band from `top` on.
 void copy_square(const square &from, uint32_t top, uint32_t rows, const band &source, band &target)
 {
     const uint32_t first = std::max(from.y, top), end = std::min(from.y + from.height, top + rows);
@@ -277,7 +277,7 @@ void copy_square(const square &from, uint32_t top, uint32_t rows, const band &so
     }
 }
 
-// The squares of a part in the rows from `top` on.
+// The squares of a part that overlap the rows from `top` on.
 std::vector<square> squares_in(const squares &all, const part &one, uint32_t top, uint32_t rows)
 {
     std::vector<square> found;

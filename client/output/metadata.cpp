@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Metadata of image files.
 #include "metadata.hpp"
 #include "layers.hpp"
 
@@ -28,7 +29,7 @@ void add_count(std::vector<metadata_entry> &entries, const char *name, uint64_t 
     add_text(entries, name, std::to_string(value));
 }
 
-// A picture that is made from depth layers has this row: the share of its samples that they do not show.
+// True for the row that only pictures from depth layers have: the share of samples that the layers do not show.
 bool is_share_unknown(const struct record_structure_row &row)
 {
     return std::strcmp(row.name, "views/unknown") == 0;
@@ -39,8 +40,8 @@ bool is_from_layers(const struct message_frame_end &end)
     return std::any_of(end.structure, end.structure + end.structure_count, is_share_unknown);
 }
 
-// Lengths, warnings and the share that is unknown belong to the picture; other numbers and means tell what was
-// done for it, which depends on earlier frames and on the machine.
+// Adds rows about the structure. Lengths, warnings and the unknown share belong to the picture; other counts and
+// means describe the work done for it, which depends on earlier frames and on the machine.
 void add_structure(std::vector<metadata_entry> &entries, const struct message_frame_end &end, bool full)
 {
     for (uint32_t i = 0; i < end.structure_count; i++) {
@@ -103,7 +104,7 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     add_text(entries, "tracer", protocol_tracer_text(begin.tracer));
     add_text(entries, "integrator", protocol_integrator_text(begin.integrator));
     add_count(entries, "samples", begin.samples);
-    if (image.part && image.part[0] != '\0') // most of its pixels are elsewhere
+    if (image.part && image.part[0] != '\0') // most of the picture's pixels are in other files
         add_text(entries, "part", image.part);
     else
         add_text(entries, "digest", digest);
@@ -112,7 +113,7 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     add_number(entries, "exposure_stops", static_cast<double>(begin.exposure_stops));
     add_number(entries, "time_s", static_cast<double>(begin.time_s));
     add_number(entries, "fov_y_degrees", static_cast<double>(begin.fov_y * degrees_per_radian));
-    if (image.full_metadata || !is_from_layers(end)) { // an earlier frame may have left its layers
+    if (image.full_metadata || !is_from_layers(end)) { // layers may come from an earlier frame
         add_count(entries, "primary_rays", end.primary_rays);
         add_count(entries, "shadow_rays", end.shadow_rays);
         add_count(entries, "secondary_rays", end.secondary_rays);

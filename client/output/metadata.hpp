@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an image file says about its picture.
+// Metadata that image files carry about their picture.
 #ifndef FARLIGHT_CLIENT_OUTPUT_METADATA_HPP
 #define FARLIGHT_CLIENT_OUTPUT_METADATA_HPP
 
@@ -11,14 +11,14 @@
 constexpr float degrees_per_radian = 57.29577951f;
 
 struct metadata_entry {
-    std::string name; // after "farlight/"
+    std::string name; // follows "farlight/"
     std::string text;
     bool is_number;
     float number;
 };
-// Without full_metadata only what is the same whenever the same request is carried out.
+// Collects the metadata. Without full_metadata they are the same each time that the same request is carried out.
 std::vector<metadata_entry> metadata_of(const struct image &image);
-// All of them as lines "farlight/NAME=VALUE".
+// Formats all metadata as lines "farlight/NAME=VALUE".
 std::string metadata_lines(const struct image &image);
 
 #endif

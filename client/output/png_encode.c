@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Encoding of PNG files. */
 #include "png_encode.h"
 
 #include <png.h>
@@ -9,7 +10,7 @@
 
 #define COMPRESSION_LEVEL 4 /* half the time of 6 for 2 % more bytes */
 
-/* What libpng writes to, and why it stopped. */
+/* Destination of libpng's output, and the reason of a failure. */
 struct sink {
     uint8_t *bytes;
     size_t count, capacity;
@@ -54,7 +55,8 @@ static void set_header(png_structp writer, png_infop info, const struct png *png
 {
     png_set_compression_level(writer, COMPRESSION_LEVEL);
     png_set_compression_strategy(writer, Z_DEFAULT_STRATEGY);
-    /* A third less time than all five; of four pictures from 6 % fewer bytes to 2 % more. */
+    /* Takes a third less time than all five filters; four test pictures became up to 6 % smaller and 2 %
+     * larger. */
     png_set_filter(writer, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB | PNG_FILTER_UP);
     png_set_IHDR(writer, info, png->width, png->height, 8,
                  png->channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
@@ -69,13 +71,13 @@ static void set_header(png_structp writer, png_infop info, const struct png *png
     for (size_t i = 0; i < png->text_count; i++) {
         const struct png_text *each = &png->texts[i];
         png_text text = {.compression = PNG_TEXT_COMPRESSION_NONE,
-                         .key = (char *)(uintptr_t)each->key, /* only read, as is the text */
+                         .key = (char *)(uintptr_t)each->key, /* key and text are only read */
                          .text = (char *)(uintptr_t)each->text};
         png_set_text(writer, info, &text, 1);
     }
 }
 
-/* Errors of the library jump out of this function: it holds nothing but what the caller frees. */
+/* Errors of libpng jump out of this function, so it owns nothing. */
 static bool write_all(png_structp writer, png_infop info, const struct png *png, struct sink *sink)
 {
     if (setjmp(png_jmpbuf(writer)))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The stream of requests: pictures to be written, files to be compared. */
+/* The loop of requests: pictures to write, files to compare or merge. */
 #include "serve.h"
 #include "helper/channel.h"
 #include "helper/file.h"
@@ -22,24 +22,24 @@ struct text {
     char text[257];
 };
 
-/* The state of the picture that is being received. */
+/* The request whose picture is being received. */
 struct request {
     uint32_t number;
     char path[4097], format[17], model[4097], part[401];
     bool half, named;
     float origin[3];
     unsigned quality;
-    struct text *texts; /* to be drawn into it */
+    struct text *texts; /* drawn into the picture */
     size_t text_count;
     struct incoming incoming;
-    char reason[TEXT_MAX]; /* why it fails; empty: it has not failed */
+    char reason[TEXT_MAX]; /* reason of a failure; empty: none */
 };
 
 struct exporter {
     const struct serve_options *options;
     struct channel channel;
     struct request request;
-    struct mattes *mattes; /* owned; NULL: no name has come */
+    struct mattes *mattes; /* owned; NULL: no names have arrived */
 };
 
 /* ---- one file ---- */
@@ -167,7 +167,7 @@ static bool end_frame(struct exporter *exporter, const struct message_frame_end 
 
 /* ---- one comparison ---- */
 
-/* The files are those that were named at the start: a message opens nothing. */
+/* Files were named at the start, so that a message opens nothing. */
 static const struct compare_file *find_file(const struct exporter *exporter, const char *path)
 {
     for (size_t i = 0; i < exporter->options->file_count; i++)
@@ -258,7 +258,7 @@ bool serve(const struct serve_options *options)
     struct exporter exporter = {.options = options};
     exporter.channel =
         (struct channel){.fd = options->fd, .program = "farlight-export", .handle = handle, .user = &exporter};
-    /* An unfinished picture is dropped at the end: nothing of it is on the disk. */
+    /* An unfinished picture is dropped; it has no file yet. */
     const bool good = answer_for_colours(&exporter) && channel_run(&exporter.channel);
     incoming_finish(&exporter.request.incoming);
     free(exporter.request.texts);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The stream of requests: pictures to be written, files to be compared. */
+/* The loop of requests: pictures to write, files to compare or merge. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_SERVE_H
 #define FARLIGHT_CLIENT_OUTPUT_SERVE_H
 
@@ -12,16 +12,17 @@
 
 struct serve_options {
     int fd;                   /* connected stream socket */
-    float frames_per_second;  /* for the metadata of images; 0: none */
-    const char *light_groups; /* NULL: they have no names */
+    float frames_per_second;  /* metadata; 0: none */
+    const char *light_groups; /* names of light groups; NULL: none */
     bool full_metadata, dwaa;
-    struct colour_wanted colour; /* with it, the first answer says whether there is that, before any request */
-    struct image_window window;  /* of EXR files */
-    const struct compare_file *files; /* that may be compared or merged: a message opens nothing */
+    /* if set, the first answer says whether these colours exist, before any request */
+    struct colour_wanted colour;
+    struct image_window window;       /* window of EXR files */
+    const struct compare_file *files; /* the only files that requests may compare or merge */
     size_t file_count;
 };
 
-/* Answers requests until the other side ends. False, with a line on standard error: it broke the protocol, or
+/* Answers requests until the other side closes. False, with a line on standard error: it broke the protocol, or
  * there is no memory. */
 bool serve(const struct serve_options *options);
 

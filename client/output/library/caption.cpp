@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Drawing of lines of text with OpenImageIO.
 #include "caption.hpp"
 #include "output/library.h"
 
@@ -12,8 +13,8 @@ namespace
 {
 namespace algo = OIIO::ImageBufAlgo;
 
-constexpr int font_pixels = 14; // height
-constexpr int margin = 4;       // within the region
+constexpr int font_pixels = 14; // height of the font
+constexpr int margin = 4;       // distance from the region's edge
 const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans"};
 
 std::string fit(const std::string &text, int width, const std::string &font)
@@ -22,7 +23,7 @@ std::string fit(const std::string &text, int width, const std::string &font)
     size_t cut = 0;
     while (cut < text.size() && algo::text_size(fitting, font_pixels, font).width() > width) {
         cut++;
-        while (cut < text.size() && (static_cast<unsigned char>(text[cut]) & 0xc0) == 0x80) // within a character
+        while (cut < text.size() && (static_cast<unsigned char>(text[cut]) & 0xc0) == 0x80) // a continuation byte
             cut++;
         fitting = ".." + text.substr(cut);
     }
@@ -63,7 +64,7 @@ bool caption_draw_into(const struct raster *raster, const struct message_export_
                               static_cast<float>(wanted->colour >> 8 & 255) / 255,
                               static_cast<float>(wanted->colour & 255) / 255, 1};
         OIIO::ImageBuf picture(OIIO::ImageSpec(width, height, 4, OIIO::TypeDesc::UINT8),
-                               const_cast<void *>(raster->pixels)); // which are the caller's to change
+                               const_cast<void *>(raster->pixels)); // the caller allows writing
         if (!font.empty())
             caption_draw(picture, -1, static_cast<int>(wanted->y), wanted->text, font, ink,
                          OIIO::ROI(left, std::min(left + box, width), 0, height));

@@ -8,14 +8,14 @@
 
 #include <string>
 
-// The font's name; "" where none is installed. Opens what drawing needs, while that is still allowed.
+// The font's name; "" if none is installed. Opens the files for drawing, which the sandbox forbids later.
 std::string caption_font();
-// Draws the line from `x` on, or, with a negative one, in the middle of the region, cut to the region's width: the
-// end of a text says most, as that of a file's name. `ink` has a number for each channel.
+// Draws a line from `x` on, or in the middle of the region for a negative `x`. A line that is too long loses its
+// beginning, because the end says more, as in a file's path. `ink` has a number for each channel.
 void caption_draw(OIIO::ImageBuf &picture, int x, int baseline, const std::string &text, const std::string &font,
                   const float *ink, const OIIO::ROI &region);
 
-// Draws what the message says into bytes with four channels. False: `reason` says why.
+// Draws the message's text into bytes with four channels. False: `reason` is set.
 struct message_export_text;
 bool caption_draw_into(const struct raster *raster, const struct message_export_text *wanted, char *reason,
                        size_t reason_bytes);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Colour conversions by OpenColorIO configurations.
 #include "colour.hpp"
 
 #include <OpenImageIO/color.h>
@@ -13,17 +14,17 @@
 namespace
 {
 
-// Linear Rec. 709 as configurations without the role aces_interchange call it: those of ACES 1, nuke-default, spi,
-// Blender's.
+// Names of linear Rec. 709 in configurations without the role aces_interchange: ACES 1, nuke-default, spi,
+// Blender.
 const char *const linear_names[] = {"Linear Rec.709 (sRGB)",   "lin_rec709_srgb", "lin_rec709",  "Linear Rec.709",
                                     "Utility - Linear - sRGB", "lin_srgb",        "linear_srgb", "Linear"};
-constexpr size_t NAMES_BYTES = 360; // of a message
+constexpr size_t NAMES_BYTES = 360; // fits into a message
 
 OIIO::ColorProcessorHandle processor;
 bool comes_by_aces;
 float aces_from_rec709[9];
 
-bool tell(char *reason, size_t reason_bytes, const std::string &text)
+bool refuse(char *reason, size_t reason_bytes, const std::string &text)
 {
     std::snprintf(reason, reason_bytes, "%s", text.c_str());
     return false;
@@ -67,7 +68,7 @@ std::string source_of(const OIIO::ColorConfig &config)
     return "";
 }
 
-// "DISPLAY/VIEW", or a view of the default display.
+// Finds "DISPLAY/VIEW", or a view of the default display.
 bool find_view(const OIIO::ColorConfig &config, const std::string &wanted, std::string &display, std::string &view)
 {
     const char *usual = config.getDefaultDisplayName();
@@ -96,29 +97,29 @@ bool open_colours(const struct library_colour &wanted, char *reason, size_t reas
 {
     OIIO::ColorConfig config(wanted.config);
     if (config.has_error())
-        return tell(reason, reason_bytes, std::string(wanted.config) + ": " + config.geterror());
+        return refuse(reason, reason_bytes, std::string(wanted.config) + ": " + config.geterror());
     const std::string source = source_of(config);
     if (source.empty())
-        return tell(reason, reason_bytes,
+        return refuse(reason, reason_bytes,
                     std::string(wanted.config) +
                         " has neither the role aces_interchange nor linear Rec. 709 by a known "
                         "name; it has: " +
                         listed(config.getColorSpaceNames()));
     if (wanted.space) {
         if (!knows(config, wanted.space) && !has(config.getRoles(), wanted.space))
-            return tell(reason, reason_bytes,
+            return refuse(reason, reason_bytes,
                         std::string(wanted.config) + " has no colour space '" + wanted.space +
                             "'; it has: " + listed(config.getColorSpaceNames()));
         processor = config.createColorProcessor(source, wanted.space);
     } else {
         std::string display, view;
         if (!find_view(config, wanted.view, display, view))
-            return tell(reason, reason_bytes,
+            return refuse(reason, reason_bytes,
                         std::string(wanted.config) + " has no view '" + wanted.view +
                             "'; it has: " + listed(views_of(config)));
         processor = config.createDisplayTransform(display, view, source);
     }
-    return processor || tell(reason, reason_bytes, std::string(wanted.config) + ": " + config.geterror());
+    return processor || refuse(reason, reason_bytes, std::string(wanted.config) + ": " + config.geterror());
 }
 
 } // namespace
@@ -129,7 +130,7 @@ bool colour_open_configuration(const struct library_colour *wanted, char *reason
     try {
         return open_colours(*wanted, reason, reason_bytes);
     } catch (const std::exception &exception) {
-        return tell(reason, reason_bytes, std::string(wanted->config) + ": " + exception.what());
+        return refuse(reason, reason_bytes, std::string(wanted->config) + ": " + exception.what());
     }
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Comparison of two pictures: errors, similarity, and a picture of the errors.
 #include "compare.hpp"
 #include "heat_map.hpp"
 #include "picture.hpp"
@@ -20,7 +21,7 @@ namespace
 using OIIO::ImageBuf;
 namespace algo = OIIO::ImageBufAlgo;
 
-// Two frames of 8192x8192 as raw floats have half of it.
+// Limit of a file: two frames of 8192x8192 as raw floats have half of it.
 constexpr size_t file_bytes_max = size_t(1) << 31;
 constexpr float sent_max = 3e38f;
 
@@ -29,7 +30,7 @@ struct comparison {
     const struct message_compare_images &wanted;
     struct compare_result &result;
     struct picture a, b;
-    std::vector<bool> nonfinite; // a pixel each
+    std::vector<bool> nonfinite; // a flag for each pixel
 };
 
 bool fail(struct compare_result &result, const char *path, const std::string &reason)
@@ -39,7 +40,7 @@ bool fail(struct compare_result &result, const char *path, const std::string &re
     std::snprintf(result.field, sizeof(result.field), "%s%s", is_long ? "..." : "",
                   path + (is_long ? length - sizeof(result.field) + 4 : 0));
     std::string line = reason.empty() ? "cannot be read" : reason;
-    std::replace(line.begin(), line.end(), '\n', ' '); // a library's message may have several lines
+    std::replace(line.begin(), line.end(), '\n', ' '); // libraries' messages may have several lines
     while (!line.empty() && line.back() == ' ')
         line.pop_back();
     std::snprintf(result.reason, sizeof(result.reason), "%s", line.c_str());
@@ -81,7 +82,7 @@ bool check_alike(const struct comparison &each)
                     each.b.channel_names());
 }
 
-// Counts what is no number and makes it 0 in both, for no sum holds such a thing.
+// Counts pixels with NaN or infinity and sets them to 0 in both pictures, so that sums stay finite.
 void set_aside_nonfinite(struct comparison &each)
 {
     const size_t channels = static_cast<size_t>(each.a.channels());
@@ -102,13 +103,14 @@ void set_aside_nonfinite(struct comparison &each)
     }
 }
 
-// The difference of two floats may be more than a float holds.
+// Clamps the difference of two floats to the range of a float.
 float sendable(double value)
 {
     return static_cast<float>(std::min<double>(value, static_cast<double>(sent_max)));
 }
 
-// What was set aside differs by 0 and is among the pixels that the library divides by.
+// Measures the errors. Nonfinite pixels were set to 0 in both, but are among the pixels that the library divides
+// by.
 void measure_errors(struct comparison &each)
 {
     struct message_images_compared &answer = each.result.answer;
@@ -128,7 +130,7 @@ void measure_errors(struct comparison &each)
     answer.heat_top = each.wanted.heat_top > 0 ? each.wanted.heat_top : std::min(maximum, 1.0f);
 }
 
-// What was set aside is black on both screens.
+// Measures errors of displayed colours, where nonfinite pixels are black in both.
 void measure_shown_errors(struct comparison &each, const ImageBuf &screen_a, const ImageBuf &screen_b)
 {
     struct message_images_compared &answer = each.result.answer;
@@ -219,7 +221,7 @@ bool compare_with_library(const struct library_host *host, const struct message_
 {
     try {
         struct comparison each = {*host, *wanted, *result, {}, {}, {}};
-        OIIO::attribute("threads", 0); // all processors: nothing else runs meanwhile
+        OIIO::attribute("threads", 0); // all processors, since nothing else runs meanwhile
         return read_picture(*host, *a, each.a, *result) && read_picture(*host, *b, each.b, *result) &&
                compare(each);
     } catch (const std::bad_alloc &) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Pictures of errors as heat maps.
 #include "heat_map.hpp"
 #include "caption.hpp"
 #include "picture.hpp"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// The table of the module's functions, and its encoders.
 #include "output/library.h"
 #include "caption.hpp"
 #include "colour.hpp"
@@ -26,7 +27,7 @@ bool fail(char *reason, size_t reason_bytes, const std::string &text)
     return false;
 }
 
-// Named, never guessed.
+// The reader is named explicitly, so that the library does not guess it.
 const char *plugin_of(enum image_format format)
 {
     switch (format) {
@@ -46,7 +47,7 @@ OIIO::TypeDesc type_of(const struct raster &raster)
                                          : OIIO::TypeDesc::FLOAT;
 }
 
-// What the file's pixels are. HDR has no alpha, and the library writes GIF without.
+// Describes the file's pixels. HDR has no alpha, and the library writes GIF without alpha.
 OIIO::ImageSpec make_spec(const struct library_image &image)
 {
     const bool is_linear = image.format == IMAGE_HDR;
@@ -61,12 +62,12 @@ OIIO::ImageSpec make_spec(const struct library_image &image)
     if (is_linear)
         return spec;
     spec.attribute("Compression", std::string(plugin_of(image.format)) + ":" + std::to_string(image.quality));
-    if (image.description[0] != '\0') // the library stops at an empty one
+    if (image.description[0] != '\0') // the library stops at an empty description
         spec.attribute("ImageDescription", image.description);
     return spec;
 }
 
-// Radiance files keep comments in their header, which OpenImageIO does not write.
+// Inserts comments into the header of a Radiance file, which OpenImageIO does not do.
 void insert_comments(std::vector<unsigned char> &file, const char *description)
 {
     std::string lines;
@@ -127,7 +128,7 @@ bool encode(const struct library_image *image, uint8_t **file, size_t *file_byte
 bool prepare(bool draws, char *reason, size_t reason_bytes)
 {
     const std::vector<unsigned char> pixels(4 * 4 * 4, 0);
-    // One thread: the renderer has use for the others, and the sandbox need not allow more.
+    // A single thread: the renderer uses the other processors, and the sandbox need not allow more threads.
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
     for (const enum image_format format : {IMAGE_HDR, IMAGE_WEBP, IMAGE_GIF}) {

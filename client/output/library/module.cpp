@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// All of the module for the compiler at once, which takes four seconds to read the headers of OpenImageIO.
+// The whole module as one translation unit, since the compiler takes four seconds to read OpenImageIO's headers.
 #include "caption.cpp"
 #include "colour.cpp"
 #include "compare.cpp"

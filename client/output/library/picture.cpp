@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reading of image files, and their conversion to displayed colours.
 #include "picture.hpp"
 #include "protocol/common/srgb.h"
 
@@ -17,9 +18,9 @@
 namespace
 {
 
-constexpr int edge_max = 8192; // as of frames
+constexpr int edge_max = 8192; // the frames' limit
 constexpr int channels_max = 4;
-constexpr size_t channel_name_max = 60; // four and their commas fit into a message
+constexpr size_t channel_name_max = 60; // four names and their commas fit into a message
 
 struct signature {
     const char *reader;
@@ -42,7 +43,7 @@ const signature *signature_of(const uint8_t *file, size_t file_bytes)
     return nullptr;
 }
 
-// libjpeg makes up what is missing of a file that was cut off, and only warns.
+// Detects a truncated JPEG: libjpeg makes up the missing part and only warns.
 bool is_cut_off(const signature &kind, const uint8_t *file, size_t file_bytes)
 {
     while (file_bytes > 0 && file[file_bytes - 1] == 0) // padding
@@ -51,7 +52,7 @@ bool is_cut_off(const signature &kind, const uint8_t *file, size_t file_bytes)
            (file_bytes < 2 || file[file_bytes - 2] != 0xff || file[file_bytes - 1] != 0xd9);
 }
 
-// A file may call its channels what it likes: nothing of it may reach a terminal, break the protocol's UTF-8 or
+// Sanitises the channel names of a file, so that they cannot control a terminal, break the protocol's UTF-8 or
 // look like several names in a list.
 std::vector<std::string> harmless(std::vector<std::string> names)
 {
@@ -81,16 +82,16 @@ bool check_spec(const OIIO::ImageSpec &spec, std::string &reason)
 
 struct channel_range {
     int first, count;
-    int alpha; // counted from the first; -1: none
+    int alpha; // index from the first channel; -1: none
 };
 
-// Of a file with layers, the picture: the library puts red, green, blue and alpha of no layer next to each other.
-// Else all that there is.
+// Chooses the picture of a file with layers: the library sorts red, green, blue and alpha without a layer next to
+// each other. Without these four, all channels are chosen.
 bool choose_channels(const OIIO::ImageSpec &spec, struct channel_range &chosen, std::string &reason)
 {
     const std::vector<std::string> &names = spec.channelnames;
     chosen = {0, spec.nchannels,
-              spec.nchannels > 1 ? spec.alpha_channel : -1}; // alpha alone is looked at like grey
+              spec.nchannels > 1 ? spec.alpha_channel : -1}; // alpha alone is compared like grey
     for (size_t i = 0; i + 2 < names.size(); i++) {
         if (names[i] != "R" || names[i + 1] != "G" || names[i + 2] != "B")
             continue;
@@ -142,7 +143,7 @@ void tone_map_aces(float colour[3])
         colour[r] = to_linear[r][0] * curved[0] + to_linear[r][1] * curved[1] + to_linear[r][2] * curved[2];
 }
 
-// The same as the renderer's resolve pass does for 8-bit pixels.
+// Converts as the renderer's resolve pass does for 8-bit pixels.
 void screen_from_linear(float colour[3], float alpha, enum protocol_tone_map tone_map)
 {
     for (int c = 0; c < 3; c++)
@@ -155,7 +156,7 @@ void screen_from_linear(float colour[3], float alpha, enum protocol_tone_map ton
         colour[c] = srgb_from_linear_f(std::clamp(colour[c], 0.0f, 1.0f));
 }
 
-// Which channels are red, green and blue; a grey picture has one for all.
+// Indices of red, green and blue; a grey picture has one channel for all three.
 std::array<size_t, 3> colour_channels(const struct picture &picture)
 {
     std::vector<size_t> colours;
@@ -202,7 +203,7 @@ bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made
         return fail(reason, OIIO::geterror());
     OIIO::Filesystem::IOMemReader memory(const_cast<uint8_t *>(file), file_bytes); // only read
     OIIO::ImageSpec spec, hints;
-    hints.attribute("oiio:UnassociatedAlpha", 1); // as stored
+    hints.attribute("oiio:UnassociatedAlpha", 1); // alpha as stored
     hints.attribute("oiio:reorient", 0);
     if (!input->set_ioproxy(&memory) || !input->open(std::string("image.") + kind->reader, spec, hints))
         return fail(reason, input->geterror());

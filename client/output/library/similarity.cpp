@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Structural similarity and Butteraugli distance of two pictures.
 #include "similarity.hpp"
 #include "picture.hpp"
 
@@ -17,11 +18,11 @@ namespace algo = OIIO::ImageBufAlgo;
 
 constexpr int window = 11, radius = window / 2;
 constexpr float sigma = 1.5f;
-// (K L)^2 with the range L of 1.
+// The constants (K L)^2 for the range L of 1.
 constexpr float c1 = 0.01f * 0.01f, c2 = 0.03f * 0.03f;
 
-// One row or column of the window: a Gaussian in two dimensions is one in x after one in y.
-// make_kernel("gaussian") cannot be told its sigma.
+// A row or a column of the window: a Gaussian in two dimensions is one in x after one in y. The library's
+// make_kernel("gaussian") has no parameter for sigma.
 ImageBuf window_kernel(bool is_row)
 {
     OIIO::ImageSpec spec(is_row ? window : 1, is_row ? 1 : window, 1, OIIO::TypeDesc::FLOAT);
@@ -43,7 +44,7 @@ ImageBuf luma_of(const ImageBuf &colours)
 
 struct smoothing {
     ImageBuf row = window_kernel(true), column = window_kernel(false);
-    // Weighted means over the windows whose middles are within `inner`.
+    // Computes weighted means over the windows whose centres are within `inner`.
     ImageBuf mean(const ImageBuf &plane, const ROI &inner) const
     {
         ROI tall = inner;
@@ -80,9 +81,10 @@ bool similarity_ssim(const ImageBuf &a, const ImageBuf &b, float &ssim)
 
 bool similarity_butteraugli(const ImageBuf &a, const ImageBuf &b, struct butteraugli &found)
 {
-    constexpr int edge_min = 8; // below, the library says 0 whatever it is given
+    constexpr int edge_min = 8; // the library returns 0 for smaller pictures
     constexpr size_t pixels_max = size_t(1)
-                                  << 24; // it takes some 300 bytes a pixel, and ends the program if short
+                                  // the library needs some 300 bytes a pixel and ends the program without them
+                                  << 24;
     const size_t width = static_cast<size_t>(a.spec().width), height = static_cast<size_t>(a.spec().height);
     if (a.spec().width < edge_min || a.spec().height < edge_min || width * height > pixels_max)
         return false;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Encoding of TIFF files in memory.
 #include "tiff.hpp"
 #include "protocol/version.h"
 
@@ -66,7 +67,7 @@ bool tiff_encode(const struct library_image &image, std::vector<unsigned char> &
 {
     const struct raster &raster = image.raster;
     memory_file memory = {file, 0};
-    TIFFSetErrorHandler(nullptr); // or it writes to the terminal
+    TIFFSetErrorHandler(nullptr); // keeps libtiff from writing to the terminal
     const std::unique_ptr<TIFF, void (*)(TIFF *)> tiff(TIFFClientOpen("picture", "wl", &memory, read_memory,
                                                                       write_memory, seek_memory, close_memory,
                                                                       memory_size, nullptr, nullptr),
