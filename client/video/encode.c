@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Encoding of videos with libavcodec and libavformat. */
 #include "encode.h"
 #include "helper/file.h"
 #include "protocol/pixels/ycbcr.h"
@@ -18,11 +19,11 @@
 #include <string.h>
 
 #define THREADS_MAX 16
-/* Slices gain nothing in smaller pictures, and libavcodec 59 stores those of one or two rows or columns wrongly in
- * version 3 of FFV1. */
+/* Slices gain nothing in smaller pictures, and libavcodec 59 stores slices of one or two rows or columns
+ * incorrectly in version 3 of FFV1. */
 #define FFV1_SLICED_EDGE_MIN 64
 #define WAITING_BYTES_MAX (INT64_C(4) << 30)
-#define KEY_FRAME_SECONDS 2 /* distance of key frames: the maximum that a player must go back to seek */
+#define KEY_FRAME_SECONDS 2 /* limits the distance that a player must go back to seek */
 
 struct video_encoder {
     const struct video_plan *plan;
@@ -34,12 +35,12 @@ struct video_encoder {
     AVFrame *picture;
     AVPacket *packet;
     int64_t next_picture;
-    struct palette *palette; /* of a GIF: pictures wait in it for the last one */
+    struct palette *palette; /* GIF only: stores the pictures until the last one */
 };
 
 /* ---- beginning ---- */
 
-/* Pictures are display values: sRGB's curve over BT.709's primaries, and the video says so. */
+/* Tags the video: its values are display values, with sRGB's curve over BT.709's primaries. */
 static void describe_pictures(AVCodecContext *codec, const struct video_plan *plan,
                               const struct video_source *source)
 {
@@ -68,7 +69,7 @@ static void set_quality(AVCodecContext *codec, const struct video_plan *plan, AV
         av_dict_set(options, "preset", "medium", 0);
         av_dict_set_int(options, "crf", (int64_t)plan->quality, 0);
     } else if (strcmp(plan->encoder, "mpeg4") == 0) {
-        /* The same step: H.264's doubles every 6 and is 1 at 4; MPEG-4's is twice its scale, 1 to 31. */
+        /* Equal quantiser steps: H.264's doubles every 6 and is 1 at 4; MPEG-4's is twice its scale, 1 to 31. */
         const double scale = exp2(((double)plan->quality - 4) / 6) / 2;
         codec->flags |= AV_CODEC_FLAG_QSCALE;
         codec->global_quality = (int)lround(FF_QP2LAMBDA * (scale < 1 ? 1 : scale > 31 ? 31 : scale));
@@ -86,7 +87,7 @@ static void set_quality(AVCodecContext *codec, const struct video_plan *plan, AV
     }
 }
 
-/* x264 does not say why it fails; if this thread was out of memory, errno does (0 before the call). */
+/* x264 gives no reason for a failure; errno, 0 before the call, shows a lack of memory in this thread. */
 static bool fail_codec(const struct video_encoder *encoder, int number, struct video_failure *failure)
 {
     const bool no_memory = number == AVERROR(ENOMEM) || (number == AVERROR_EXTERNAL && errno == ENOMEM);
@@ -139,7 +140,7 @@ static bool open_picture(struct video_encoder *encoder, struct video_failure *fa
     return result >= 0 || video_fail_library(failure, "", "a picture", result);
 }
 
-/* The disk's error has precedence over the library's. */
+/* Reports the disk's error rather than the library's. */
 static bool fail_file(const struct video_encoder *encoder, int number, struct video_failure *failure)
 {
     if (encoder->sink.failure == 0)
@@ -163,12 +164,13 @@ static bool begin_file(struct video_encoder *encoder, const struct video_source 
     snprintf(comment, sizeof(comment), "farlight " FARLIGHT_VERSION "%s%s", source->model[0] != '\0' ? ": " : "",
              source->model);
     av_dict_set(&encoder->format->metadata, "comment", comment, 0);
-    /* No time of day and no random numbers: the same frames make the same file. */
+    /* Omits the time of day and random numbers, so that the same frames make the same file. */
     encoder->format->flags |= AVFMT_FLAG_BITEXACT;
-    if (strcmp(encoder->plan->container, "mp4") == 0) /* the index in front: plays while it is fetched */
+    /* the index comes first, so that a download can be played */
+    if (strcmp(encoder->plan->container, "mp4") == 0)
         av_dict_set(&options, "movflags", "faststart+write_colr", 0);
     if (encoder->plan->pixels == VIDEO_RGBA || encoder->plan->pixels == VIDEO_PALETTE)
-        av_dict_set(&options, "loop", "0", 0); /* for ever */
+        av_dict_set(&options, "loop", "0", 0); /* endlessly */
     const int result = avformat_write_header(encoder->format, &options);
     av_dict_free(&options);
     return (result >= 0 && encoder->sink.failure == 0) || fail_file(encoder, result, failure);
@@ -249,7 +251,7 @@ static void fill_ycbcr(struct video_encoder *encoder, const uint8_t *pixels)
     ycbcr_convert(&encoder->converter, pixels, &planes);
 }
 
-/* Writes the encoder's finished packets; with `picture` NULL all of them. */
+/* Writes the encoder's finished packets; all of them if `picture` is NULL. */
 static bool encode(struct video_encoder *encoder, const AVFrame *picture, struct video_failure *failure)
 {
     errno = 0;
@@ -270,7 +272,7 @@ static bool encode(struct video_encoder *encoder, const AVFrame *picture, struct
     return fail_codec(encoder, result, failure);
 }
 
-/* All pictures have the same colours, or what stands still would flicker: they are kept until the last one. */
+/* Stores a picture of a GIF until the last one: a common palette keeps still regions from flickering. */
 static bool wait_for_palette(struct video_encoder *encoder, struct video_failure *failure)
 {
     const AVFrame *picture = encoder->picture;
@@ -285,7 +287,7 @@ static bool wait_for_palette(struct video_encoder *encoder, struct video_failure
 
 bool video_encoder_write(struct video_encoder *encoder, const uint8_t *pixels, struct video_failure *failure)
 {
-    /* An encoder may still hold the one before. */
+    /* The encoder may still hold the previous picture. */
     const int result = av_frame_make_writable(encoder->picture);
     if (result < 0)
         return video_fail_library(failure, "", "a picture", result);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Loading of the module that makes palettes. */
 #include "palette.h"
 #include "helper/module.h"
 

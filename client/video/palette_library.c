@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One palette for all pictures, by median cut (Heckbert 1982, as libavfilter has it), and an ordered dither, which
- * stands still where the picture does. */
+/* The module that makes palettes: one palette for all pictures by median cut (Heckbert 1982, in libavfilter),
+ * and an ordered dither, which stays the same where the picture does. */
 #include "palette.h"
 
 #include <libavfilter/avfilter.h>
@@ -11,7 +11,7 @@
 
 struct palette {
     AVFilterGraph *graph;
-    AVFilterContext *source, *sink; /* of the graph */
+    AVFilterContext *source, *sink; /* nodes of the graph */
 };
 
 static void destroy(struct palette *palette)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which container and which encoder. */
+/* Choice of container and encoder. */
 #include "encode.h"
 #include "lib/rate.h"
 #include "palette.h"
@@ -8,24 +8,25 @@
 #include <string.h>
 #include <strings.h>
 
-#define DEFAULT_FACTOR 18 /* of x264's constant rate factor: hardly to be told from the original */
+#define DEFAULT_FACTOR 18 /* x264's constant rate factor: hardly distinguishable from the original */
 #define FACTOR_MAX 51
-#define DEFAULT_WEBP_QUALITY 90 /* likewise; 95, as pictures have it, makes files half as large again */
+/* hardly distinguishable, too; 95, as for pictures, makes files half as large again */
+#define DEFAULT_WEBP_QUALITY 90
 
 /* H.264 (ITU-T H.264, table A-1): level 6.2 allows 139,264 macroblocks of 16x16. */
 #define H264_MACROBLOCKS_MAX 139264u
 
-/* In order of preference. No other encoder of the library is ever used: some open devices. */
+/* Encoders in order of preference. Others of the library are never used, because some open devices. */
 static const struct choice {
-    const char *codec;   /* as people ask for it */
-    const char *encoder; /* as the library calls it */
+    const char *codec;   /* name in options */
+    const char *encoder; /* the library's name */
     bool lossless;
 } choices[] = {{"h264", "libx264", false}, {"mpeg4", "mpeg4", false}, {"ffv1", "ffv1", true}};
 
 static const struct container {
     const char *ending, *name;
-    const char *encoder;      /* of moving pictures the only one; NULL: one of the choices */
-    enum video_pixels pixels; /* of that encoder */
+    const char *encoder;      /* the only encoder of an animated picture; NULL: one of the choices */
+    enum video_pixels pixels; /* pixels of that encoder */
 } containers[] = {{"mp4", "mp4", NULL, VIDEO_YCBCR},
                   {"mkv", "matroska", NULL, VIDEO_YCBCR},
                   {"webp", "webp", "libwebp_anim", VIDEO_RGBA},

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The loop of requests of the video writer. */
 #include "serve.h"
 #include "encode.h"
 #include "helper/channel.h"
@@ -10,19 +11,19 @@
 
 enum state {
     STATE_IDLE,   /* no video */
-    STATE_OPEN,   /* frames come */
-    STATE_FAILED, /* further frames are dropped: the request has its answer */
+    STATE_OPEN,   /* receives frames */
+    STATE_FAILED, /* drops further frames: the request has its answer */
 };
 
 struct session {
     struct channel channel;
     enum state state;
-    uint32_t number; /* of the request */
+    uint32_t number; /* number of the request */
     char path[4097], model[4097];
-    int fd; /* of the unfinished file */
+    int fd; /* unfinished file */
     struct video_plan plan;
     struct video_encoder *encoder; /* NULL before the first frame */
-    uint32_t width, height;        /* of the first frame */
+    uint32_t width, height;        /* size of the first frame */
     uint32_t frames;
     struct incoming incoming;
 };
@@ -39,7 +40,7 @@ static void drop_video(struct session *session)
     session->fd = -1;
 }
 
-/* Removes the video and sends its answer. */
+/* Removes the video and sends the failure as its answer. */
 static bool fail(struct session *session, const struct video_failure *failure)
 {
     drop_video(session);
@@ -108,7 +109,7 @@ static bool begin_frame(struct session *session, const struct message_frame_begi
         return true;
     if (!fail(session, &failure))
         return false;
-    /* The rest of this frame is still counted. */
+    /* The rest of this frame is still received and counted. */
     return incoming_begin(&session->incoming, begin, false);
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* An open file as output of libavformat. */
 #include "sink.h"
 
 #include <errno.h>
@@ -8,7 +9,7 @@
 
 #define BUFFER_BYTES 65536
 
-/* A position in the file: the writer's, or that of the reader that moves an index to the front. */
+/* A position in the file: the writer's, or the reader's that moves the index to the front. */
 struct place {
     struct video_sink *sink;
     int64_t at;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* An open file as the library's input and output. The library opens nothing by itself. */
+/* An open file as the library's input and output; the library opens no files itself. */
 #ifndef FARLIGHT_CLIENT_VIDEO_SINK_H
 #define FARLIGHT_CLIENT_VIDEO_SINK_H
 
@@ -11,7 +11,7 @@ struct AVFormatContext;
 struct video_sink {
     int fd;
     int failure;        /* errno of the first write that failed; 0: none */
-    int64_t size_bytes; /* of what was written */
+    int64_t size_bytes; /* size of the written file */
 };
 
 /* Makes *format write to the sink, which must outlive it. False: no memory. */
