@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Assignments as people write them. Names may have any characters: of "material.A.B=C.roughness=1" the object is
- * "A.B=C", as the field is the last word before the first equals sign that has a field in front of it. */
+/* Assignments in the syntax that people write. Names may have any characters: the object of
+ * "material.A.B=C.roughness=1" is "A.B=C", as the field is the last word before the first equals sign that
+ * follows a field. */
 #include "edit/field.h"
 #include "lib/text.h"
 
@@ -16,7 +17,7 @@ static const enum protocol_object_kind kinds[] = {PROTOCOL_OBJECT_MATERIAL, PROT
 
 /* ---- reading ---- */
 
-/* Cut into parts in place. */
+/* The parts of an assignment, cut in place. */
 struct parts {
     char text[TEXT_MAX];
     const char *kind, *name, *field, *value;
@@ -41,7 +42,7 @@ static bool wrong_form(struct fl_error *error)
                                   "light.Sun.intensity=5, environment.rotation=90, hide=Roof or show=Roof");
 }
 
-/* The way of an assignment whose equals sign is there, and the end of what is in front of it. */
+/* The operator of an assignment at its equals sign, and the end of the text before it. */
 static enum fl_assignment_way way_of(char *text, char *equals, char **end)
 {
     const bool has_sign = equals > text && (equals[-1] == '+' || equals[-1] == '*');
@@ -59,7 +60,7 @@ static char *dot_before(char *text, char *end)
     return end > text ? end - 1 : NULL;
 }
 
-/* "intensity=2" of the environment, which has no name. */
+/* Splits "intensity=2" of the environment, which has no name. */
 static void split_nameless(struct parts *parts, char *text)
 {
     char *equals = strchr(text, '='), *end;
@@ -70,7 +71,7 @@ static void split_nameless(struct parts *parts, char *text)
     parts->field = trimmed(text);
 }
 
-/* Where the value's equals sign is: the first one with a known field in front of it, else the first one. */
+/* Finds the value's equals sign: the first one after a known field, else the first one. */
 static char *find_equals(enum protocol_object_kind kind, char *text)
 {
     for (char *equals = strchr(text, '='); equals; equals = strchr(equals + 1, '=')) {
@@ -104,7 +105,7 @@ static bool find_kind(const char *text, enum protocol_object_kind *kind, struct 
     return fl_error_remedy(error, "material, node, light, camera and environment can");
 }
 
-/* "hide=Roof", "show=Roof". */
+/* Splits "hide=Roof" and "show=Roof". */
 static bool split_visibility(struct parts *parts, char *text)
 {
     const size_t length = strcspn(text, "=");
@@ -281,13 +282,13 @@ static void append(struct line *line, const char *text)
     line->text[line->used] = '\0';
 }
 
-/* As few digits as the float needs, with a point in every locale. */
+/* Prints as few digits as the float needs, with a point in every locale. */
 static void append_number(struct line *line, double value)
 {
     char number[32];
     double read = 0;
     for (int digits = 6; digits <= 9; digits++) {
-        snprintf(number, sizeof(number), "%.*g", digits, value + 0.0); /* no -0 */
+        snprintf(number, sizeof(number), "%.*g", digits, value + 0.0); /* avoids -0 */
         if (strchr(number, ','))
             *strchr(number, ',') = '.';
         if (fl_text_real(number, -1e30, 1e30, &read, NULL) && (float)read == (float)value)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Assignments become a transaction: what they name is read, changed here, and sent back. The daemon refuses it if
- * another client has changed one of the objects meanwhile; then all of it is done again. */
+/* Edits of a scene: assignments become a transaction. The objects are read, changed here and sent back. The
+ * daemon refuses the transaction if another client has changed an object meanwhile; then everything is
+ * repeated. */
 #include "edit/field.h"
 #include "edit/objects.h"
 #include "lib/scene.h"
@@ -10,14 +11,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ANSWER_NS 600000000000ull /* the daemon finishes a slice of a frame, and may build structures */
-#define ATTEMPTS 32               /* others would have to be in between each time */
+#define ANSWER_NS 600000000000ull /* the daemon first finishes a slice of a frame, and may build structures */
+#define ATTEMPTS 32               /* exceeded only if other clients interfere every time */
 
 /* An object of the transaction. */
 struct target {
     struct edit_object object;
     bool changed;
-    size_t assignment; /* the last that changed it, which an error of the daemon's names */
+    size_t assignment; /* the last assignment to it, which a daemon's error names */
 };
 
 struct edit {
@@ -51,7 +52,7 @@ static void finish(struct edit *edit)
     free(edit->undo);
 }
 
-/* An error about an assignment names it, unless the connection itself is at fault. */
+/* Adds the assignment's name to an error, unless the connection itself is at fault. */
 static bool blame(const struct edit *edit, size_t assignment, struct fl_error *error)
 {
     char text[sizeof(error->field)];
@@ -84,7 +85,7 @@ static struct target *need_target(struct edit *edit, enum protocol_object_kind k
     return edit_object_read(edit->scene, kind, id, &target->object, error) ? target : NULL;
 }
 
-/* Keeps the value that the field has before its first change. */
+/* Records the value of the field before its first change. */
 static bool note_undo(struct edit *edit, const struct edit_object *object, const struct fl_field *field,
                       struct fl_error *error)
 {
@@ -163,7 +164,7 @@ static bool change_all(struct edit *edit, struct fl_error *error)
 
 /* ---- sending ---- */
 
-/* The assignment behind the daemon's "edits[3] (light 2).."; false: the error is about none. */
+/* Finds the assignment for the daemon's "edits[3] (light 2).."; false: the error concerns none. */
 static bool find_blamed(const struct edit *edit, const char *field, size_t *assignment)
 {
     size_t place = 0, seen = 0;
@@ -178,7 +179,7 @@ static bool find_blamed(const struct edit *edit, const char *field, size_t *assi
     return false;
 }
 
-/* One message of a transaction, which may have more of them than the buffers hold. */
+/* Sends a message of a transaction, which may be larger than the buffers. */
 static bool send_part(struct fl_connection *connection, uint32_t request, const struct message *message,
                       struct fl_error *error)
 {
@@ -186,7 +187,7 @@ static bool send_part(struct fl_connection *connection, uint32_t request, const 
            fl_connection_send(connection, request, 0, message, error);
 }
 
-/* `base_revision`: of the earliest reading, as what was changed after it may be missing in it. */
+/* `base_revision` is the revision of the earliest reading, as later changes may be missing in it. */
 static bool send_all(const struct edit *edit, uint64_t base_revision, uint64_t *revision, struct fl_error *error)
 {
     struct fl_connection *connection = edit->scene->connection;

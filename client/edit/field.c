@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Fields of materials, lights and cameras are those of their messages, so that a new one needs no word here; those
- * of nodes and of the environment, and the intensity of lights, are made of what the messages have. */
+/* Fields of objects that can be edited. Fields of materials, lights and cameras come from the table of
+ * messages, so that new ones need no code here; fields of nodes and of the environment, and the intensity of
+ * lights, are computed from messages. */
 #include "edit/field.h"
 
 #include "edit/turn.h"
@@ -12,19 +13,19 @@
 #include <string.h>
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
-#define COORDINATE_MAX 1e12 /* of the protocol */
+#define COORDINATE_MAX 1e12 /* the protocol's limit */
 #define SCALE_MAX 1e6
 #define ANGLE_MAX 3.6e6
-#define TURN_MAX 3600.0    /* degrees, of the environment; the protocol has 100 radians */
-#define TURN_OF_IMAGE 90.0 /* as --environment-rotation: the middle column is +x, in the protocol -z */
-#define ANGLE_STEP 1e-4    /* degrees: an angle out of a matrix of floats is no better than a tenth of it */
+#define TURN_MAX 3600.0    /* degrees, environment; the protocol allows 100 radians */
+#define TURN_OF_IMAGE 90.0 /* the middle column is +x, as for --environment-rotation; in the protocol it is -z */
+#define ANGLE_STEP 1e-4    /* degrees: an angle from a matrix of floats is no more precise */
 
 /* ---- units ---- */
 
-/* Of fields whose place in messages.def has no unit. */
+/* Units of fields that have none in messages.def. */
 static const struct {
     const char *name, *unit;
-    double scale; /* what the message has for one of the unit */
+    double scale; /* value in the message of one unit */
 } units[] = {
     {"anisotropy_rotation", "degrees", RADIANS_PER_DEGREE},
     {"inner_cone", "degrees", RADIANS_PER_DEGREE},
@@ -66,7 +67,7 @@ enum message_type edit_message_type(enum protocol_object_kind kind)
                                                  : MESSAGE_OK;
 }
 
-/* The place of a colour in three fields, X_red and so on; 0: it is none. */
+/* Length of the stem if the field is the first of three, X_red and so on; 0: it is not. */
 static size_t stem_of_triple(const struct field_desc *wire)
 {
     const char *suffix = strrchr(wire->name, '_');
@@ -75,7 +76,8 @@ static size_t stem_of_triple(const struct field_desc *wire)
     return (size_t)(suffix - wire->name);
 }
 
-/* Three numbers that cannot be negative, or four with an alpha, are one in all messages of objects. */
+/* True for three numbers that cannot be negative, or four with an alpha, which are colours in all messages of
+ * objects. */
 static bool is_colour(const struct fl_field *field)
 {
     return (field->count == 3 || field->count == 4) && field->min >= 0;
@@ -141,7 +143,7 @@ static struct fl_field intensity(double max, const char *doc)
     return field;
 }
 
-/* Without its image. */
+/* Fields of the environment, without its image. */
 static size_t environment_fields(struct fl_field fields[FL_FIELDS_MAX])
 {
     const struct struct_desc *body = message_describe(MESSAGE_SET_ENVIRONMENT)->body();
@@ -156,7 +158,7 @@ static size_t environment_fields(struct fl_field fields[FL_FIELDS_MAX])
     return 6;
 }
 
-/* What tells objects apart or points elsewhere is no field. */
+/* False for fields that identify an object or refer to others. */
 static bool is_value(const struct field_desc *wire, const struct struct_desc *body)
 {
     return wire != body->fields && !field_is_counted(wire) && wire->kind != FIELD_BYTES &&
@@ -186,7 +188,7 @@ size_t fl_fields(enum protocol_object_kind kind, struct fl_field fields[FL_FIELD
     return count;
 }
 
-/* As a remedy: "it has translate, rotate, ..", as far as they fit. */
+/* Sets the remedy: "it has translate, rotate, ..", as far as the names fit. */
 static void list_fields(const struct fl_field *fields, size_t count, struct fl_error *error)
 {
     size_t used = (size_t)snprintf(error->remedy, sizeof(error->remedy), "it has");
@@ -282,7 +284,7 @@ static double intensity_of(const float colour[3])
 void edit_field_load(const struct fl_field *field, const struct message *object,
                      double values[FL_FIELD_VALUES_MAX])
 {
-    const float *matrix = object->set_node.parent_from_node; /* of a node's fields */
+    const float *matrix = object->set_node.parent_from_node; /* nodes only */
     double unused[3];
     switch ((enum edit_source)field->source) {
     case EDIT_WIRE:
@@ -296,7 +298,7 @@ void edit_field_load(const struct fl_field *field, const struct message *object,
     case EDIT_ROTATE:
         edit_turn_load(matrix, values, unused);
         for (int i = 0; i < 3; i++)
-            values[i] = rint(values[i] / ANGLE_STEP) * ANGLE_STEP + 0.0; /* no -0 */
+            values[i] = rint(values[i] / ANGLE_STEP) * ANGLE_STEP + 0.0; /* avoids -0 */
         return;
     case EDIT_SCALE:
         edit_turn_load(matrix, unused, values);

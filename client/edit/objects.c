@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Finding and reading the objects of a scene. */
 #include "edit/objects.h"
 
 #include "edit/field.h"
@@ -12,7 +13,7 @@
 #include <string.h>
 
 #define ANSWER_NS 30000000000ull
-#define ENVIRONMENT 1u /* the identifier of the only one */
+#define ENVIRONMENT 1u /* the identifier of the only environment */
 
 /* ---- names ---- */
 
@@ -27,7 +28,7 @@ static int by_id(const void *a, const void *b)
     return left < right ? -1 : left > right;
 }
 
-/* Ascending, each once: a list that changes while it is read may name an object twice. */
+/* Sorts by identifier and removes duplicates: a list that changes while it is read may name an object twice. */
 static void put_in_order(struct list *list)
 {
     size_t kept = 0;
@@ -53,7 +54,7 @@ static bool take_page(struct list *list, const struct message_scene_objects_repl
     return true;
 }
 
-/* Each scene has one, which the daemon does not list. */
+/* Lists the environment, which each scene has and the daemon does not list. */
 static bool list_environment(struct list *list, struct fl_error *error)
 {
     if (!fl_grow((void **)&list->objects, &list->capacity, list->count, sizeof(*list->objects), error))
@@ -62,7 +63,8 @@ static bool list_environment(struct list *list, struct fl_error *error)
     return true;
 }
 
-/* `name` empty: all. Places ascend from page to page, so that the questions come to an end. */
+/* Requests the list page by page; `name` empty: all objects. Positions ascend from page to page, so that the
+ * requests end. */
 static bool list_objects(struct fl_scene *scene, enum protocol_object_kind kind, const char *name,
                          struct list *list, struct fl_error *error)
 {
@@ -152,7 +154,7 @@ static bool add_id(struct found *found, uint32_t id, struct fl_error *error)
     return true;
 }
 
-/* "*" stands for any characters. */
+/* Matches a pattern in which "*" stands for any characters. */
 static bool matches(const char *pattern, const char *name)
 {
     const char *star = NULL, *resume = NULL;
@@ -175,7 +177,7 @@ static bool matches(const char *pattern, const char *name)
     return *pattern == '\0';
 }
 
-/* What a node must show for its name to stand for an object of that kind; group: none does. */
+/* The kind that a node must show for its name to select an object of this kind; group: none. */
 static enum protocol_node_kind shown_as(enum protocol_object_kind kind)
 {
     return kind == PROTOCOL_OBJECT_LIGHT    ? PROTOCOL_NODE_LIGHT
@@ -183,7 +185,8 @@ static enum protocol_node_kind shown_as(enum protocol_object_kind kind)
                                             : PROTOCOL_NODE_GROUP;
 }
 
-/* Adds those whose names match, all or the first; for lights and cameras, if none does, those of nodes. */
+/* Adds objects with matching names, all or the first; for lights and cameras without a match, objects by the
+ * names of nodes. */
 static bool add_matching(const struct list *objects, const struct list *nodes, enum protocol_object_kind kind,
                          const char *pattern, struct found *found, struct fl_error *error)
 {
@@ -228,7 +231,7 @@ static bool find_in_lists(struct fl_scene *scene, const struct wanted *wanted, s
 {
     const bool by_nodes = shown_as(wanted->kind) != PROTOCOL_NODE_GROUP;
     uint64_t index = 0;
-    /* Of one name alone first: a scene may have millions. */
+    /* Requests this one name first, since a scene may have millions. */
     if (!list_objects(scene, wanted->kind, wanted->which, objects, error) ||
         (by_nodes && objects->count == 0 &&
          !list_objects(scene, PROTOCOL_OBJECT_NODE, wanted->which, nodes, error)))
@@ -285,7 +288,7 @@ static uint32_t id_in(const struct message *message)
                                                       : 0;
 }
 
-/* A copy that needs no buffer of the connection: its bytes, decoded again. */
+/* Copies a message by encoding and decoding it, so that it needs no buffer of the connection. */
 static bool keep_message(struct edit_object *object, const struct message *message, struct fl_error *error)
 {
     const size_t payload_bytes = message_payload_bytes(message), scratch_bytes = 2 * payload_bytes + 8;

@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
+/* Angles and scale of a node's matrix. */
 #include "edit/turn.h"
 
 #include <math.h>
 
 #define DEGREES_PER_RADIAN 57.29577951308232
-#define POLE 0.9999999 /* of the sine of the second angle: beyond it the other two turn about the same axis */
+#define POLE 0.9999999 /* sine of the second angle beyond which the other two turn about the same axis */
 
 void edit_turn_load(const float matrix[12], double degrees[3], double scale[3])
 {
-    double turn[3][3]; /* by row */
+    double turn[3][3]; /* rotation, by row */
     for (int c = 0; c < 3; c++) {
         const double x = (double)matrix[c], y = (double)matrix[4 + c], z = (double)matrix[8 + c];
         const double length = sqrt(x * x + y * y + z * z);
