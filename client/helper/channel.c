@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Messages between a helper program and its parent. */
 #include "channel.h"
 
 #include <errno.h>
@@ -16,7 +17,7 @@
 
 /* ---- answers ---- */
 
-/* The longest prefix that fits and does not cut a UTF-8 character. */
+/* Copies the longest prefix that fits and does not cut a UTF-8 character. */
 static void copy_text(char *out, size_t out_bytes, const char *text)
 {
     size_t length = strlen(text);
@@ -65,7 +66,7 @@ bool channel_send_failure(const struct channel *channel, uint32_t request, const
     message.error.retryable = failure->retryable;
     if (channel_send(channel, request, &message))
         return true;
-    /* The library's text was no UTF-8. */
+    /* The library's text was not UTF-8. */
     message.error.field = "";
     message.error.text = "no more can be said";
     return channel_send(channel, request, &message);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Atomic writing and bounded reading of files. */
 #include "file.h"
 
 #include <errno.h>
@@ -47,7 +48,7 @@ static int write_all(int fd, const uint8_t *bytes, size_t count)
     return 0;
 }
 
-/* The temporary name of the file that is being written: a signal handler removes it if the program is ended. */
+/* Temporary name of the unfinished file, for the signal handler that removes it. */
 static char unfinished[4200];
 static volatile sig_atomic_t is_unfinished;
 
@@ -94,7 +95,7 @@ int file_begin(const char *path, char *reason, size_t reason_bytes)
         fail(reason, reason_bytes, errno);
         return -1;
     }
-    /* mkostemp gives rights to the owner alone; this is an ordinary file. */
+    /* mkostemp grants rights to the owner alone; this is an ordinary file. */
     const mode_t mask = umask(0);
     umask(mask);
     if (fchmod(fd, 0666 & ~mask) == 0)
@@ -186,7 +187,7 @@ bool file_read(int fd, size_t max_bytes, uint8_t **bytes, size_t *count, char *r
                  max_bytes >> 20);
         return false;
     }
-    /* What grows meanwhile is read as it was. */
+    /* A file that grows meanwhile is read at its former size. */
     *bytes = malloc((size_t)status.st_size);
     if (*bytes && read_up_to(fd, *bytes, (size_t)status.st_size, count))
         return true;

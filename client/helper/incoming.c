@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Receiving the pixels of a frame. */
 #include "incoming.h"
 
 #include <stdlib.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Loading of modules with large libraries. */
 #include "module.h"
 
 #include <dlfcn.h>
@@ -9,8 +10,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Beside the program, or where it is installed. A run path would do the same, but not under the address sanitizer,
- * whose dlopen stands before the C library's. */
+/* Finds the module beside the program or where it is installed. A run path would do so too, except under the
+ * address sanitizer, whose dlopen replaces the C library's. */
 static bool find(const char *file, char path[PATH_MAX], char *reason, size_t reason_bytes)
 {
     static const char *const folders[] = {"", "../lib/farlight/"};
@@ -34,7 +35,7 @@ void *module_load(const char *file, const char *symbol, char *reason, size_t rea
     char path[PATH_MAX];
     if (!find(file, path, reason, reason_bytes))
         return NULL;
-    /* Lazily: most of the libraries' functions are never called. */
+    /* Lazy binding: most functions of the libraries are never called. */
     void *module = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
     void *found = module ? dlsym(module, symbol) : NULL;
     if (!found)

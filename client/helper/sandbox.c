@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The sandbox of helper programs: limits, Landlock, seccomp. */
 #include "sandbox.h"
 
 #include <dirent.h>
@@ -18,7 +19,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-/* Not in the headers of every supported distribution. */
+/* Constants that the headers of some supported distributions lack. */
 #ifndef LANDLOCK_ACCESS_FS_TRUNCATE
 #define LANDLOCK_ACCESS_FS_TRUNCATE (1ULL << 14)
 #endif
@@ -47,7 +48,7 @@ static bool set_limit(int resource, uint64_t value)
     if (getrlimit((__rlimit_resource_t)resource, &limit) != 0)
         return false;
     if (limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < value)
-        value = limit.rlim_cur; /* somebody set a tighter one */
+        value = limit.rlim_cur; /* keeps a tighter limit of the user's */
     limit.rlim_cur = limit.rlim_max = (rlim_t)value;
     return setrlimit((__rlimit_resource_t)resource, &limit) == 0;
 }
@@ -63,12 +64,12 @@ static bool set_limits(const struct sandbox_options *options)
     if (options->cpu_seconds != 0 && !set_limit(RLIMIT_CPU, options->cpu_seconds))
         return false;
     signal(SIGXFSZ, SIG_IGN); /* a write beyond the limit then fails instead of ending the process */
-    /* A sanitizer's report goes to stderr, which may be a file. */
+    /* A sanitizer's report goes to standard error, which may be a file. */
     return set_limit(RLIMIT_CORE, 0) && (SANITIZED || set_limit(RLIMIT_FSIZE, options->file_bytes));
 }
 
-/* Landlock binds the thread that enters it and those that it starts. Code in a bound thread runs in any other
- * thread of the process by a signal, or by what it writes into the shared memory. 0: not known. */
+/* Counts threads, since Landlock binds only the thread that enters it and its later children: code in a bound
+ * thread can act through an unbound one by a signal or shared memory. 0: unknown. */
 static unsigned count_threads(void)
 {
     DIR *tasks = opendir("/proc/self/task");
@@ -111,7 +112,7 @@ static uint64_t rights_of_abi(long abi)
     return rights;
 }
 
-/* A missing folder gives no rights and is no error here: opening files in it reports it. */
+/* Grants rights to a folder. A missing folder is no error here: opening a file in it reports that. */
 static bool allow_folder(int ruleset, const char *folder, uint64_t rights)
 {
     struct landlock_path_beneath_attr rule = {.allowed_access = rights};
@@ -127,7 +128,7 @@ static bool allow_folder(int ruleset, const char *folder, uint64_t rights)
 
 static bool allow_folders(int ruleset, const struct sandbox_options *options, uint64_t handled)
 {
-    /* Paths that the dynamic linker, the C library and the image readers' plug-in search may still open. */
+    /* Paths that the dynamic linker, the C library and the plug-in search of image readers may still open. */
     static const char *const system_folders[] = {"/usr/lib", "/usr/lib64", "/lib", "/lib64",
                                                  "/sys/devices/system/cpu"};
     const uint64_t read_rights = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
@@ -140,7 +141,7 @@ static bool allow_folders(int ruleset, const struct sandbox_options *options, ui
     for (size_t i = 0; i < sizeof(system_folders) / sizeof(system_folders[0]); i++)
         if (!allow_folder(ruleset, system_folders[i], read_rights))
             return false;
-    if (SANITIZED && !allow_folder(ruleset, "/proc", read_rights)) /* where the leak sanitizer finds the threads */
+    if (SANITIZED && !allow_folder(ruleset, "/proc", read_rights)) /* the leak sanitizer lists threads there */
         return false;
     for (size_t i = 0; i < options->read_folder_count; i++)
         if (options->read_folders[i] && !allow_folder(ruleset, options->read_folders[i], read_rights))
@@ -201,7 +202,7 @@ static bool allow_calls(scmp_filter_ctx filter, const char *const *names, size_t
     return true;
 }
 
-/* Allows the call where the bits of `mask` of an argument have this value. */
+/* Allows a call if the bits of `mask` of an argument have this value. */
 static bool allow_masked(scmp_filter_ctx filter, int number, unsigned argument, uint64_t mask, uint64_t value)
 {
     const struct scmp_arg_cmp is_value = {
@@ -217,7 +218,8 @@ static bool allow_with_argument(scmp_filter_ctx filter, int number, unsigned arg
     return seccomp_rule_add_array(filter, SCMP_ACT_ALLOW, number, 1, &is_value) == 0;
 }
 
-/* No memory is ever both writable and executable. Code comes from files alone, as the dynamic linker maps it. */
+/* Forbids memory that is both writable and executable; code comes from files alone, as the dynamic linker maps
+ * it. */
 static bool allow_memory(scmp_filter_ctx filter)
 {
     return allow_masked(filter, SCMP_SYS(mmap), 2, PROT_EXEC, 0) &&
@@ -225,9 +227,9 @@ static bool allow_memory(scmp_filter_ctx filter)
            allow_masked(filter, SCMP_SYS(mprotect), 2, PROT_EXEC, 0);
 }
 
-/* Threads, but no processes and no namespaces. The flags of clone3 lie in memory, where no filter sees them: the C
- * library falls back to clone. Signals only to threads of this process, all of which are bound: abort() raises its
- * own by tgkill. Signal handlers are those of before; they can be asked for. */
+/* Allows threads, but no processes and no namespaces. The flags of clone3 lie in memory, where no filter sees
+ * them, so it is refused and the C library falls back to clone. Signals reach only threads of this process,
+ * which are all bound: abort() uses tgkill. Signal handlers can be read but not changed. */
 static bool allow_threads(scmp_filter_ctx filter)
 {
     const uint64_t of_threads = CLONE_VM | CLONE_SIGHAND | CLONE_THREAD;
@@ -240,7 +242,7 @@ static bool allow_threads(scmp_filter_ctx filter)
            allow_with_argument(filter, SCMP_SYS(rt_sigaction), 1, 0);
 }
 
-/* fcntl and ioctl only with the requests of a reader of files, so that no descriptor gains abilities. */
+/* Restricts fcntl and ioctl to the requests of a reader of files, so that no descriptor gains abilities. */
 static bool allow_arguments(scmp_filter_ctx filter)
 {
     static const unsigned fcntl_commands[] = {F_GETFD, F_SETFD, F_GETFL, F_SETFL, F_DUPFD_CLOEXEC};
@@ -252,12 +254,12 @@ static bool allow_arguments(scmp_filter_ctx filter)
     for (size_t i = 0; i < sizeof(ioctl_requests) / sizeof(ioctl_requests[0]); i++)
         if (!allow_with_argument(filter, SCMP_SYS(ioctl), 1, ioctl_requests[i]))
             return false;
-    /* Limits may be asked for but not changed. */
+    /* Limits can be read but not changed. */
     return allow_with_argument(filter, SCMP_SYS(prlimit64), 2, 0);
 }
 
-/* Other calls fail with EPERM instead of ending the process: a library that makes an unusual call then handles the
- * error, and the import ends with a message. */
+/* Enters the filter. Other calls fail with EPERM instead of ending the process, so that a library that makes an
+ * unusual call handles the error and the import ends with a message. */
 static bool enter_seccomp(const struct sandbox_options *options)
 {
     scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
