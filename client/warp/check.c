@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Checks of the arguments of fl_warp functions. */
 #include "warp/check.h"
 
 #include <math.h>
@@ -6,7 +7,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-#define RIGID_SLACK 1e-3f /* of products of the camera's axes: what comes as floats is rounded */
+#define RIGID_SLACK 1e-3f /* tolerance of products of the camera's axes, which are rounded floats */
 #define PLACE_MAX 1e9f    /* metres */
 #define LENGTH_MIN 1e-9f  /* metres */
 #define FOV_MAX 3.0f      /* radians */

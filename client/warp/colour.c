@@ -1,19 +1,20 @@
 /* SPDX-License-Identifier: MIT */
+/* Interpolation of a layer's colours. */
 #include "warp/colour.h"
 
 #include "warp/rays.h"
 
 #include <string.h>
 
-#define SHARES 256 /* of a texel: weights are whole numbers of them */
+#define SHARES 256 /* weights of texels are multiples of 1 / SHARES */
 
-/* Two values of 8 bits each, in bits 0 to 7 and 16 to 23, from two such pairs. */
+/* Mixes two values of 8 bits each, in bits 0 to 7 and 16 to 23, with two others. */
 LANES_INLINE uint32_t mix_pair(uint32_t a, uint32_t b, uint32_t share)
 {
     return ((a * (SHARES - share) + b * share + 0x800080u) >> 8) & 0xff00ffu;
 }
 
-/* Between the texels of two rows. */
+/* Interpolates between two texels of two rows each. */
 LANES_INLINE uint32_t mix_four(const uint32_t above[2], const uint32_t below[2], uint32_t share_x,
                                uint32_t share_y)
 {
@@ -25,8 +26,8 @@ LANES_INLINE uint32_t mix_four(const uint32_t above[2], const uint32_t below[2],
     return even | odd << 8;
 }
 
-/* What is loaded for each place: the bits that say where four texels are one surface, and two texels of two rows.
- */
+/* Texels loaded for each place: the bits that show where four texels are one surface, and two texels of two
+ * rows. */
 struct texels {
     uint32_t joined[LANES], above[LANES][2], below[LANES][2];
 };
@@ -61,7 +62,7 @@ LANES_KERNEL static void colour_places(const struct warp_layer *layer, const flo
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
         const uint32_t joined = mask_of((int)(texels.joined[k] >> (places[k] & 31) & 1u));
-        /* Of texels of several surfaces the nearest. */
+        /* Texels of several surfaces are not mixed: the nearest counts. */
         const uint32_t nearest_x = (shares_x[k] + SHARES / 2) & SHARES,
                        nearest_y = (shares_y[k] + SHARES / 2) & SHARES;
         const uint32_t share_x = (shares_x[k] & joined) | (nearest_x & ~joined);

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Bowles and others: what is seen at a pixel lies where the depth that is found there says that it lies, so that
- * this is repeated. Near edges it may find either surface, or none. */
+/* Iterative image warping (Bowles and others): the surface at a pixel lies where its own depth puts it, so a
+ * fixed-point iteration finds it. Near edges it may find either surface, or none. */
 #include "warp/trace.h"
 
 #include "warp/colour.h"
 
 #define ROUNDS 3
-#define FOUND_TEXELS 1.0f /* what moved further in the last round has not been found */
+#define FOUND_TEXELS 1.0f /* the search has failed if the last round moved further */
 
-/* LANES pixels of a row, on their way to where they are seen. */
+/* LANES pixels of a row, and the places that the search has reached. */
 struct search {
     float x[LANES], y[LANES], way[LANES];
     uint32_t mask[LANES], colours[LANES];
@@ -27,7 +27,7 @@ static inline void load_sticking(const uint8_t *sticking, const int places[LANES
         loaded[k] = sticking[places[k]];
 }
 
-/* From (x, y) of the picture on. */
+/* Searches from the place (x, y) of the picture. */
 LANES_KERNEL_OF_LOADS static void search_pixels(const struct warp_rays *rays, const struct warp_layer *layer,
                                                 const float place[2], struct search *restrict search)
 {
@@ -59,7 +59,7 @@ LANES_KERNEL_OF_LOADS static void search_pixels(const struct warp_rays *rays, co
             search->y[k] = y;
         }
     }
-    if (layer->sticks) /* in the last place that was looked at, which is within a texel of where it was found */
+    if (layer->sticks) /* read at the last place of the search, which is within a texel of the result */
         load_sticking(layer->sticking, places, search->sticking);
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {

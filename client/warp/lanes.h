@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Loops that a compiler makes vector instructions of: plain C over LANES values that lie side by side. A function
- * with such loops is a LANES_KERNEL, which is compiled once for each kind of processor that has more to offer;
- * what it calls is LANES_INLINE, so that it is part of all of these. Results are the same on all of them: the
- * folder is compiled without contraction of products and sums. */
+/* Loops that compilers vectorise: plain C over LANES adjacent values. A function with such loops is a
+ * LANES_KERNEL, compiled once for each kind of vector unit; the functions that it calls are LANES_INLINE, so
+ * that they are part of each version. Results are equal on all processors: the folder is compiled without
+ * contraction of products and sums. */
 #ifndef FARLIGHT_CLIENT_WARP_LANES_H
 #define FARLIGHT_CLIENT_WARP_LANES_H
 
@@ -11,12 +11,12 @@
 #include <stdint.h>
 #include <string.h>
 
-#define LANES 16 /* floats in the widest registers that there are */
+#define LANES 16 /* floats in the widest vector registers */
 
 #define LANES_INLINE static inline __attribute__((always_inline))
 
-/* LANES_CLONES is set by the Makefile, for optimised builds without sanitizers. A loop of little but loads takes a
- * tenth less time in registers of 256 bits. Kernels are static: clang gives clones another name in other files. */
+/* LANES_CLONES is set by the Makefile for optimised builds without sanitizers. A loop that mostly loads takes a
+ * tenth less time with registers of 256 bits. Kernels are static because clang renames clones across files. */
 #if defined(LANES_CLONES) && defined(__x86_64__)
 #define LANES_KERNEL __attribute__((target_clones("avx512f", "avx2", "default")))
 #define LANES_KERNEL_OF_LOADS __attribute__((target_clones("avx2", "default")))
@@ -74,8 +74,8 @@ LANES_INLINE float min_of_4(const float a[4])
     return min_of(min_of(a[0], a[1]), min_of(a[2], a[3]));
 }
 
-/* Conditions of lanes are masks, all bits or none, as registers have them: of a `bool` a compiler would make
- * branches, or bytes. */
+/* Conditions of lanes are masks, all bits or none, as in vector registers; for a `bool` compilers make branches
+ * or bytes. */
 LANES_INLINE uint32_t mask_of(int condition)
 {
     return (uint32_t)-condition;
@@ -91,7 +91,7 @@ LANES_INLINE float pick(uint32_t mask, float a, float b)
     return float_from_bits((bits_of(a) & mask) | (bits_of(b) & ~mask));
 }
 
-/* What is not a number becomes `low`. */
+/* NaN becomes `low`. */
 LANES_INLINE float clamp(float a, float low, float high)
 {
     return min_of(max_of(a, low), high);

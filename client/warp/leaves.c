@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Slopes come from differences of depths, as the client knows no primitives. Where a texel and its neighbour do
- * not go on from one another both have the flag O of the paper. */
+/* Planes of the leaves. Slopes come from differences of depths, as the client knows no primitives. A texel and
+ * a neighbour that do not continue each other both get the flag O of the paper. */
 #include "warp/leaves.h"
 
 #include "warp/lanes.h"
 #include "warp/node.h"
 
-/* Two differences of w to the neighbours on both sides are one slope if they are as different as this share of the
- * smaller one: then it is their mean. */
+/* Two differences of w, to the neighbours on both sides, form one slope, their mean, if they differ by at most
+ * this share of the smaller one. */
 #define SLOPE_SHARE 0.5f
-/* Else the surface goes on to one side, where the difference is smaller, if that is no more than this share of w:
- * more is a step on both sides. */
+/* Otherwise the surface continues to the side with the smaller difference if that is at most this share of w; a
+ * larger one is a step on both sides. */
 #define STEP_SHARE 0.02f
-/* Of the greatest w of four texels: they show one surface if they differ by no more. */
+/* Four texels show one surface if they differ by at most this share of their maximum w. */
 #define JOINED_SHARE 0.03f
 
-/* Of w at a texel from the differences to its neighbours: from the one before it and to the one after it. */
+/* Slope of w at a texel from the differences to its neighbours: from the previous one and to the next one. */
 LANES_INLINE float slope_of(float w, float before, float after, float noise)
 {
     const float a = magnitude(before), b = magnitude(after), smaller = a < b ? before : after;
@@ -24,14 +24,14 @@ LANES_INLINE float slope_of(float w, float before, float after, float noise)
     return is_one ? 0.5f * (before + after) : is_step ? 0 : smaller;
 }
 
-/* The word with the slopes at a texel, of w there, and to the left, to the right, above and below. */
+/* Packs the slopes at a texel from w there, to the left, to the right, above and below. */
 LANES_INLINE uint32_t slopes_of(float w, float left, float right, float above, float below, float noise)
 {
     const float x = slope_of(w, w - left, right - w, noise), y = slope_of(w, w - above, below - w, noise);
     return w > 0 ? plane_tail(x, y) : 0;
 }
 
-/* Beyond the border the surface goes on as it is on this side. */
+/* Beyond the border the surface continues with the slope on this side. */
 static void find_slope_at_border(const struct warp_layer *layer, const struct slope_row *row, uint32_t x,
                                  uint32_t y)
 {
@@ -77,26 +77,26 @@ void warp_find_slopes(const struct warp_layer *layer, const struct slope_row *ro
             find_slope_at_border(layer, row, (uint32_t)x, y);
 }
 
-/* How far the planes of two leaves differ in the middle of their border; b lies to the right of a, or below. */
+/* True if the planes of two leaves differ too much at the middle of their border; b lies to the right of a, or
+ * below. */
 LANES_INLINE uint32_t is_edge(float w_a, float w_b, float slope_a, float slope_b, float slack)
 {
     return mask_of(magnitude(w_b - w_a - 0.5f * (slope_a + slope_b)) >
                    QUADTREE_EDGE_SHARE * max_of(w_a, w_b) + slack);
 }
 
-/* What the leaves of a row are made of. Of a row of texels that is not there: the row itself, with a mask of no
- * bits. */
+/* The inputs of a row of leaves. A missing row of texels is replaced by the row itself, with a mask of no bits. */
 struct leaf_row {
     const float *above, *w, *below;
     const float *up, *along_y, *down;     /* slopes along y, of the three rows */
-    const float *along_x, *along_x_below; /* along x */
+    const float *along_x, *along_x_below; /* slopes along x */
     const uint32_t *tails;
     uint32_t has_above, has_below;
     float slack, noise;
     uint32_t *nodes;
 };
 
-/* A neighbour that is not there is the texel itself. */
+/* A missing neighbour is replaced by the texel itself. */
 LANES_INLINE void make_leaf(const struct leaf_row *row, int x, int left, int right)
 {
     const float *w = row->w, *across = row->along_x, slack = row->slack;
@@ -147,8 +147,7 @@ static void make_row(const struct leaf_row *row, struct span span, int last)
         make_leaf(row, last, last - 1, last);
 }
 
-/* Whether four texels show one surface: they are close to one another, or go on from one another however steeply.
- */
+/* True if four texels show one surface: they are close to each other, or continue each other however steeply. */
 LANES_INLINE uint32_t is_joined(const struct leaf_row *row, int x)
 {
     const float a = row->w[x], b = row->w[x + 1], c = row->below[x], d = row->below[x + 1], slack = row->slack;
@@ -160,7 +159,7 @@ LANES_INLINE uint32_t is_joined(const struct leaf_row *row, int x)
     return mask_of(high - low <= JOINED_SHARE * high + row->noise) | (~edge & mask_of(low > 0));
 }
 
-/* Of a word's texels from the first on, all of which have neighbours. */
+/* Finds the bits of a word of texels that all have neighbours. */
 LANES_KERNEL static uint32_t join_word(const struct leaf_row *given, int first)
 {
     const struct leaf_row row = *given;
@@ -171,7 +170,7 @@ LANES_KERNEL static uint32_t join_word(const struct leaf_row *given, int first)
     return word;
 }
 
-/* The last texel of a row, and all of the last row, have no neighbours. */
+/* The last texel of a row and the last row have no neighbours. */
 static void join_texels(const struct leaf_row *row, uint32_t *words, struct span span, int last)
 {
     for (int x = span.first; x < span.end; x += WARP_JOINED_WORD) {

@@ -5,25 +5,25 @@
 
 #include "warp/tree.h"
 
-/* Of a row, `left` to `right`: slopes as they are in nodes, and the words that hold them. */
+/* Slopes of the columns `left` to `right` of a row, as stored in nodes, and the words that hold them. */
 struct slope_row {
     float *x, *y;
     uint32_t *tails;
 };
 
-/* Columns of a row. */
+/* A range of columns. */
 struct span {
     int first, end;
 };
 
-/* Slopes of three rows. Those of a row that is not there are not read for what they are. */
+/* Slopes of three rows; those of a missing row may be anything. */
 struct slope_rows {
     const struct slope_row *above, *here, *below;
 };
 
-/* Of row y, from w of it and of its neighbours. */
+/* Finds the slopes of row y from w of the row and its neighbours. */
 void warp_find_slopes(const struct warp_layer *layer, const struct slope_row *row, uint32_t y, struct span span);
-/* Writes leaves of row y and what they are joined to; `rows` have the slopes of one column more on both sides. */
+/* Writes leaves of row y and their bits of `joined`; `rows` have slopes of one more column on both sides. */
 void warp_make_leaves(struct warp_layer *layer, const struct slope_rows *rows, uint32_t y, struct span span);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Nodes of the quadtrees: where they lie and what their 64 bits mean, as shaders/quadtree/node.glsl has them. */
+/* Nodes of the quadtrees: their order, and the meaning of their 64 bits, as in shaders/quadtree/node.glsl. */
 #ifndef FARLIGHT_CLIENT_WARP_NODE_H
 #define FARLIGHT_CLIENT_WARP_NODE_H
 
@@ -9,28 +9,28 @@
 #define NODE_W_BITS 0x7ffffffeu
 #define NODE_HALF_SIGN 0x8000u
 #define NODE_HALF_BITS 0x7fffu
-/* Of exponents: those of floats are larger by 112. */
+/* Difference of the exponents of floats and half floats, 112. */
 #define NODE_HALF_BIAS (112u << 23)
 #define NODE_SMALLEST_NORMAL (113u << 23) /* 2^-14 */
 
-/* The first node of a level, of `texels` = padded width * height, a multiple of 4^QUADTREE_TOP. Of a multiple of 3
- * a third is a product. */
+/* Index of the first node of a level; `texels` = padded width * height, a multiple of 4^QUADTREE_TOP. The
+ * division of a multiple of 3 by 3 is a product. */
 LANES_INLINE uint32_t node_level_first(uint32_t texels, uint32_t level)
 {
     return (texels - (texels >> 2 * level)) * 0xaaaaaaabu * 4u;
 }
 
-/* To the nearest half float, ties to even; `value` is in their range. */
+/* Rounds to the nearest half float, ties to even; `value` must be in range. */
 LANES_INLINE uint32_t half_of(float value)
 {
     const uint32_t bits = bits_of(value) & 0x7fffffffu, sign = bits_of(value) >> 16 & NODE_HALF_SIGN;
     const uint32_t normal = (bits + 0xfffu + (bits >> 13 & 1u) - NODE_HALF_BIAS) >> 13;
-    /* The unit of the last place of 0.5 is the smallest half float. */
+    /* The last bit of 0.5 has the value of the smallest half float. */
     const uint32_t subnormal = bits_of(float_from_bits(bits) + 0.5f) - bits_of(0.5f);
     return sign | (bits < NODE_SMALLEST_NORMAL ? subnormal : normal);
 }
 
-/* Times 1 / QUADTREE_SLOPE_SCALE. */
+/* Divides by QUADTREE_SLOPE_SCALE as well. */
 LANES_INLINE float slope_from_half(uint32_t half)
 {
     const float scale = 5.192296858534828e33f / QUADTREE_SLOPE_SCALE; /* 2^112, the difference of the exponents */

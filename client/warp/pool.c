@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Threads that share a loop. */
 #include "warp/pool.h"
 
 #include <pthread.h>
@@ -14,17 +15,17 @@ struct worker {
 
 struct warp_pool {
     pthread_mutex_t mutex;
-    pthread_cond_t changed; /* `round`, `ends` or `busy` */
+    pthread_cond_t changed; /* signals `round`, `ends` or `busy` */
     unsigned threads, started;
-    unsigned round; /* grows with each run */
-    unsigned busy;  /* workers that are in the run */
+    unsigned round; /* incremented by each run */
+    unsigned busy;  /* workers in the current run */
     bool ends;
-    warp_pool_work *work; /* of the run */
+    warp_pool_work *work; /* function of the current run */
     void *context;
     unsigned items;
     atomic_uint next;
     uint64_t processor_ns;
-    struct worker workers[]; /* all but the caller */
+    struct worker workers[]; /* threads besides the caller */
 };
 
 static uint64_t thread_ns(void)

@@ -1,32 +1,33 @@
 /* SPDX-License-Identifier: MIT */
-/* The rays of a picture in the key view's space (x, y, w). What a pixel's ray meets at the depth w lies at
+/* The rays of a picture in the key view's space (x, y, w). A surface at depth w on a pixel's ray lies at
  *
  *   (x, y) = vanishing + w * shift,
  *
- * where the vanishing point is what the pixel would see of things infinitely far away, and the shift is how far
- * what is at the unit's distance lies from there. The ray comes from the eye with decreasing w: so w is its
+ * where the vanishing point is the place of infinitely distant objects, and the shift is the displacement from
+ * there of an object at the unit's distance. The ray leaves the eye with decreasing w, so w serves as its
  * parameter. */
 #ifndef FARLIGHT_CLIENT_WARP_RAYS_H
 #define FARLIGHT_CLIENT_WARP_RAYS_H
 
 #include "warp/lanes.h"
 
-/* Rays that lead away from what the key view sees by more than this have no vanishing point: they are outside. */
+/* Rays that point away from the key view's direction by more than this have no vanishing point and are outside. */
 #define RAYS_FORWARD_MIN 1e-4f
-#define RAYS_PLACE_MAX 1e6f /* texels: what is so far outside may as well be here */
+#define RAYS_PLACE_MAX 1e6f /* texels: limit of coordinates, which is far outside anyway */
 
 struct warp_rays {
-    float rows[3][3]; /* of (x, y, 1) of the picture: the vanishing point's texel coordinates times rows[2] */
-    float origin[3];  /* the eye in the same coordinates, per unit */
-    float w_limit;    /* surfaces of greater w are behind the eye's plane */
+    /* Matrix for (x, y, 1) of the picture: the vanishing point's texel coordinates times rows[2] */
+    float rows[3][3];
+    float origin[3]; /* the eye in the same coordinates, per unit */
+    float w_limit;   /* surfaces of larger w are behind the eye's plane */
 };
 
-/* Of LANES pixels. */
+/* Rays of LANES pixels. */
 struct warp_packet {
     float x[LANES], y[LANES], shift_x[LANES], shift_y[LANES];
 };
 
-/* One of them. */
+/* A ray of a packet. */
 struct warp_ray {
     float x, y, shift_x, shift_y;
 };
@@ -41,13 +42,13 @@ LANES_INLINE struct warp_ray rays_at(const struct warp_rays *rays, float x, floa
     struct warp_ray ray;
     ray.x = is_forward ? clamp(across, -RAYS_PLACE_MAX, RAYS_PLACE_MAX) : -RAYS_PLACE_MAX;
     ray.y = is_forward ? clamp(down, -RAYS_PLACE_MAX, RAYS_PLACE_MAX) : -RAYS_PLACE_MAX;
-    const float counts = (float)is_forward; /* a product, as lanes do without a condition then */
+    const float counts = (float)is_forward; /* a product, since lanes have no branches */
     ray.shift_x = counts * (rays->origin[0] - rays->origin[2] * ray.x);
     ray.shift_y = counts * (rays->origin[1] - rays->origin[2] * ray.y);
     return ray;
 }
 
-/* The texel that a coordinate lies in, of 0 to `last`. */
+/* The texel that contains a coordinate, clamped to 0 .. `last`. */
 LANES_INLINE int texel_of(float place, int last)
 {
     return (int)clamp(place, 0, (float)last);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* A tile first narrows the range of w in which its rays can meet something: the range gives the texels that they
- * pass there, and the blocks of these the range. Where the layer rises too little in them to hide anything from
- * these rays, each of them meets one surface, which is solved for. Elsewhere quarters of the tile are tried, and
- * what is left is traced from node to node. */
+/* Tracing of tiles of rays. A tile first narrows the range of w in which its rays can hit something: the range
+ * gives the texels that the rays pass, and the blocks of these texels give a new range. Where the layer is too
+ * flat there to occlude anything, each ray hits one surface, which is solved for. Elsewhere the tile is divided
+ * into quarters, and the smallest are traced from node to node. */
 #include "warp/trace.h"
 
 #include "warp/colour.h"
@@ -13,23 +13,23 @@
 #define PACKET_COLUMNS 8u
 #define PACKET_ROWS 2u
 #define NARROWINGS_MAX 4
-#define NARROWING_LEAST 0.8f /* of the range before: what narrows less has come to its end */
-#define RANGE_SLACK 0.001f   /* of w */
-#define BLOCKS_ACROSS 4u     /* along the longer side of a rectangle, about */
-/* How far neighbouring texels may come apart in the picture, in texels, where rays meet one surface: from 1 on one
- * may hide the other. Below it the solution's iteration closes in by this factor. */
+#define NARROWING_LEAST 0.8f /* narrowing stops if a round leaves more than this share of the range */
+#define RANGE_SLACK 0.001f   /* share of w */
+#define BLOCKS_ACROSS 4u     /* approximate number along the longer side of a rectangle */
+/* Maximum stretch between neighbouring texels in the picture, in texels, if rays hit one surface: from 1 on one
+ * texel may hide the other. Below it the solution's iteration converges by this factor. */
 #define STRETCH_MAX 0.5f
-#define SHIFT_MIN 1e-6f   /* texels per unit of w: less is a ray that stays where it is */
-#define NEAR_LIMIT 0.999f /* of the w of the eye's plane */
+#define SHIFT_MIN 1e-6f   /* texels per unit of w: a ray that moves less stays in place */
+#define NEAR_LIMIT 0.999f /* share of the w of the eye's plane */
 
-/* The pixels of a tile, or of a part of one, and what their rays can meet. */
+/* The pixels of a tile or of a part of one, and the surfaces that their rays can hit. */
 struct tile {
     uint32_t x, y, size;
-    struct warp_ray rays[4]; /* at the corners */
+    struct warp_ray rays[4]; /* rays of the corners */
     float range[2];
     bool is_inside;  /* no ray leaves the layer within the range */
     bool is_outside; /* no ray is inside the layer within it */
-    uint32_t level;  /* of nodes as large as what the rays pass */
+    uint32_t level;  /* nodes of this level are as large as the region that the rays pass */
     float stretch;
 };
 
@@ -73,7 +73,7 @@ static void place_tile(const struct warp_task *task, struct tile *tile)
         tile->rays[i] = rays_at(&task->rays, x + (i & 1 ? side : 0), y + (i >> 1 ? side : 0));
 }
 
-/* Where rays are within the range, and the greatest shift along each axis. */
+/* Bounds of the rays within the range, and the maximum shift along each axis. */
 struct box {
     float low[2], high[2], shift[2];
 };
@@ -95,7 +95,7 @@ static struct box box_of(const struct tile *tile)
     return box;
 }
 
-/* Once: true if that may have helped. */
+/* Narrows the range once; true if another round may help. */
 static bool narrow_once(const struct warp_layer *layer, struct tile *tile)
 {
     const float last[2] = {(float)(layer->width - 1), (float)(layer->height - 1)};
@@ -141,7 +141,7 @@ LANES_KERNEL static void place_packet(const struct warp_rays *rays, struct warp_
     }
 }
 
-/* Where rays that met nothing known have their colours from. */
+/* Sets the places from which rays without a known hit take their colours. */
 static void go_back(const struct warp_packet *packet, float texels, struct warp_walk *walk)
 {
     for (int k = 0; k < LANES; k++) {
@@ -153,13 +153,13 @@ static void go_back(const struct warp_packet *packet, float texels, struct warp_
     }
 }
 
-/* What becomes of a packet. */
+/* Results of a packet. */
 struct result {
     uint32_t colours[LANES], mask[LANES], deeper;
     uint8_t sticking[LANES];
 };
 
-/* Those that came behind the layers before go on in this one. */
+/* Continues the rays that passed behind the previous layers in this one. */
 static void walk_deeper(const struct warp_task *task, uint32_t l, const struct warp_packet *packet,
                         float w_begin[LANES], struct result *result)
 {
@@ -219,7 +219,7 @@ static void walk_packet(const struct warp_task *task, const struct tile *tile, c
 
 /* ---- out ---- */
 
-/* A faint chequer: colours half way to a light and a dark grey. */
+/* Draws a faint chequer: the colour half way to a light and a dark grey. */
 static uint32_t under_pattern(uint32_t colour, uint32_t x, uint32_t y)
 {
     const uint32_t grey = (x >> 3 ^ y >> 3) & 1 ? 0x505050u : 0x303030u;
@@ -263,7 +263,7 @@ void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const stru
             colours[k] = under_pattern(colours[k], x + k, y);
 }
 
-/* All of which is known, within the picture. */
+/* Stores a packet with known pixels only, all within the picture. */
 static void store_known(const struct warp_task *task, uint32_t x, uint32_t y, const struct result *result,
                         struct warp_tally *tally)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pictures of another eye, tile by tile. */
+/* Tracing of pictures of another eye, tile by tile. */
 #ifndef FARLIGHT_CLIENT_WARP_TRACE_H
 #define FARLIGHT_CLIENT_WARP_TRACE_H
 
@@ -9,39 +9,40 @@
 
 #define WARP_TILE 16u /* pixels along a side */
 
-/* What is the same for all tiles. */
+/* Parameters of all tiles. */
 struct warp_task {
     const struct warp_layer *layers;
     uint32_t layer_count;
     struct warp_rays rays;
-    float ranges[FL_WARP_LAYERS_MAX][2]; /* least and greatest w of each layer that a ray may meet */
-    uint32_t width, height, stride;      /* of what is written, pixels */
+    float ranges[FL_WARP_LAYERS_MAX][2]; /* minimum and maximum w in each layer that a ray may hit */
+    uint32_t width, height, stride;      /* size of the output, pixels */
     enum fl_warp_holes holes;
-    float fill_back; /* texels from where a ray was last before a surface to what it is filled with */
+    /* Distance in texels, from a ray's last place before a surface, of the colour that fills a hole */
+    float fill_back;
     uint32_t *colours;
     uint8_t *mask, *sticking; /* the latter may be NULL */
-    bool sticks;              /* something, in some layer; else what sticks is not asked for */
+    bool sticks;              /* true if some layer has sticking; else it is not computed */
 };
 
-/* Pixels. */
+/* Sums over pixels. */
 struct warp_tally {
     uint64_t by_mask[FL_WARP_OUTSIDE + 1], deeper, walked;
-    uint64_t sticking; /* sum of 255 times their shares */
+    uint64_t sticking; /* sum of 255 times the shares */
 };
 
-/* Side by side in a row. */
+/* Adjacent pixels of a row. */
 struct warp_pixels {
     uint32_t count;
     const uint32_t *colours, *mask;
-    const uint8_t *sticking; /* counts where the mask says known; only read if something sticks */
+    const uint8_t *sticking; /* valid where the mask says known; only read if a layer has sticking */
 };
 
-/* Writes those that are in the picture, under a pattern where that is wanted. */
+/* Writes the pixels within the picture, with a pattern over holes if requested. */
 void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const struct warp_pixels *pixels,
                 struct warp_tally *tally);
 
 void warp_task_find_ranges(struct warp_task *task);
-/* A row of tiles; adds to the tally. */
+/* Traces a row of tiles and adds to the tally. */
 void warp_trace_row(const struct warp_task *task, uint32_t row, struct warp_tally *tally);
 void warp_iterate_row(const struct warp_task *task, uint32_t row, struct warp_tally *tally);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Widmer and others, section 3.3, as nodes.comp of the tracer `quadtree` has it, level by level: node for node the
- * same bits, if the leaves are. */
+/* The quadtree (Widmer and others, section 3.3), built level by level as in nodes.comp of the tracer
+ * `quadtree`: equal leaves give equal bits in all nodes. */
 #include "warp/tree.h"
 
 #include "warp/lanes.h"
@@ -9,7 +9,7 @@
 
 #include <stdlib.h>
 
-/* As in nodes.comp. */
+/* The constants of nodes.comp. */
 #define ROUNDING 2.384e-7f
 #define SLOPE_ROUNDING 9.766e-4f
 #define NO_LIMIT 3.4e38f
@@ -40,7 +40,7 @@ bool warp_layer_init(struct warp_layer *layer, uint32_t width, uint32_t height)
         blocks += texels >> 2 * level;
     }
     layer->colours = calloc((size_t)texels + layer->padded_width + 1,
-                            sizeof(*layer->colours)); /* the next texel, and the next row */
+                            sizeof(*layer->colours)); /* for reading beyond the last texel and the last row */
     layer->w = calloc(texels, sizeof(*layer->w));
     layer->sticking = calloc(texels, sizeof(*layer->sticking));
     layer->joined = calloc(texels / WARP_JOINED_WORD, sizeof(*layer->joined));
@@ -69,7 +69,7 @@ void warp_layer_finish(struct warp_layer *layer)
 
 /* ---- rows ---- */
 
-/* Rows of slopes round the one whose leaves are made, and what blocks need. */
+/* Rows of slopes around the row of leaves, and inputs of the blocks. */
 struct scratch {
     struct slope_row rows[3];
     float *w_min, *w_max, *steep_x, *steep_y;
@@ -98,7 +98,7 @@ static struct scratch scratch_of(const struct warp_layer *layer, float *memory)
                             .steep_y = memory + 12 * row};
 }
 
-/* The rows take turns. */
+/* The rows are used in turn. */
 static const struct slope_row *slopes_at(const struct scratch *scratch, uint32_t y)
 {
     return &scratch->rows[y % 3];
@@ -136,7 +136,7 @@ void warp_block_join(struct warp_block *block, const struct warp_block *other)
     block->steep_y = max_of(block->steep_y, other->steep_y);
 }
 
-/* Of the rows that were gathered. */
+/* Makes the lowest blocks from the gathered rows. */
 static void make_low_blocks(struct warp_layer *layer, const struct scratch *scratch, uint32_t y, struct span span)
 {
     const int side = 1 << WARP_BLOCK_LOW;
@@ -152,7 +152,7 @@ static void make_low_blocks(struct warp_layer *layer, const struct scratch *scra
     }
 }
 
-/* A row of a level from the level below it; what lies beyond the picture is in none. */
+/* Makes a row of a level from the level below; blocks beyond the picture are left out. */
 static void make_blocks(struct warp_layer *layer, uint32_t level, uint32_t y, struct span span)
 {
     const uint32_t across = layer->padded_width >> level, side = 1u << (level - 1);
@@ -173,16 +173,16 @@ static void make_blocks(struct warp_layer *layer, uint32_t level, uint32_t y, st
 
 /* ---- nodes ---- */
 
-/* What is the same for all nodes of a row. */
+/* Parameters of all nodes of a row. */
 struct merge_terms {
-    float h; /* half a side of a child: also from the centre of the node to those of the children */
+    float h; /* half the side of a child, which is also the distance from the node's centre to the children's */
     float tolerance, nearness;
-    float of_leaves;                          /* 1 where the children are leaves, else 0: no branches in lanes */
+    float of_leaves;                          /* 1 if the children are leaves, else 0; lanes have no branches */
     const uint32_t *upper, *lower;            /* two rows of children: their words .. */
-    const float *upper_errors, *lower_errors; /* .. and how far their planes are off at most */
+    const float *upper_errors, *lower_errors; /* .. and the maximum errors of their planes */
 };
 
-/* An eye that is up to the radius nearer to the surface sees a difference of w as more pixels. */
+/* An eye that is nearer to the surface by up to the radius sees a difference of w as more pixels. */
 LANES_INLINE float tolerance_of(const struct merge_terms *terms, float w_max)
 {
     const float near = max_of(1 - terms->nearness * w_max, 0);
@@ -198,14 +198,14 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
     const float child_error[4] = {upper_errors[0], upper_errors[1], lower_errors[0], lower_errors[1]};
     const float h = terms->h;
     float w4[4], sx[4], sy[4], error[4], reach[4];
-    uint32_t gaps = 0; /* the sign bit, if there are some */
+    uint32_t gaps = 0; /* the sign bit if there are gaps */
     int all_planes = 1, all_something = 1, any_something = 0;
     for (int i = 0; i < 4; i++) {
         w4[i] = plane_w(head[i]);
         sx[i] = plane_slope_x(tail[i]);
         sy[i] = plane_slope_y(tail[i]);
         reach[i] = (magnitude(sx[i]) + magnitude(sy[i])) * h;
-        /* Rounding of the leaves themselves, whose exact planes are known no more. */
+        /* Covers the rounding of the leaves, whose exact planes are lost. */
         const float rounding = w4[i] * ROUNDING + (reach[i] * SLOPE_ROUNDING + 2 * h * SLOPE_STEP);
         error[i] = child_error[i] + terms->of_leaves * (w4[i] > 0 ? rounding : 0);
         all_planes &= node_is_plane(head[i]);
@@ -213,7 +213,7 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
         any_something |= w4[i] > 0;
         gaps |= node_is_plane(head[i]) ? (w4[i] > 0 ? 0 : NODE_NOTHING) : tail[i] & NODE_NOTHING;
     }
-    /* Least squares of w at the four centres. */
+    /* Least-squares plane through w at the four centres. */
     const uint32_t flag = (head[0] | head[1] | head[2] | head[3]) & 1u;
     const uint32_t merged_tail = plane_tail(((w4[1] - w4[0]) + (w4[3] - w4[2])) * (0.25f / h),
                                             ((w4[2] - w4[0]) + (w4[3] - w4[1])) * (0.25f / h));
@@ -225,9 +225,10 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
         const float side_x = i & 1 ? 1 : -1, side_y = i >> 1 ? 1 : -1;
         off[i] = magnitude(w + h * (slope_x * side_x + slope_y * side_y) - w4[i]) +
                  (h * (magnitude(slope_x - sx[i]) + magnitude(slope_y - sy[i])) + error[i]);
-        /* Also over the planes below, which rays are tested against. */
+        /* The bound covers the planes below, too, as rays are tested against them. */
         high[i] = node_is_plane(head[i]) ? w4[i] + reach[i] + error[i] : float_from_bits(head[i]);
-        /* A surface goes on by up to a texel into a gap beside it. Seen on edge, its slopes are not known. */
+        /* A surface continues by up to a texel into a gap beside it. The slope of a surface seen edge-on is
+         * unknown. */
         const float steepness = magnitude(sx[i]) + magnitude(sy[i]), beside = steepness > 0 ? steepness : NO_LIMIT;
         const float own_low = w4[i] - reach[i] - error[i] - (gaps ? beside : 0);
         low[i] = node_is_plane(head[i]) ? own_low : magnitude(float_from_bits(tail[i]));
@@ -242,7 +243,7 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
     *node_error = merges ? worst : 0;
 }
 
-/* A row of zeros behind the errors. */
+/* Errors of the leaves: a row of zeros after the other errors. */
 static const float *leaf_errors(const struct warp_layer *layer)
 {
     return layer->errors + (warp_layer_nodes(layer) - layer->padded_width * layer->padded_height);
@@ -272,7 +273,7 @@ LANES_KERNEL static void merge_row(struct warp_layer *layer, uint32_t level, uin
 
 /* ---- parts ---- */
 
-/* Slopes look one texel far, and edges at the slopes of the next one. */
+/* Slopes depend on texels at distance one, and edges on slopes at distance one. */
 #define SEEN_TEXELS 2u
 
 struct warp_rectangle warp_layer_parts(const struct warp_layer *layer, const struct warp_rectangle *texels)

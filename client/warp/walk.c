@@ -1,26 +1,26 @@
 /* SPDX-License-Identifier: MIT */
-/* Widmer and others, section 4: from node to node without a stack, the way back up the tree by the bits in which
- * two neighbours differ. */
+/* Stackless traversal of the quadtree (Widmer and others, section 4): the way up the tree follows from the bits
+ * in which two neighbours differ. */
 #include "warp/walk.h"
 
 #include "warp/node.h"
 
 #define ITERATIONS_MAX 6
-#define NODE_COLUMNS_MASK 0xffff /* of a neighbour beyond the border: its number is negative */
+#define NODE_COLUMNS_MASK 0xffff /* hides the sign of the negative number of a neighbour beyond the border */
 #define SHIFT_MIN 1e-6f          /* texels: a ray that moves less stays in its column or row */
-/* Planes beside one another do not quite meet. A ray that comes behind one by no more than the bound allows has
- * met it, as by no more than this share of w, for what rounds: 0.04 pixels at 1 m from an eye 15 cm aside, if 1000
- * are the focal length. */
+/* Adjacent planes do not quite meet. A ray that is behind a plane by no more than the bound has hit it; so has
+ * a ray that is behind it by this share of w, which covers rounding: 0.04 pixels at 1 m from an eye 15 cm
+ * aside, for a focal length of 1000. */
 #define ROUNDING_SHARE 2.441e-4f /* 2^-12 */
-/* Texels that the last iteration may have moved a place by. The error that is left is smaller by how much surfaces
- * differ from planes. */
+/* Maximum movement of a place in the last iteration, in texels. The remaining error is smaller by the deviation
+ * of surfaces from planes. */
 #define SOLVED_TEXELS 0.0625f
-#define SLOPE_LEAST 0.25f /* of 1 - slope * shift, which is at least 0.5 where a solution is looked for */
+#define SLOPE_LEAST 0.25f /* limit of 1 - slope * shift, which is at least 0.5 where a solution is searched */
 
-/* What a layer is to rays. */
+/* A layer as rays see it. */
 struct ground {
     const uint32_t *nodes;
-    int across, last_x, last_y; /* nodes of a row of the lowest level; the last texels */
+    int across, last_x, last_y; /* nodes in a row of the lowest level; indices of the last texels */
     uint32_t texels;
     float tolerance, nearness, noise;
 };
@@ -37,7 +37,7 @@ static struct ground ground_of(const struct warp_layer *layer)
                            .noise = 2 * layer->noise};
 }
 
-/* Where rays are: what a step changes of each. */
+/* State of rays that each step changes. */
 struct lanes {
     float inverse_x[LANES], inverse_y[LANES], w_end[LANES];
     int level[LANES], x[LANES], y[LANES], is_first[LANES], is_clipped[LANES], leaves[LANES];
@@ -84,7 +84,7 @@ LANES_INLINE float slack_at(const struct ground *ground, float w)
     return ground->tolerance * near * near + ROUNDING_SHARE * w + ground->noise;
 }
 
-/* A ray's step through the node `head`, `tail`; all bits if it goes on. */
+/* Moves a ray through the node `head`, `tail`; returns all bits if it continues. */
 LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet *packet, struct warp_walk *walk,
                            struct lanes *lanes, const int k, const uint32_t head, const uint32_t tail)
 {
@@ -92,12 +92,12 @@ LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet
     const float from_x = packet->x[k], from_y = packet->y[k], shift_x = packet->shift_x[k];
     const float shift_y = packet->shift_y[k], w = walk->w[k], w_end = lanes->w_end[k];
     const uint32_t is_active = mask_of(walk->state[k] == WALK_ON), is_first = (uint32_t)lanes->is_first[k];
-    /* w decreases: the ray moves against its shift. */
+    /* w decreases, so the ray moves against its shift. */
     const int to_right = shift_x < 0, to_below = shift_y < 0;
     const float exit_x = ((float)((x + to_right) << level) - from_x) * lanes->inverse_x[k];
     const float exit_y = ((float)((y + to_below) << level) - from_y) * lanes->inverse_y[k];
     const float w_out = min_of(max_of(max_of(exit_x, exit_y), w_end), w);
-    /* How far the surface is before the ray, in w: above 0 the ray is behind it. */
+    /* The gap is the distance of the surface before the ray, in w: above 0 the ray is behind it. */
     const float half = 0.5f * (float)(1 << level), slope_x = plane_slope_x(tail), slope_y = plane_slope_y(tail);
     const float centre_x = (float)(x << level) + half, centre_y = (float)(y << level) + half,
                 w_plane = plane_w(head);
@@ -106,29 +106,29 @@ LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet
     const float gap_out = gap + growth * w_out, slack = slack_at(ground, w_plane);
     const uint32_t is_plane = mask_of((int32_t)head < 0), is_last = mask_of(w_out <= w_end);
     const uint32_t is_behind_plane = is_plane & mask_of(gap_in > slack);
-    /* A box with gaps has less than 0. */
+    /* A box with gaps has a negative value here. */
     const uint32_t is_behind = is_behind_plane | (~is_plane & mask_of(w < float_from_bits(tail) - slack));
-    /* The surface that nothing lies behind is met, however planes are rounded. */
+    /* The last surface before the end is hit, however planes are rounded. */
     const uint32_t crosses = mask_of(gap_in >= 0) | mask_of(gap_out >= 0) | (is_last & mask_of(gap_out >= -slack));
     const uint32_t is_met = is_plane & ~is_behind & crosses;
     const uint32_t goes_down = ~is_plane & ~is_behind & mask_of(w_out <= float_from_bits(head));
     const uint32_t passes = ~(is_behind | is_met | goes_down);
     const float apart = gap_in - gap_out, share = gap_in / pick(mask_of(magnitude(apart) > 1e-20f), apart, 1e-20f);
     const float w_met = pick(mask_of(gap_in >= 0), w, w + (w_out - w) * clamp(share, 0, 1));
-    /* The child that the ray is in. */
+    /* The child that contains the ray. */
     const int lower = level - (level > 0), low_x = 2 * x, low_y = 2 * y;
     const int at_x = texel_of(from_x + shift_x * w, ground->last_x) >> lower;
     const int at_y = texel_of(from_y + shift_y * w, ground->last_y) >> lower;
     const int child_x = max_int(min_int(at_x, low_x + 1), low_x),
               child_y = max_int(min_int(at_y, low_y + 1), low_y);
-    /* The neighbour, or the highest node that it is in and this one is not. */
+    /* The neighbour, or the largest node that contains it but not this node. */
     const uint32_t is_across = mask_of(exit_x > exit_y);
     const int next_x = x + pick_int(is_across, 2 * to_right - 1, 0),
               next_y = y + pick_int(is_across, 0, 2 * to_below - 1);
     const uint32_t ends = is_last | mask_of(next_x < 0) | mask_of(next_y < 0) |
                           mask_of(next_x > ground->last_x >> level) | mask_of(next_y > ground->last_y >> level);
     const int differ = ((x ^ next_x) | (y ^ next_y)) & NODE_COLUMNS_MASK;
-    const int up = (int)(bits_of((float)differ) >> 23) - 127; /* the highest bit that is set */
+    const int up = (int)(bits_of((float)differ) >> 23) - 127; /* index of the highest set bit */
     const int higher = min_int(level + up, QUADTREE_TOP), by = higher - level;
     const int where_behind = pick_int(is_first & (uint32_t)lanes->is_clipped[k], WALK_OUTSIDE, WALK_BEHIND);
     const int where_ends = pick_int((uint32_t)lanes->leaves[k], WALK_OUTSIDE, WALK_BEHIND);
@@ -149,7 +149,7 @@ LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet
     return goes_on;
 }
 
-/* The nodes that rays are in, one by one: in lanes a load is no faster. */
+/* Loads the nodes of the rays one by one, since a gather is no faster. */
 struct nodes {
     uint32_t words[LANES][2];
 };
@@ -160,7 +160,7 @@ static inline void load_nodes(const struct ground *ground, const int places[LANE
         memcpy(nodes->words[k], ground->nodes + 2 * (size_t)places[k], sizeof(nodes->words[k]));
 }
 
-/* False: no ray goes on. */
+/* Moves all rays a step. False: no ray continues. */
 LANES_KERNEL static bool walk_step(const struct ground *ground, const struct warp_packet *restrict packet,
                                    struct warp_walk *restrict walk, struct lanes *restrict lanes)
 {
@@ -192,7 +192,7 @@ void warp_walk(const struct warp_layer *layer, const struct warp_packet *packet,
 
 /* ---- one surface ---- */
 
-/* One step of all; false: none has moved by much. */
+/* Runs an iteration for all rays; false: none has moved much. */
 LANES_KERNEL static bool solve_step(const struct ground *ground, const struct warp_packet *restrict packet,
                                     float *restrict w, const float range[2])
 {

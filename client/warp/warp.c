@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Contexts: key views, and warping them to other views. */
 #include "warp/warp.h"
 
 #include "warp/check.h"
@@ -11,7 +12,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Texels: helps most where the background is plain, and costs nothing where it is not. */
+/* Distance in texels that avoids smeared colours at edges; it helps most where the background is plain, and
+ * costs nothing elsewhere. */
 #define SMEARED_BACK 0.5f
 
 struct fl_warp {
@@ -19,10 +21,10 @@ struct fl_warp {
     struct warp_layer layers[FL_WARP_LAYERS_MAX];
     uint32_t layer_count; /* 0: there is no key view */
     struct fl_warp_camera camera;
-    float unit, radius, pixels, off_pixels; /* off_pixels: of w_error, from an eye at the radius */
+    float unit, radius, pixels, off_pixels; /* off_pixels: effect of w_error for an eye at the radius */
     float w_error;
     bool is_smeared;
-    float *scratch; /* of each thread */
+    float *scratch; /* an array for each thread */
     uint64_t build_ns;
 };
 
@@ -49,7 +51,7 @@ struct fl_warp *fl_warp_create(unsigned threads, struct fl_warp_error *error)
     return warp;
 }
 
-/* From the first on. */
+/* Frees the layers from `first` on. */
 static void forget_layers(struct warp_layer layers[FL_WARP_LAYERS_MAX], uint32_t first)
 {
     for (uint32_t l = first; l < FL_WARP_LAYERS_MAX; l++)
@@ -68,7 +70,7 @@ void fl_warp_destroy(struct fl_warp *warp)
 
 /* ---- key views ---- */
 
-/* Rows of parts of one layer, or of several. */
+/* A row of parts of one layer, or of several. */
 struct build {
     struct fl_warp *warp;
     uint32_t layer;
@@ -84,7 +86,7 @@ static void build_row(void *context, unsigned item, unsigned worker)
                      build->warp->scratch + worker * warp_layer_scratch(layer));
 }
 
-/* Of texels that are given without any nothing sticks. */
+/* Copies shares of sticking; texels without them get 0. */
 static void copy_sticking(struct warp_layer *layer, const uint8_t *sticking,
                           const struct warp_rectangle *rectangle)
 {
@@ -120,7 +122,7 @@ static float focal_of(const struct fl_warp_camera *camera, uint32_t height)
     return 0.5f * (float)height / tanf(0.5f * camera->fov_y);
 }
 
-/* As many as the key view needs at least, of its size; those that there are stay where they are. */
+/* Allocates missing layers of the key view's size; existing ones of this size are kept. */
 static bool have_layers(struct fl_warp *warp, const struct fl_warp_key *key, struct fl_warp_error *error)
 {
     struct warp_layer layers[FL_WARP_LAYERS_MAX] = {{0}};
@@ -153,7 +155,7 @@ static bool have_layers(struct fl_warp *warp, const struct fl_warp_key *key, str
     return true;
 }
 
-/* All of it, by the bounds of the key view. */
+/* Copies a whole layer and sets its bounds from the key view. */
 static void fill_layer(const struct fl_warp *warp, struct warp_layer *layer, const struct fl_warp_layer *texels)
 {
     const struct warp_rectangle all = {0, 0, layer->width, layer->height};
@@ -237,7 +239,7 @@ const uint32_t *fl_warp_nodes(const struct fl_warp *warp, uint32_t layer, uint32
 
 /* ---- views ---- */
 
-/* Right, down and forward in world space. */
+/* Axes of a camera in world space: right, down and forward. */
 static void axes_of(const struct fl_warp_camera *camera, double axes[3][3])
 {
     for (int k = 0; k < 3; k++) {
@@ -252,8 +254,8 @@ static double dot3(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Of the picture's (x, y, 1), and of the eye; in doubles, as places far from the world's origin may lie close
- * together. */
+/* Computes the rays' matrix for (x, y, 1) of the picture, and the eye, in doubles, since places far from the
+ * world's origin may be close together. */
 static struct warp_rays rays_of(const struct fl_warp *warp, const struct fl_warp_view *view)
 {
     const struct fl_warp_camera *from = &warp->camera, *to = &view->camera;
