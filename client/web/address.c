@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Addresses of the page, and names that browsers may use for it. */
 #include "web/address.h"
 
 #include <arpa/inet.h>
@@ -9,8 +10,8 @@
 
 #define PORT_MAX 65535
 
-/* Splits "HOST:PORT", "[HOST]:PORT" and both without a port; false: it is neither. *port is what follows the
- * colon, NULL: nothing does. */
+/* Splits "HOST:PORT", "[HOST]:PORT" and both without a port; false: invalid. *port is the text after the colon;
+ * NULL: none. */
 static bool split(const char *text, char *host, size_t host_bytes, const char **port)
 {
     const bool has_brackets = text[0] == '[';

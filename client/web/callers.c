@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The list of connections. */
 #include "web/callers.h"
 
 #include <stdio.h>

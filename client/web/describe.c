@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Messages to the page, as JSON. */
 #include "web/describe.h"
 #include "options/wave_table.h"
 
@@ -6,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NAMES_MAX 256u /* cameras or clips in a menu */
+#define NAMES_MAX 256u /* limit of cameras or clips in a menu */
 #define STAGES_MAX 96u
 
 static json_t *cameras(const struct fl_scene *scene)

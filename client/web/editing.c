@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* Answers to browsers that edit. */
 #include "web/editing.h"
 
 #include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define LIST_MAX 200u /* objects of one answer */
+#define LIST_MAX 200u /* limit of objects in an answer */
 #define WORDS_MAX 64u
 
 static char *print(json_t *json, struct fl_error *error)
@@ -64,7 +65,7 @@ static json_t *field_object(const struct fl_field_value *value)
                      field->max, "words", words_of(field), "values", values);
 }
 
-/* Whether the scene's colours are a display's values, and not linear. Without an environment they are linear. */
+/* True if the scene's colours are display values; without an environment they are linear. */
 static bool has_display_values(struct fl_scene *scene, struct fl_object_state *state)
 {
     struct fl_error ignored = {0};
@@ -98,8 +99,8 @@ static char *read_one(struct fl_scene *scene, const struct web_request *request,
 
 /* ---- changing ---- */
 
-static char *tell_edited(const struct edit_history *history, const struct fl_edited *edited,
-                         struct fl_error *error)
+static char *describe_edited(const struct edit_history *history, const struct fl_edited *edited,
+                             struct fl_error *error)
 {
     return print(json_pack("{s:{s:I,s:I,s:I,s:I}}", "edited", "revision", (json_int_t)edited->revision, "objects",
                            (json_int_t)edited->objects, "undos", (json_int_t)history->undo_count, "redos",
@@ -116,10 +117,10 @@ static char *edit(struct edit_history *history, struct fl_scene *scene, const st
         return NULL;
     }
     edit_history_add(history, edited.undo, edited.undo_count);
-    return tell_edited(history, &edited, error);
+    return describe_edited(history, &edited, error);
 }
 
-/* One that cannot be undone any more, as its object is gone, is forgotten. */
+/* Undoes or redoes a change. A change that cannot be undone, because its object was removed, is dropped. */
 static char *undo(struct edit_history *history, struct fl_scene *scene, bool redo, struct fl_error *error)
 {
     struct fl_edited edited = {0};
@@ -132,7 +133,7 @@ static char *undo(struct edit_history *history, struct fl_scene *scene, bool red
     const bool is_done = fl_scene_edit(scene, change.list, change.count, &edited, error);
     free(change.list);
     edit_history_took(history, redo, edited.undo, edited.undo_count);
-    return is_done ? tell_edited(history, &edited, error) : NULL;
+    return is_done ? describe_edited(history, &edited, error) : NULL;
 }
 
 char *web_editing_answer(struct edit_history *history, struct fl_scene *scene, const struct web_request *request,

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* Comparison of a tracer with the reference, as a map of errors. */
 #include "web/error_map.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define WEIGHT 8u /* a view has 4: it is refined further while its errors are waited for */
+#define WEIGHT 8u /* a view has 4; it is refined further while the comparison runs */
 
 static void shrink(struct message_render *render)
 {
@@ -15,7 +16,7 @@ static void shrink(struct message_render *render)
     render->height = (uint32_t)fmax(1, render->height * share);
 }
 
-/* A job's first frame is at its time 0, so that the clip begins earlier by the view's time. */
+/* A job's first frame is at its time 0, so the clip starts earlier by the view's time. */
 static void place(struct error_map *map, const struct fl_view_camera *camera)
 {
     struct message_render *render = &map->render;
@@ -51,8 +52,8 @@ bool error_map_begin(struct error_map *map, struct fl_scene *scene, const struct
     render->compare = 1;
     render->compare_with = PROTOCOL_TRACER_REFERENCE;
     render->encoding = render->still_encoding =
-        PROTOCOL_ENCODING_PREDICTED;        /* what a lossy one adds would look like errors */
-    render->denoise = PROTOCOL_DENOISE_OFF; /* likewise what a filter takes away */
+        PROTOCOL_ENCODING_PREDICTED;        /* errors of a lossy encoding would count */
+    render->denoise = PROTOCOL_DENOISE_OFF; /* a filter would hide errors */
     render->adapt = 0;
     render->weight = WEIGHT;
     render->moving_rate = render->noise = 0;
@@ -71,11 +72,12 @@ static void mark(struct fl_frame *frame, const struct fl_frame *reference)
             const int difference = abs(frame->pixels[i * 4 + c] - reference->pixels[i * 4 + c]);
             largest = difference > largest ? difference : largest;
         }
-        frame->pixels[i] = (uint8_t)largest; /* of this pixel, or one that was compared before */
+        /* Maximum over this pixel's channels; earlier pixels are overwritten */
+        frame->pixels[i] = (uint8_t)largest;
     }
 }
 
-/* The same picture by the reference. */
+/* Starts the same picture with the reference. */
 static bool go_on(struct error_map *map, struct fl_scene *scene, struct fl_error *error)
 {
     map->render.compare = 0;

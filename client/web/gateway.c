@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The server for HTTP and WebSockets. */
 #include "web/gateway.h"
 #include "web/callers.h"
 #include "web/page.h"
@@ -12,14 +13,13 @@
 
 #define HEADERS_BYTES 2048
 #define NAME_BYTES 256
-#define MISDIRECTED 421 /* the HTTP status: this server does not answer for that name */
-#define CHECK_US 250000 /* for a signal that came just before the wait */
+#define MISDIRECTED 421 /* HTTP status: this server has another name */
+#define CHECK_US 250000 /* catches a signal that arrived just before the wait */
 #define REQUEST_TIMEOUT_S 20
 #define PING_S 20
 #define SILENCE_S 60
-#define MESSAGES_PER_S                                                                                            \
-    250.0 /* a mouse that reports 125 to 250 times a second, each with a shown frame at most .. */
-#define MESSAGES_AT_ONCE 500.0 /* .. after a pause of the browser's */
+#define MESSAGES_PER_S 250.0   /* a mouse reports 125 to 250 times a second, each at most with a shown frame .. */
+#define MESSAGES_AT_ONCE 500.0 /* .. after the browser has paused */
 
 _Static_assert(LWS_PRE <= PARCEL_ROOM, "libwebsockets writes its frame's header in front of a message");
 
@@ -27,22 +27,22 @@ struct gateway {
     const struct gateway_options *options;
     struct seat_options seat;
     struct lws_context *context;
-    const char *machine; /* its own name counts where it listens beyond itself; NULL: it does not */
-    int port;            /* of the first address */
+    const char *machine; /* this machine's name, accepted if it listens beyond loopback; NULL: it does not */
+    int port;            /* port of the first address */
     struct web_callers callers;
     struct web_links links;
     unsigned viewers;
-    bool has_told_origin;
+    bool has_reported_origin;
     lws_sorted_usec_list_t check;
 };
 
-/* What belongs to one HTTP request or WebSocket; cleared by libwebsockets. */
+/* State of an HTTP request or WebSocket; cleared by libwebsockets. */
 struct visitor {
-    const struct page_file *file; /* to be sent */
+    const struct page_file *file; /* file being sent */
     struct seat *seat;
     char message[WEB_REQUEST_BYTES_MAX];
     size_t message_bytes;
-    double messages; /* that may still come at once */
+    double messages; /* messages that may still arrive at once */
     uint64_t last_ns;
 };
 
@@ -53,7 +53,7 @@ static struct gateway *gateway_of(struct lws *wsi)
 
 /* ---- the right to come in ---- */
 
-/* A browser is led here by another site's name, whose pages could then read ours: it says that name. */
+/* False for a Host of another site, whose pages could then read ours (DNS rebinding). */
 static bool is_own_host(const struct gateway *gateway, struct lws *wsi)
 {
     char host[NAME_BYTES];
@@ -62,7 +62,7 @@ static bool is_own_host(const struct gateway *gateway, struct lws *wsi)
             (gateway->machine && web_host_is_ours(host, &gateway->machine, 1)));
 }
 
-/* The page itself has asked, not one of another site in the same browser. */
+/* True if the page itself made the request, not a page of another site in the same browser. */
 static bool is_own_origin(struct lws *wsi)
 {
     char origin[NAME_BYTES], host[NAME_BYTES];
@@ -74,15 +74,15 @@ static bool is_own_origin(struct lws *wsi)
            (strncmp(origin, "http://", 7) == 0 || strncmp(origin, "https://", 8) == 0);
 }
 
-/* The page itself has the right name where a proxy has changed it for its socket. Once: a foreign page may ask as
- * often as it likes. */
-static void tell_other_origin(struct gateway *gateway, struct lws *wsi)
+/* Reports an Origin that differs from the Host, which happens to the page itself behind a proxy that changes
+ * the Host. Only once, as a foreign page may try any number of times. */
+static void report_other_origin(struct gateway *gateway, struct lws *wsi)
 {
     char origin[NAME_BYTES] = "", host[NAME_BYTES] = "";
-    if (gateway->has_told_origin || lws_hdr_copy(wsi, origin, sizeof(origin), WSI_TOKEN_ORIGIN) <= 0 ||
+    if (gateway->has_reported_origin || lws_hdr_copy(wsi, origin, sizeof(origin), WSI_TOKEN_ORIGIN) <= 0 ||
         lws_hdr_copy(wsi, host, sizeof(host), WSI_TOKEN_HOST) <= 0)
         return;
-    gateway->has_told_origin = true;
+    gateway->has_reported_origin = true;
     fputs("farlight: a page with the link was refused: its Origin is ", stderr);
     plain_text_print(stderr, origin);
     fputs(", but its Host ", stderr);
@@ -90,7 +90,7 @@ static void tell_other_origin(struct gateway *gateway, struct lws *wsi)
     fputs(" (a proxy has to pass the Host on; nginx: proxy_set_header Host $http_host)\n", stderr);
 }
 
-/* The HTTP status with which a WebSocket is turned away; 0: it may come in. */
+/* The HTTP status that refuses a WebSocket; 0: accepted. */
 static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web_right *right)
 {
     char path[NAME_BYTES];
@@ -101,7 +101,7 @@ static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web
     if (!name || strcmp(name, "view") != 0)
         return HTTP_STATUS_UNAUTHORIZED;
     if (!is_own_origin(wsi)) {
-        tell_other_origin(gateway, wsi);
+        report_other_origin(gateway, wsi);
         return HTTP_STATUS_FORBIDDEN;
     }
     return gateway->viewers < gateway->options->viewers ? 0 : HTTP_STATUS_SERVICE_UNAVAILABLE;
@@ -139,7 +139,7 @@ static int begin_page(struct lws *wsi, struct visitor *visitor, const struct pag
     return 0;
 }
 
-/* A link whose last slash was lost. The address is relative, as a proxy may have put more in front. */
+/* Redirects a link whose last slash was lost. The address is relative, as a proxy may add a path in front. */
 static int add_slash(struct lws *wsi, const char *path)
 {
     unsigned char buffer[LWS_PRE + HEADERS_BYTES], *at = buffer + LWS_PRE;
@@ -198,7 +198,7 @@ static int send_page(struct lws *wsi, struct visitor *visitor)
 
 static int refuse(struct lws *wsi, enum lws_close_status status, const char *why)
 {
-    unsigned char reason[100]; /* a close frame holds 123 bytes; libwebsockets wants to be able to write to them */
+    unsigned char reason[100]; /* a close frame holds 123 bytes; libwebsockets must be able to write to them */
     const size_t bytes = strnlen(why, sizeof(reason));
     memcpy(reason, why, bytes);
     lws_close_reason(wsi, status, reason, bytes);
@@ -263,7 +263,7 @@ static int on_message(struct lws *wsi, struct visitor *visitor, const char *byte
         return refuse(wsi, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the message is too long");
     memcpy(visitor->message + visitor->message_bytes, bytes, count);
     visitor->message_bytes += count;
-    if (comes_too_often(visitor)) /* also parts of one */
+    if (comes_too_often(visitor)) /* parts of a message count, too */
         return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, "too many messages");
     if (!lws_is_final_fragment(wsi) || lws_remaining_packet_payload(wsi) > 0)
         return 0;
@@ -271,7 +271,7 @@ static int on_message(struct lws *wsi, struct visitor *visitor, const char *byte
     visitor->message_bytes = 0;
     if (!web_request_read(visitor->message, whole, &request, &error))
         return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, error.field);
-    if (!seat_tell(visitor->seat, &request))
+    if (!seat_request(visitor->seat, &request))
         return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, "this link may not edit, or not yet");
     return 0;
 }
@@ -295,8 +295,8 @@ static int on_writable(struct lws *wsi, struct visitor *visitor)
 
 /* ---- connections ---- */
 
-/* Each browser has a WebSocket, and up to six connections for the files of a page; ssh and proxies make one
- * address of many. */
+/* Limit for one address: each browser has a WebSocket, and up to six connections for the files of a page;
+ * behind ssh and proxies many browsers share an address. */
 static unsigned callers_max(const struct gateway *gateway)
 {
     return 6 * gateway->options->viewers + 16;
@@ -351,11 +351,11 @@ static int on_event(struct lws *wsi, enum lws_callback_reasons reason, void *use
     case LWS_CALLBACK_CLOSED:
         close_seat(gateway_of(wsi), visitor);
         return 0;
-    case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* a seat has something */
+    case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* a seat has a parcel */
         lws_callback_on_writable_all_protocol(lws_get_context(wsi), lws_get_protocol(wsi));
         return 0;
     default:
-        return 0; /* nothing of libwebsockets' own pages and uploads */
+        return 0; /* disables libwebsockets' own pages and uploads */
     }
 }
 
@@ -386,12 +386,13 @@ static bool open_context(struct gateway *gateway, struct fl_error *error)
                                                    .retry_and_idle_policy = &alive,
                                                    .server_string = "farlight-web",
                                                    .options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS};
-    lws_set_log_level(0, NULL); /* it would log paths, and with them the token */
+    lws_set_log_level(0, NULL); /* its log has paths, which contain the token */
     gateway->context = lws_create_context(&info);
     return gateway->context || fl_error_set(error, FL_ERROR_SYSTEM, "", "libwebsockets does not start");
 }
 
-/* Where the kernel has chosen a port for the first address, the others take it too. */
+/* Listens at an address. Port 0 of the first address is chosen by the kernel, and the others with port 0 use
+ * the same. */
 static bool listen_at(struct gateway *gateway, const struct web_address *address, struct fl_error *error)
 {
     const uint64_t of_four = LWS_SERVER_OPTION_DISABLE_IPV6;
@@ -420,8 +421,8 @@ static bool listen_at(struct gateway *gateway, const struct web_address *address
     return true;
 }
 
-/* Of several links each says what it gives, behind a blank, where neither terminals nor scripts take it for a part
- * of the link. */
+/* Prints the links. With several, each is followed by its right, after a blank, so that neither terminals nor
+ * scripts take it for a part of the link. */
 static void announce(const struct gateway *gateway)
 {
     static const char *const gives[WEB_RIGHT_COUNT] = {

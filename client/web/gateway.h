@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* HTTP and WebSockets: the page for those who have the link, and a seat for each of its WebSockets. */
+/* The server for HTTP and WebSockets: serves the page to holders of the link, and a seat to each WebSocket. */
 #ifndef FARLIGHT_CLIENT_WEB_GATEWAY_H
 #define FARLIGHT_CLIENT_WEB_GATEWAY_H
 
@@ -10,24 +10,24 @@
 #define GATEWAY_HOSTS_MAX 8
 
 struct gateway_options {
-    struct seat_options seat; /* without may_edit, changed and user */
+    struct seat_options seat; /* may_edit, changed and user are ignored */
     struct web_address listens[GATEWAY_LISTENS_MAX];
     size_t listen_count;
-    const char *hosts[GATEWAY_HOSTS_MAX + 1]; /* names by which browsers may ask, beside addresses and localhost */
+    const char *hosts[GATEWAY_HOSTS_MAX + 1]; /* names that browsers may use, besides addresses and localhost */
     size_t host_count;
-    unsigned viewers; /* WebSockets at once */
-    bool allow_edit;  /* there is a second link, and who has that may edit */
+    unsigned viewers; /* maximum number of WebSockets */
+    bool allow_edit;  /* creates a second link, whose holders may edit */
     int (*interrupt_signal)(void);
-    bool (*has_failed)(void *user); /* what is shown is gone for good; NULL: it never is */
+    bool (*has_failed)(void *user); /* true once the shown scene is gone for good; NULL: never */
     void *user;
 };
 
 struct gateway;
 
-/* Listens, and serves nothing yet. The options must outlive it. */
+/* Listens, but serves nothing yet. The options must outlive the gateway. */
 struct gateway *gateway_create(const struct gateway_options *options, struct fl_error *error);
-/* Prints the link, or with allow_edit both, that for looking first, and serves until there is a signal, which is
- * FL_ERROR_INTERRUPTED, or has_failed, which leaves the error as it is. */
+/* Prints the link, or with allow_edit both, viewing first, and serves until a signal arrives, which is
+ * FL_ERROR_INTERRUPTED, or until has_failed, which leaves the error unchanged. */
 void gateway_run(struct gateway *gateway, struct fl_error *error);
 void gateway_destroy(struct gateway *gateway);
 

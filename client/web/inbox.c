@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* What a browser asks for, until its seat begins it. */
+/* Requests of a browser that its seat has not begun. */
 #include "web/inbox.h"
 
-/* Where a request of this kind waits; NULL: nowhere. */
+/* The slot for a request of this kind; NULL: none. */
 static struct web_request *place_of(struct web_inbox *inbox, enum web_request_kind kind)
 {
     switch (kind) {

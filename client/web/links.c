@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Links with tokens. */
 #include "web/links.h"
 
 #include <sodium.h>

@@ -7,17 +7,17 @@
 
 enum web_right { WEB_LOOKS, WEB_EDITS, WEB_RIGHT_COUNT };
 
-#define WEB_TOKEN_LENGTH 43 /* of 32 random bytes in base 64 without padding */
+#define WEB_TOKEN_LENGTH 43 /* 32 random bytes in base 64 without padding */
 
 struct web_links {
     char tokens[WEB_RIGHT_COUNT][WEB_TOKEN_LENGTH + 1];
-    bool allow_edit; /* else no token gives WEB_EDITS */
+    bool allow_edit; /* false: no token grants WEB_EDITS */
 };
 
-/* False: there are no random numbers. */
+/* Makes the tokens. False: there are no random numbers. */
 bool web_links_make(struct web_links *links, bool allow_edit);
-/* What follows a token in the path "/TOKEN/..", and what that token gives; NULL: it has none of ours. Takes the
- * same time for all tokens. */
+/* Finds the rest of the path "/TOKEN/..", and the token's right; NULL: not one of ours. Takes the same time for
+ * all tokens. */
 const char *web_links_find(const struct web_links *links, const char *path, enum web_right *right);
 void web_links_forget(struct web_links *links);
 

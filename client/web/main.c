@@ -22,13 +22,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The C library looks for it by name, past our hidden visibility. */
+/* argp finds this variable by name, despite our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-web " FARLIGHT_VERSION;
 
 #define LISTEN_DEFAULT "127.0.0.1:8080"
 #define VIEWERS_DEFAULT 8u
 #define VIEWERS_MAX 64u
-#define DAEMON_WORDS_MAX 28 /* of fl_connect */
+#define DAEMON_WORDS_MAX 28 /* limit of fl_connect */
 
 enum key {
     KEY_SCENE = 0x500,
@@ -67,12 +67,12 @@ static const struct argp_option options[] = {
     {0}};
 
 struct command_line {
-    struct cli_job job; /* model, server, options of the picture; and the error of what was typed */
+    struct cli_job job; /* model, server, options of the picture; and the error of an option */
     struct gateway_options gateway;
     bool insecure;
     struct cli_socket socket;
     struct web_outage outage;
-    const char *words[DAEMON_WORDS_MAX + 1]; /* arguments of a daemon of its own, and a NULL */
+    const char *words[DAEMON_WORDS_MAX + 1]; /* arguments of a private daemon, and a NULL */
     size_t word_count;
 };
 
@@ -148,7 +148,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return protocol_integrator_parse(value, &job->options.integrator)
                    ? 0
                    : cli_usage(job, "--integrator", "unknown integrator '%s'", value);
-    case ARGP_KEY_ARG: /* those behind -- are the daemon's */
+    case ARGP_KEY_ARG: /* words after -- are the daemon's */
         return state->quoted > 0 && state->next > state->quoted ? add_word(line, value)
                                                                 : cli_set_model(job, value);
     default:
@@ -174,8 +174,8 @@ static bool check_listens(const struct command_line *line, struct fl_error *erro
     return true;
 }
 
-/* The seats come to the daemon by an address, as every client does. The user's arguments for it come last: the
- * later of two options counts. */
+/* Adds an address to the daemon's arguments, since seats connect to it as every client does. The user's
+ * arguments come last, because the later of two options counts. */
 static bool name_daemon(struct command_line *line, struct fl_error *error)
 {
     const char *const ours[] = {"--listen", line->socket.address, "--log-level", "error"};
@@ -189,7 +189,7 @@ static bool name_daemon(struct command_line *line, struct fl_error *error)
     return true;
 }
 
-/* What is empty, such as FARLIGHT_SERVER=, names nothing. */
+/* An empty value, as of FARLIGHT_SERVER=, counts as none. */
 static const char *named(const char *text)
 {
     return text && text[0] != '\0' ? text : NULL;
@@ -206,8 +206,9 @@ static bool complete(struct command_line *line, struct fl_error *error)
         return fl_error_remedy(error, job->daemon.server ? "'farlight scenes' lists the daemon's scenes"
                                                          : "farlight-web model.glb");
     }
-    if (job->input.watch && !cli_watch_can_edit_again(
-                                job->input.edits, job->input.edit_count)) /* its scene keeps its name, and stays */
+    if (job->input.watch &&
+        /* The scene keeps its name when edits reload it */
+        !cli_watch_can_edit_again(job->input.edits, job->input.edit_count))
         cli_usage(job, "--watch", "an --edit that adds or multiplies would do so each time: assign a value");
     if (job->error.code != FL_ERROR_NONE || !cli_check_watch(job) || !cli_job_complete_view(job) ||
         !cli_check_models(job, &job->error)) {
@@ -225,7 +226,7 @@ static bool complete(struct command_line *line, struct fl_error *error)
                               .server = server,
                               .key_file = cli_key_file(server, job->daemon.key_file),
                               .scene = job->input.scene ? job->input.scene : cli_base_name(job->input.model),
-                              /* Of a model's daemon the thread tells that shares it. */
+                              /* with a private daemon the sharing thread reports outages */
                               .outage = job->input.model ? NULL : &line->outage};
     line->gateway.interrupt_signal = cli_interrupt_signal;
     return true;
@@ -233,7 +234,7 @@ static bool complete(struct command_line *line, struct fl_error *error)
 
 /* ---- a scene of the daemon's ---- */
 
-/* A wrong name, address or camera is better told here than in a browser. */
+/* Connects once, so that a wrong name, address or camera is reported here rather than in a browser. */
 static bool check_scene(const struct seat_options *seat, struct fl_error *error)
 {
     const struct fl_connect_options connect = {.server = seat->server,
@@ -253,10 +254,10 @@ static bool check_scene(const struct seat_options *seat, struct fl_error *error)
 
 /* ---- a model ---- */
 
-/* It is shared as long as the gateway runs, by a thread of its own. */
+/* Sharing of a model while the gateway runs, by a thread of its own. */
 struct share {
     struct cli_sharing sharing;
-    struct fl_error error; /* of the thread, once it has ended */
+    struct fl_error error; /* result of the thread, once it has ended */
     atomic_bool has_ended;
     pthread_t thread;
 };
@@ -275,7 +276,7 @@ static bool has_ended(void *user)
     return atomic_load(&share->has_ended);
 }
 
-/* Ctrl-C ends both; the gateway alone ends with the process. */
+/* Ctrl-C ends both; if sharing fails, the gateway ends with the process. */
 static void run_with(struct gateway *gateway, struct share *share, struct fl_error *error)
 {
     if (pthread_create(&share->thread, NULL, keep_sharing, share) != 0) {

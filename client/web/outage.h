@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the operator is told of a daemon that is away: each browser notices and tries again, and the operator is
- * told once. */
+/* Outages of the daemon, reported to the operator once, although each browser notices them and tries again. */
 #ifndef FARLIGHT_CLIENT_WEB_OUTAGE_H
 #define FARLIGHT_CLIENT_WEB_OUTAGE_H
 
@@ -8,20 +7,20 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Between the begins that are told: a daemon that fails again and again, or only some browsers, is no flood of
- * lines. */
+/* Minimum time between reports of outages: a daemon that fails repeatedly, or only for some browsers, must not
+ * flood the log. */
 #define OUTAGE_PAUSE_NS 10000000000ull
 
 struct web_outage {
-    pthread_mutex_t lock; /* of all seats' threads; guards what follows */
-    bool is_told;
-    uint64_t told_ns; /* the last one; 0: none was */
+    pthread_mutex_t lock; /* shared by all seats' threads; guards the members below */
+    bool is_reported;
+    uint64_t reported_ns; /* time of the last report; 0: none */
 };
 
 void web_outage_init(struct web_outage *outage);
-/* A seat has lost the daemon, or does not reach it. True: this is to be told. */
+/* A seat has lost the daemon, or cannot reach it. True: the caller reports it. */
 bool web_outage_begins(struct web_outage *outage, uint64_t now_ns);
-/* A seat has reached it. True: its begin was told, and so is this to be. */
+/* A seat has reached the daemon. True: the outage was reported, and the caller reports its end. */
 bool web_outage_ends(struct web_outage *outage);
 
 #endif

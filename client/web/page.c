@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* The page's files, embedded in the program. */
 #include "web/page.h"
 
 #include <string.h>
 
-/* The assembler takes the bytes in as they are. */
+/* The assembler includes the bytes unchanged. */
 #define EMBED(name, file)                                                                                         \
     __asm__(".pushsection .rodata\n" #name ": .incbin \"client/web/page/" file "\"\n" #name                       \
             "_end: .byte 0\n.popsection\n");                                                                      \

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The queue of messages to a browser. */
 #include "web/queue.h"
 
 #include <stdlib.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Requests of the page, read from JSON and checked. */
 #include "web/request.h"
 
 #include <jansson.h>
@@ -8,11 +9,12 @@
 #define SIDE_MIN 16
 #define SHOWN_MAX 64
 #define PLACE_MAX 1e9 /* metres */
-#define PARALLEL 1e-6 /* sine between the view's direction and up, below which they are taken for parallel */
+/* Sine of the angle between the view's direction and up below which they count as parallel */
+#define PARALLEL 1e-6
 #define FOV_MIN 0.001
 #define FOV_MAX 3.1
 #define TIME_MAX 1e6
-#define VALUE_MAX 1e30 /* of any field; what it allows itself, the library checks */
+#define VALUE_MAX 1e30 /* limit of all fields; the library checks each field's own */
 
 static bool refuse(struct fl_error *error, const char *field, const char *what)
 {
@@ -46,14 +48,14 @@ static bool read_show(json_t *json, struct web_show *show, struct fl_error *erro
     return true;
 }
 
-/* A camera that the daemon would refuse ends its view. */
+/* False for a camera that the daemon would refuse, since a refusal ends the view. */
 static bool is_sound(const double eye[3], const double at[3], const double up[3])
 {
     double into[3], into_square = 0, up_square = 0;
     for (int i = 0; i < 3; i++) {
         if (!(fabs(eye[i]) <= PLACE_MAX && fabs(at[i]) <= PLACE_MAX && fabs(up[i]) <= PLACE_MAX))
             return false;
-        /* As it will be sent. */
+        /* rounded to floats as in the message */
         into[i] = (double)(float)at[i] - (double)(float)eye[i];
         into_square += into[i] * into[i];
         up_square += up[i] * up[i];
@@ -125,7 +127,7 @@ static bool read_list(json_t *json, struct fl_assignment *wanted, struct fl_erro
     return read_kind(kind, &wanted->kind, error);
 }
 
-/* "field" and "values", which an edit has. */
+/* Reads "field" and "values" of an edit. */
 static bool read_change(const char *field, json_t *values, struct fl_assignment *wanted, struct fl_error *error)
 {
     if (strlen(field) >= sizeof(wanted->field))
@@ -160,7 +162,7 @@ static bool read_object(json_t *json, bool is_edit, struct fl_assignment *wanted
     return read_kind(kind, &wanted->kind, error) && (!is_edit || read_change(field, values, wanted, error));
 }
 
-/* What only browsers that may edit send. */
+/* Reads the requests that only browsers with the right to edit may send. */
 static bool read_editing(const char *name, json_t *value, struct web_request *request, struct fl_error *error)
 {
     if (strcmp(name, "list") == 0) {
@@ -210,7 +212,7 @@ bool web_request_read(const char *text, size_t bytes, struct web_request *reques
     json_t *json = json_loadb(text, bytes, JSON_REJECT_DUPLICATES, &why);
     if (!json)
         return refuse(error, "message", "is no JSON");
-    void *first = json_object_iter(json); /* NULL of what is no object */
+    void *first = json_object_iter(json); /* NULL for JSON that is not an object */
     const bool good = json_object_size(json) == 1 && first
                           ? read_one(json_object_iter_key(first), json_object_iter_value(first), request, error)
                           : refuse(error, "message", "is no object of one member");

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* A browser's seat: a thread with its own connection to the daemon. */
 #include "web/seat.h"
 #include "web/describe.h"
 #include "web/editing.h"
@@ -23,32 +24,33 @@
 #define MOVING_RATE 15.0f
 #define LOOKS_REMEMBERED 256u
 #define IDLE_MS 1000
-#define PING_ROUNDS 8u /* seconds without news after which the daemon hears from us: it disconnects the silent */
+/* Seconds of idling after which the seat pings the daemon, which disconnects silent clients */
+#define PING_ROUNDS 8u
 
 struct seat {
     struct seat_options options;
     pthread_t thread;
-    int wake_fd, end_fd; /* events: there is something to do; it is over */
+    int wake_fd, end_fd; /* eventfds: there is work; the seat ends */
 
-    pthread_mutex_t lock; /* guards what follows */
+    pthread_mutex_t lock; /* guards the members below */
     struct web_inbox inbox;
     bool has_ended;
     struct web_queue queue;
 
-    /* Of the thread. */
+    /* The thread's own members. */
     struct fl_connection *connection;
     struct fl_scene *scene;
     struct fl_view *view;
     struct record_clip_use clip;
-    struct message_render render; /* as the view was last asked for */
-    struct fl_view_camera camera; /* likewise, if has_camera */
+    struct message_render render; /* the view's last request */
+    struct fl_view_camera camera; /* its camera, if has_camera */
     bool has_camera;
     struct error_map errors;
     struct edit_history history;
-    char *described;                             /* what the page was told of the scene last */
-    uint64_t described_revision, shown_revision; /* then, and of the newest frame */
+    char *described;                             /* the last description of the scene that was sent */
+    uint64_t described_revision, shown_revision; /* its revision, and the newest frame's */
     unsigned idle_rounds;
-    uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo */
+    uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo the size */
 };
 
 /* ---- to the browser ---- */
@@ -57,7 +59,7 @@ static void signal_event(int fd)
 {
     const uint64_t one = 1;
     if (write(fd, &one, sizeof(one)) < 0)
-        errno = 0; /* it is readable already */
+        errno = 0; /* the descriptor is readable already */
 }
 
 static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail_bytes, struct fl_error *error)
@@ -112,7 +114,7 @@ static bool fill_render(struct seat *seat, const struct web_show *show, struct f
                            error);
 }
 
-/* What is as it was told is not told again. */
+/* Sends a description of the scene unless it equals the last one. */
 static bool describe(struct seat *seat, struct fl_error *error)
 {
     struct fl_scene_bounds bounds;
@@ -183,7 +185,7 @@ static bool pass_frames(struct seat *seat, struct fl_error *error)
 
 /* ---- the errors of its tracer ---- */
 
-/* Of a comparison that cannot be made the page is told, and its view goes on. */
+/* Reports a comparison that is impossible to the page; the view continues. */
 static bool refuse_compare(struct seat *seat, struct fl_error *error)
 {
     struct fl_error refusal = *error;
@@ -231,10 +233,10 @@ static bool answer_edit(struct seat *seat, const struct web_request *request, st
 
 /* ---- the thread ---- */
 
-static bool do_what_came(struct seat *seat, struct fl_error *error)
+static bool begin_requests(struct seat *seat, struct fl_error *error)
 {
     pthread_mutex_lock(&seat->lock);
-    /* Each answer is a parcel, and those that wait are counted. */
+    /* Each answer is a parcel, and queued parcels are limited. */
     const bool may_answer = web_queue_has_room_for_text(&seat->queue);
     const bool wants_scene = seat->shown_revision > seat->described_revision && may_answer;
     const struct web_request shown = web_inbox_take(&seat->inbox.show, true),
@@ -256,14 +258,14 @@ static bool do_what_came(struct seat *seat, struct fl_error *error)
     return key.kind == WEB_NONE || !seat->view || fl_view_want_key_frame(seat->view, error);
 }
 
-/* Until there is something to do; false: it is over. */
+/* Waits for work; false: the seat ends. */
 static bool wait_for_work(struct seat *seat)
 {
     uint64_t count;
     struct pollfd fds[] = {{.fd = seat->end_fd, .events = POLLIN},
                            {.fd = seat->wake_fd, .events = POLLIN},
                            {.fd = -1, .events = POLLIN}};
-    if (seat->view && may_send(seat)) /* else what arrives waits, and the daemon sees that */
+    if (seat->view && may_send(seat)) /* otherwise frames wait in the socket, which the daemon notices */
         fds[2].fd = fl_connection_fd(seat->connection);
     const int ready = poll(fds, sizeof(fds) / sizeof(fds[0]), seat->connection ? IDLE_MS : -1);
     if (ready < 0 && errno != EINTR)
@@ -284,21 +286,22 @@ static bool has_show(struct seat *seat)
 
 /* ---- to the operator ---- */
 
-/* What a page alone has asked for, and is refused, is no outage. */
-static void tell_outage(const struct seat *seat, const struct fl_error *error)
+/* A request of the page that the daemon refuses is no outage. */
+static void report_outage(const struct seat *seat, const struct fl_error *error)
 {
     const bool is_of_page = seat->scene && !cli_is_temporary(error) &&
                             (error->code == FL_ERROR_REFUSED || error->code == FL_ERROR_ARGUMENT);
     if (!seat->options.outage || is_of_page || error->code == FL_ERROR_NONE ||
         error->code == FL_ERROR_INTERRUPTED || !web_outage_begins(seat->options.outage, monotonic_now_ns()))
         return;
-    struct fl_error told = *error;
-    if (told.field[0] == '\0')
-        snprintf(told.field, sizeof(told.field), "%.*s", (int)sizeof(told.field) - 1, seat->options.server);
-    cli_report(&told);
+    struct fl_error reported = *error;
+    if (reported.field[0] == '\0')
+        snprintf(reported.field, sizeof(reported.field), "%.*s", (int)sizeof(reported.field) - 1,
+                 seat->options.server);
+    cli_report(&reported);
 }
 
-static void tell_return(const struct seat *seat)
+static void report_return(const struct seat *seat)
 {
     if (seat->options.outage && web_outage_ends(seat->options.outage) && !seat->options.job->talk.quiet)
         fprintf(stderr, "farlight: %s: the daemon is back\n", seat->options.server);
@@ -306,7 +309,7 @@ static void tell_return(const struct seat *seat)
 
 /* ---- the thread ---- */
 
-static bool come_to_scene(struct seat *seat, struct fl_error *error)
+static bool attach(struct seat *seat, struct fl_error *error)
 {
     const struct fl_connect_options connect = {.server = seat->options.server,
                                                .key_file = seat->options.key_file,
@@ -318,7 +321,7 @@ static bool come_to_scene(struct seat *seat, struct fl_error *error)
     if (seat->connection)
         seat->scene = fl_scene_attach(seat->connection, seat->options.scene, error);
     if (seat->scene)
-        tell_return(seat);
+        report_return(seat);
     return seat->scene != NULL;
 }
 
@@ -327,16 +330,16 @@ static void serve(struct seat *seat, struct fl_error *error)
     while (!has_show(seat))
         if (!wait_for_work(seat))
             return;
-    if (!come_to_scene(seat, error))
+    if (!attach(seat, error))
         return;
     do {
         uint64_t round_trip_ns;
         if (seat->idle_rounds % PING_ROUNDS == PING_ROUNDS - 1 &&
             !fl_ping(seat->connection, &round_trip_ns, error))
             return;
-        /* Answers pings, and notices that the daemon is gone, also while no frame is wanted. The frames of a view
-         * that is being refined would leave no room for errors behind them. */
-        if (!do_what_came(seat, error) || !fl_connection_wait(seat->connection, 0, error) ||
+        /* Answers pings and notices a lost daemon even while no frame is wanted. Errors go first, since frames
+         * of a view that is being refined would fill the queue. */
+        if (!begin_requests(seat, error) || !fl_connection_wait(seat->connection, 0, error) ||
             !pass_errors(seat, error) || !pass_frames(seat, error))
             return;
     } while (wait_for_work(seat));
@@ -347,8 +350,8 @@ static void *work(void *argument)
     struct seat *seat = argument;
     struct fl_error error = {0}, ignored;
     serve(seat, &error);
-    tell_outage(seat, &error);
-    if (!seat->connection) /* these name the daemon's address or its key's file */
+    report_outage(seat, &error);
+    if (!seat->connection) /* such errors name the daemon's address or the key file */
         error.field[0] = error.remedy[0] = '\0';
     if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)
         post(seat, web_describe_error(&error, error.code != FL_ERROR_ARGUMENT), NULL, 0, &ignored);
@@ -396,7 +399,7 @@ struct seat *seat_create(const struct seat_options *options, struct fl_error *er
     return NULL;
 }
 
-bool seat_tell(struct seat *seat, const struct web_request *request)
+bool seat_request(struct seat *seat, const struct web_request *request)
 {
     bool is_taken = true;
     pthread_mutex_lock(&seat->lock);
@@ -417,7 +420,7 @@ struct parcel *seat_take(struct seat *seat, bool *has_ended)
     *has_ended = !seat->queue.first && seat->has_ended;
     pthread_mutex_unlock(&seat->lock);
     if (parcel && parcel->is_text)
-        signal_event(seat->wake_fd); /* there is room for another one */
+        signal_event(seat->wake_fd); /* there is space for another one */
     return parcel;
 }
 

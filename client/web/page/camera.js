@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A camera that turns about a point: {eye, at, up, fov}. No page, no socket.
+// A camera that turns about a point: {eye, at, up, fov}. Independent of page and socket.
 
 const add = (a, b, share = 1) => a.map((value, i) => value + b[i] * share);
 const subtract = (a, b) => add(a, b, -1);
@@ -8,9 +8,10 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 const length = (a) => Math.hypot(...a);
 const unit = (a) => a.map((value) => value / (length(a) || 1));
 const STEEPEST = 1.55; // radians above the horizon, just below the pole
-const NEAREST = 1e-4, FARTHEST = 1e8; // metres from the point that it turns about
+const NEAREST = 1e-4, FARTHEST = 1e8; // distance in metres from the point that it turns about
 
-// Of a frame: rows of right, up, back and eye. The point lies at the depth of the scene's middle.
+// Derives a camera from a frame, whose matrix has the columns right, up, back and eye. The point lies at the depth
+// of the scene's middle.
 export function cameraOfFrame(frame, scene) {
   const m = frame.camera;
   const eye = [m[3], m[7], m[11]], above = [m[1], m[5], m[9]], into = [-m[2], -m[6], -m[10]];
@@ -26,7 +27,7 @@ function axes(camera) {
   return { into, right, above: cross(right, into) };
 }
 
-// By angles in radians: to the right, and up.
+// Turns by angles in radians: to the right, and up.
 export function orbit(camera, right, above) {
   const up = unit(camera.up), from = subtract(camera.eye, camera.at), distance = length(from);
   const height = Math.asin(Math.max(-1, Math.min(1, dot(from, up) / distance)));
@@ -38,7 +39,7 @@ export function orbit(camera, right, above) {
   return { ...camera, eye: add(camera.at, offset, distance) };
 }
 
-// By shares of the picture's height.
+// Moves by shares of the picture's height.
 export function pan(camera, right, above) {
   const axis = axes(camera);
   const height = 2 * Math.tan(camera.fov / 2) * length(subtract(camera.at, camera.eye));
@@ -46,14 +47,14 @@ export function pan(camera, right, above) {
   return { ...camera, eye: add(camera.eye, by), at: add(camera.at, by) };
 }
 
-// Below 1: nearer.
+// Changes the distance; a factor below 1 moves nearer.
 export function zoom(camera, factor) {
   const from = subtract(camera.eye, camera.at);
   const distance = Math.max(NEAREST, Math.min(FARTHEST, length(from) * factor));
   return { ...camera, eye: add(camera.at, unit(from), distance) };
 }
 
-// As a part of a link; null: it is not one.
+// Prints and reads a camera as a part of a link; null: invalid.
 const list = (values) => values.map((value) => Number(value.toPrecision(7))).join(",");
 export function printCamera(camera) {
   return [list(camera.eye), list(camera.at), list(camera.up), list([camera.fov])].join(";");

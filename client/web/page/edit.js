@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The panel that edits objects of the scene, for those whose link allows it. No socket: ask() sends, and the answer comes to take().
+// The panel that edits objects of the scene, for holders of the editing link. Independent of the socket: ask()
+// sends a request, take() receives its answer.
 
 const SEARCH_PAUSE_MS = 250;
-const KEYS = { z: "undo", "Shift+z": "redo", y: "redo" }; // with Control, or the Command of a Mac
-const BRIGHTEST = 1; // of a colour that a menu of colours can show
+const KEYS = { z: "undo", "Shift+z": "redo", y: "redo" }; // together with Control, or Command on a Mac
+const BRIGHTEST = 1; // brightest component that a colour input can show
 
 const $ = (id) => document.getElementById(id);
 const encode = (linear) => (linear <= 0.0031308 ? linear * 12.92 : 1.055 * linear ** (1 / 2.4) - 0.055);
 const decode = (shown) => (shown <= 0.04045 ? shown / 12.92 : ((shown + 0.055) / 1.055) ** 2.4);
-const same = (value) => value; // where the scene's colours are a display's values
+const same = (value) => value; // for scenes whose colours are display values
 const hex = (values, shown) => `#${values.slice(0, 3).map((value) => Math.round(shown(Math.min(1, value)) * 255).toString(16).padStart(2, "0")).join("")}`;
 const colour = (text, kept) => [1, 3, 5].map((at) => kept(parseInt(text.slice(at, at + 2), 16) / 255));
 const round = (value) => Number(value.toPrecision(5));
@@ -16,9 +17,9 @@ const round = (value) => Number(value.toPrecision(5));
 export class Editing {
   constructor(ask) {
     this.ask = ask;
-    this.waiting = []; // requests; the first one is asked, as the gateway takes one at a time
+    this.waiting = []; // requests; the first one is in flight, as the gateway takes one at a time
     this.revision = -1;
-    this.display = false; // colours are a display's values, else linear
+    this.display = false; // colours are display values, else linear
     $("edit-kind").addEventListener("change", () => this.list());
     $("edit-match").addEventListener("input", () => {
       clearTimeout(this.searching);
@@ -29,20 +30,20 @@ export class Editing {
     document.addEventListener("keydown", (event) => {
       const name = KEYS[(event.shiftKey ? "Shift+" : "") + event.key.toLowerCase()];
       if (!name || !(event.ctrlKey || event.metaKey) || event.altKey || $("editing").hidden) return;
-      if (event.target.matches("input[type=text], input[type=number]")) return; // it undoes what is typed
+      if (event.target.matches("input[type=text], input[type=number]")) return; // the field undoes its own text
       event.preventDefault();
       this.turn(name);
     });
   }
 
-  // The connection is a new one: what was asked of the old one is not answered, and its changes cannot be undone.
+  // After a new connection, old requests get no answers and old changes cannot be undone.
   begin(mayEdit) {
     $("editing").hidden = $("edit-keys").hidden = !mayEdit;
     this.waiting = [];
     this.showTurns({ undos: 0, redos: 0 });
   }
 
-  // One that has nothing to turn is disabled, but not what a key asks for.
+  // Disabled buttons show that there is nothing to undo or redo; keys are checked here.
   turn(name) {
     if (!$(`edit-${name}`).disabled) this.request({ [name]: true });
   }
@@ -52,7 +53,7 @@ export class Editing {
     $("edit-redo").disabled = redos === 0;
   }
 
-  // Of a question that waits the newest counts; each change does.
+  // Queues a request: only the newest waiting query counts, but every change.
   request(message) {
     const name = Object.keys(message)[0];
     if (name === "list" || name === "read") this.waiting = this.waiting.filter((one, i) => i === 0 || !(name in one));
@@ -74,7 +75,7 @@ export class Editing {
     else $("edit-fields").replaceChildren();
   }
 
-  // Another one may have changed the object.
+  // Reloads the object, which another client may have changed.
   seen(revision) {
     if ($("editing").hidden || revision === this.revision) return;
     this.revision = revision;
@@ -86,8 +87,8 @@ export class Editing {
     if (this.waiting.length > 0) this.ask(this.waiting[0]);
     if (message.refused) {
       this.say(message.refused.text);
-      if (asked.read) this.list(); // the object is gone
-      else if (!asked.list) this.read(); // as it is
+      if (asked.read) this.list(); // the object was removed
+      else if (!asked.list) this.read(); // shows its current state
     } else if (message.objects) {
       this.takeObjects(message.objects);
     } else if (message.object) {
@@ -155,7 +156,8 @@ export class Editing {
 
   values(field, inputs) {
     if (field.form === "flag") return [inputs[0].checked ? 1 : 0];
-    if (field.form === "colour" && inputs.length === 1) return colour(inputs[0].value, this.display ? same : decode); // alpha stays
+    // Alpha stays
+    if (field.form === "colour" && inputs.length === 1) return colour(inputs[0].value, this.display ? same : decode);
     return inputs.map((input) => (input.value === "" ? NaN : Number(input.value)));
   }
 }

@@ -1,31 +1,33 @@
 // SPDX-License-Identifier: MIT
+// The page: connection, camera controls, menus.
 import { cameraOfFrame, orbit, pan, printCamera, readCamera, zoom } from "./camera.js";
 import { Editing } from "./edit.js";
 import { drawErrors, showFigures } from "./errors.js";
 import { Picture, canH264 } from "./picture.js";
 import { showStages } from "./stages.js";
 
-const WIDTH_MAX = 3840, HEIGHT_MAX = 2160, SIDE_MIN = 16; // as the gateway allows
-const REST_MS = 150; // after the last input the picture is refined
-const PAUSE_MS = 250, PAUSE_MAX_MS = 8000; // between tries to connect
-const REFUSED = 1008; // the status with which the gateway closes a connection that has asked for what there is not
+const WIDTH_MAX = 3840, HEIGHT_MAX = 2160, SIDE_MIN = 16; // the gateway's limits
+const REST_MS = 150; // delay after the last input until the picture is refined
+const PAUSE_MS = 250, PAUSE_MAX_MS = 8000; // delay between attempts to connect
+const REFUSED = 1008; // close status of the gateway for a request that it refuses
 const TURN = Math.PI; // radians for a drag over the picture's height
-const NARROW = 0.0015; // of a wheel's notch of 100: 14 %
-const COMPARED_SAMPLES = 4; // the view has so many before its tracer is compared, which takes the daemon a while
+const NARROW = 0.0015; // factor for a wheel's notch of 100: 14 %
+// Samples that the view gets before its tracer is compared, which takes the daemon a while
+const COMPARED_SAMPLES = 4;
 const FIRST = "the first picture is being rendered";
-const WIDE = 1000; // pixels of a window that has room for the controls beside the scene
+const WIDE = 1000; // pixels of a window that has space for the controls beside the scene
 
 const $ = (id) => document.getElementById(id);
 const canvas = $("picture");
 let socket = null, retry = 0, failures = 0, wantsH264 = false;
-let scene = null, isNew = true; // what was told last, on another connection
-let camera = null; // null: the view is the scene's own, or `node`'s
-let node = null; // null: not told yet
+let scene = null, isNew = true; // the last description, from an earlier connection
+let camera = null; // null: the view has the scene's camera, or `node`'s
+let node = null; // null: not known yet
 let lastFrame = null;
 let isDirty = false, movedAt = 0, resting = 0, id = 0;
 let isPlaying = false, isClipGone = false, time = 0, tickAt = 0;
-let comparison = 0, isCompared = false; // the newest one, and whether the gateway has been asked for it
-const inputs = new Map(); // when the input of a camera came, by its number
+let comparison = 0, isCompared = false; // number of the newest comparison; whether it was requested
+const inputs = new Map(); // time of the input of a camera, by the camera's number
 const link = new URLSearchParams(location.hash.slice(1));
 
 // ---- what the gateway is told ----
@@ -46,7 +48,7 @@ function tellShow() {
     canvas.height = height;
   }
   forgetErrors();
-  // A menu is empty before the scene is told; without a word the gateway has its own.
+  // A menu is empty before the scene is known; the gateway has defaults for missing names.
   const chosen = (name) => $(name).value || link.get(name) || undefined;
   tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer"), integrator: chosen("integrator"),
     clip: Number(chosen("clip") || 0) } });
@@ -69,7 +71,7 @@ function drawStages() {
   if ($("stages").checked && lastFrame) showStages(document.querySelector("#timeline tbody"), lastFrame.stages);
 }
 
-// Screen readers read it out, so that it is not for what changes with each frame.
+// Screen readers read the text aloud, so it must not change with each frame.
 function say(text, isLost = false) {
   if ($("status").textContent !== text) $("status").textContent = text;
   $("status").classList.toggle("lost", isLost);
@@ -79,7 +81,8 @@ function fill(select, entries, chosen) {
   select.replaceChildren(...entries.map(([value, text]) => new Option(text, value, false, String(value) === String(chosen))));
 }
 
-// At the beginning of a connection, and when the scene has changed: what is chosen stays, if it is still there.
+// Updates the page at the beginning of a connection and after changes of the scene; choices stay if they still
+// exist.
 function takeScene(told) {
   const clip = $("clip").value || link.get("clip") || "0";
   scene = told;
@@ -146,7 +149,7 @@ const picture = new Picture(canvas, (header) => {
   lastFrame = header;
   editing.seen(header.revision);
   drawStages();
-  let input = 0; // the newest one that it shows
+  let input = 0; // the newest input that the frame shows
   for (const seen of [...inputs.keys()].filter((key) => key <= header.id)) {
     input = inputs.get(seen);
     inputs.delete(seen);
@@ -191,12 +194,12 @@ function take(event) {
 
 // ---- connecting, and connecting again ----
 
-// It may name what there is not, and is for the first view alone.
+// The link's names may not exist in the scene, and they apply to the first view only.
 function forgetLink() {
   for (const name of ["tracer", "integrator", "clip"]) link.delete(name);
 }
 
-// The next connection asks for none, and says so.
+// Removes the clip, so that the next connection requests none, and says so.
 function forgetClip() {
   $("clip").value = "0";
   isClipGone = true;
@@ -297,7 +300,7 @@ function goTo(value) {
     tellLook(false);
     return;
   }
-  // Without a camera of its own the whole scene is what a new view shows.
+  // A new view without a camera shows the whole scene.
   socket.onclose = null;
   socket.close();
   forgetConnection();
@@ -358,7 +361,7 @@ function tick(now) {
     isDirty = false;
     tellLook(true);
     clearTimeout(resting);
-    resting = setTimeout(settle, REST_MS); // also where nothing is animated, as the page is hidden
+    resting = setTimeout(settle, REST_MS); // a hidden page is not animated, but settles all the same
   }
   requestAnimationFrame(tick);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Frames to a canvas: JPEG by the browser's images, H.264 by WebCodecs.
+// Frames on a canvas: JPEG by the browser's images, H.264 by WebCodecs.
 
-const CODEC = "avc1.640033"; // high profile, level 5.1; the stream says itself what it is
+const CODEC = "avc1.640033"; // high profile, level 5.1; the stream carries its own parameters
 const FAILURES_MAX = 3;
 
 export async function canH264() {
@@ -14,13 +14,13 @@ export async function canH264() {
 }
 
 export class Picture {
-  // shown(header): it can be seen. lost(gone): a key frame is needed; gone: H.264 does not work at all.
+  // shown(header): the frame is visible. lost(gone): a key frame is needed; gone: H.264 does not work at all.
   constructor(canvas, shown, lost) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: false });
     this.shown = shown;
     this.lost = lost;
-    this.last = Promise.resolve(); // frames are shown in order
+    this.last = Promise.resolve(); // keeps frames in order
     this.waiting = new Map(); // headers of frames in the decoder, by number
     this.failures = 0;
   }
@@ -75,10 +75,10 @@ export class Picture {
   fail(header) {
     this.failures += 1;
     this.lost(this.failures > FAILURES_MAX);
-    this.shown(header); // the gateway waits for it
+    this.shown(header); // the gateway waits for this
   }
 
-  // Another connection has another stream.
+  // A new connection has a new stream.
   reset() {
     if (this.decoder && this.decoder.state !== "closed") this.decoder.close();
     this.decoder = null;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How long each stage of a frame took, and when: a row for each, with its bars.
+// A table of a frame's stages, with bars for when and how long each ran.
 
 const COLOURS = { primary: "#4f8fd0", trace: "#d08a3c", shade: "#62a85b", resolve: "#9a72c4", encode: "#c4556b", build: "#b8a13c" };
 const SVG = "http://www.w3.org/2000/svg";
