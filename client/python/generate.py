@@ -19,7 +19,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q"}
 WIDTH = 120
 
-# Each row of a table becomes a tuple of Python. Arguments that are no strings in the table become strings.
+# Each row of a table becomes a Python tuple. Arguments that are not strings in the table become strings.
 ROWS = {
     "RECORD": "name, doc", "MESSAGE": "NAME, name, number, from, doc",
     "INT": "type, field, min, max, doc", "ENUM": "enum_name, field, doc", "REAL": "field, min, max, doc",
@@ -35,7 +35,7 @@ ROWS = {
 }
 STRINGS = {"doc", "unit", "text", "numbers"}
 
-# Signatures: the message whose fields are keywords, and those that are none, as the method sets them itself or refuses them.
+# Signatures: the message whose fields are keywords, and the fields that are no keywords, as the method sets or refuses them.
 JOB = {"scene", "kind", "channel", "credit", "attachments", "parts", "margin", "hidden_layers"}
 SIGNATURES = {
     "job": ("render", JOB), "view": ("render", JOB), "material": ("set_material", ()),
@@ -45,11 +45,11 @@ SIGNATURES = {
     "disc": ("set_disc", {"centre_world", "normal_world"}), "light": ("set_light", ()), "camera": ("set_camera", {"fov_y"}),
     "node": ("set_node", {"kind", "object", "parent_from_node"}), "environment": ("set_environment", {"width", "height", "arrays"}),
 }
-FOR_ARRAYS = {"Sequence[float]": "Numbers", "Sequence[ClipUse]": "Sequence[ClipUse | Object]"}  # as methods take them
+FOR_ARRAYS = {"Sequence[float]": "Numbers", "Sequence[ClipUse]": "Sequence[ClipUse | Object]"}  # types that methods accept
 
 
 def read(table, names):
-    """The rows of a table, each a tuple that begins with its macro."""
+    """Reads the rows of a table, each as a tuple that begins with its macro."""
     source = ""
     for name in names:
         arguments = ROWS[name].split(", ")
@@ -81,7 +81,7 @@ def prose(text, indent):
 
 
 def docstring(text, fields=()):
-    """`fields`: (name, its doc)."""
+    """Formats a docstring; `fields`: (name, doc)."""
     told = [(name, doc) for name, doc in fields if doc]
     text = text.replace("\\", "\\\\") or "See the table."
     first = prose(f'"""{text}' + ("" if told else '"""'), "    ").replace("        ", "    ")
@@ -91,7 +91,7 @@ def docstring(text, fields=()):
 
 
 class Field:
-    """One field: its descriptor, its type and default in Python, and its doc."""
+    """A field: its descriptor, its Python type and default, and its doc."""
 
     def __init__(self, row):
         kind = row[0]
@@ -104,7 +104,7 @@ class Field:
         self.descriptor = "_f." + descriptor.format(name=f'"{self.name}"')
 
     def keyword(self):
-        """The type that a method takes: words are checked, too."""
+        """The type that a method accepts: words are checked, too."""
         word = self.annotation.removesuffix(" | str")
         return f"{word} | {word}Word" if word != self.annotation else FOR_ARRAYS.get(word, word)
 
@@ -173,7 +173,7 @@ def enumerations():
 
 
 def message_rows():
-    """Each record or message: its row, and its fields."""
+    """Yields each record or message: its row, and its fields."""
     groups = []
     for row in read("messages.def", [name for name in ROWS if name not in ("ENUMERATION", "VALUE", "LIMIT")]):
         if row[0] in ("RECORD", "MESSAGE"):
@@ -184,7 +184,7 @@ def message_rows():
 
 
 def heads():
-    """Of the methods with @takes(messages.NAME_keywords): their own arguments, by NAME."""
+    """Finds the own arguments of the methods with @takes(messages.NAME_keywords), by NAME."""
     found = {}
     for path in sorted((ROOT / "client/python/farlight").glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -200,7 +200,7 @@ def heads():
 
 
 def signature(name, head, keywords, doc):
-    """`keywords`: (name, type, default)."""
+    """Formats a signature; `keywords`: (name, type, default)."""
     said = ast.unparse(head) + ("" if head.kwonlyargs else ", *")
     lines = ["", "", f"def {name}_keywords("]
     lines += textwrap.wrap(f"{said},", WIDTH, initial_indent="    ", subsequent_indent="    ")
@@ -214,14 +214,16 @@ def signatures(groups):
     taken = heads()
     for name, (message, left_out) in SIGNATURES.items():
         own = {argument.arg for argument in taken[name].args + taken[name].kwonlyargs}
-        keywords = [(field.name, field.keyword(), "_f.NEXT" if message == f"set_{field.name}" else field.default)  # NEXT: the object's own number
+        # NEXT: the object's own number
+        keywords = [(field.name, field.keyword(), "_f.NEXT" if message == f"set_{field.name}" else field.default)
                     for field in fields[message] if field.name not in own.union(left_out)]
         lines += signature(name, taken[name], keywords, f"{camel(message)} explains")
     return lines + signature("change", taken["change"], changes(fields), "the messages of objects explain")
 
 
 def changes(fields):
-    """What objects of any kind have: a name that several kinds have takes the types of all. An object keeps its number."""
+    """Merges the fields of all kinds of objects: a name that several kinds have gets the types of all. An object keeps its
+    number."""
     kinds = {"intensity": ["float"]}
     for message, listed in fields.items():
         for field in listed if message.startswith("set_") else ():

@@ -17,17 +17,17 @@ import farlight
 
 
 def random_camera(random, lower, upper):
-    """Somewhere round the box, looking at a point within it."""
+    """A camera outside the bounding box that points at a place within it."""
     middle, radius = (lower + upper) / 2, np.linalg.norm(upper - lower) / 2
     direction = random.normal(size=3)
-    direction[1] = abs(direction[1]) * 0.7  # rather from above
+    direction[1] = abs(direction[1]) * 0.7  # favours views from above
     eye = middle + direction / np.linalg.norm(direction) * radius * random.uniform(1.5, 3)
     target = middle + (upper - lower) * random.uniform(-0.2, 0.2, size=3)
     return farlight.Camera(eye, target, fov_degrees=random.uniform(30, 60))
 
 
 def boxes(node):
-    """Of each object that is seen: its number, its pixels, and its box as COCO has it."""
+    """Yields the number, the pixel count and the COCO box of each visible object."""
     for number in np.unique(node[node > 0]).tolist():
         rows, columns = np.nonzero(node == number)
         left, top = int(columns.min()), int(rows.min())
@@ -35,7 +35,7 @@ def boxes(node):
 
 
 def write_coco(folder, scene, count):
-    """From the files of the pictures."""
+    """Builds coco.json from the pictures' files."""
     named = scene.names().nodes.items()
     made = {"images": [], "annotations": [], "categories": [{"id": number, "name": node.name or f"node {number}"} for number, node in named]}
     for number in range(count):

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """A turntable in cells, as notebooks and editors run them one by one: turntable.py [MODEL [FOLDER [FRAMES]]]"""
-# %% A daemon of our own, and a scene: a file, or one made of arrays.
+# %% A private daemon, and a scene from a file or from arrays.
 import pathlib
 import sys
 
@@ -40,7 +40,7 @@ else:
     gold = scene.add_material((1.0, 0.75, 0.3), metallic=1, roughness=0.2)
     scene.add_node(scene.add_mesh(positions, triangles, normals=normals, material=gold))
 
-# %% Its size, and one picture.
+# %% The scene's size, and one picture.
 bounds = client.describe(scene)
 lower, upper = np.array(bounds.lower_world), np.array(bounds.upper_world)
 middle, radius = (lower + upper) / 2, np.linalg.norm(upper - lower) / 2
@@ -48,7 +48,7 @@ size = {"width": 320, "height": 240}
 
 
 def camera(degrees):
-    """On a circle a little above the middle."""
+    """A camera on a circle a little above the middle."""
     angle = np.radians(degrees)
     return farlight.Camera(middle + 2.5 * radius * np.array([np.sin(angle), 0.4, np.cos(angle)]), middle)
 
@@ -56,14 +56,14 @@ def camera(degrees):
 first = client.render(scene, camera(0), samples=4, integrator="distributed", **size)
 print("first picture:", first.size, "rays:", first.end.primary_rays + first.end.shadow_rays)
 
-# %% Once around. One job for all frames: the daemon renders ahead while we write.
+# %% Once around, as a single job: the daemon renders ahead while we write.
 folder.mkdir(parents=True, exist_ok=True)
 keys = {"camera_path": "orbit", "orbit_turn": 2 * np.pi, "orbit_seconds": count / 24}
 for frame in client.frames(scene, camera(0), samples=4, integrator="distributed", last_frame=count - 1, **keys, **size):
     farlight.write_png(folder / f"{frame.number:03}.png", frame.colour)
 print(f"{count} frames in {folder}")
 
-# %% Another finish, at once: only the material travels.
+# %% Another material, without delay: only its values travel.
 if not model:
     scene.change(gold, base_colour=(0.9, 0.2, 0.3, 1), metallic=0, clearcoat=1)
     farlight.write_png(folder / "lacquer.png", client.render(scene, camera(30), samples=16, integrator="path", **size).colour)

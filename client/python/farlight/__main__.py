@@ -21,19 +21,19 @@ from .scene import Scene
 from .version import VERSION
 
 FAILED, USAGE, TRY_AGAIN, INTERRUPTED = 1, 2, 75, 130
-# Samples of a pixel where nothing is said, as the command `farlight render` has it.
+# Default samples of a pixel, as for the command `farlight render`.
 SAMPLES = {"path": 64}
 OTHER_SAMPLES = 16
 
 
 class _Progress:
-    """One line on a terminal, drawn again at most ten times a second."""
+    """A progress line on a terminal, drawn at most ten times a second."""
 
     def __init__(self) -> None:
         self.is_shown, self.is_drawn, self.next_s = sys.stderr.isatty(), False, 0.0
 
-    def tell(self, what: str, done: int = 0, total: int = 0) -> None:
-        """`total` 0: it is not known how much there is."""
+    def show(self, what: str, done: int = 0, total: int = 0) -> None:
+        """Shows the progress; `total` 0: unknown."""
         now = time.monotonic()
         if self.is_shown and (now >= self.next_s or not total):
             share = f" {100 * min(done, total) // total} % of {total / 1e6:.1f} MB" if total else ""
@@ -41,7 +41,7 @@ class _Progress:
             self.is_drawn, self.next_s = True, now + 0.1
 
     def clear(self) -> None:
-        """Before anything else is printed."""
+        """Removes the line before anything else is printed."""
         if self.is_drawn:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
         self.is_drawn = False
@@ -65,7 +65,7 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _setting(text: str) -> tuple[str, Any]:
-    """A field of the message render, as its type has it."""
+    """Reads a field of the message render, by the type of the field."""
     word, equals, value = text.partition("=")
     name, render = word.replace("-", "_"), messages.Render()
     known = [field.name for field in render.FIELDS if not isinstance(getattr(render, field.name), tuple)]
@@ -151,19 +151,19 @@ def _layers(options: argparse.Namespace) -> tuple[str, ...]:
 
 
 def _render(options: argparse.Namespace, progress: _Progress) -> None:
-    # What is wrong with options is said before a large model is read.
+    # Faults of options are reported before a large model is read.
     values, layers = _values(options), _layers(options)
     request(Camera(options.eye or (0, 0, 1), options.look_at or (0, 0, 0), fov_degrees=options.fov), layers, one_frame(values))
     if not os.path.isdir(os.path.dirname(options.output) or "."):
         raise FileFailed("its folder is not there", field=options.output)
-    progress.tell("importing")
-    scene = importer.load(*options.models, environment=options.environment, progress=progress.tell)
+    progress.show("importing")
+    scene = importer.load(*options.models, environment=options.environment, progress=progress.show)
     progress.clear()
     for note in scene.notes:
         print(f"farlight: {note}", file=sys.stderr)
-    with client.connect(options.server, key_file=options.key, retry_for=options.retry_for, progress=progress.tell) as daemon:
+    with client.connect(options.server, key_file=options.key, retry_for=options.retry_for, progress=progress.show) as daemon:
         daemon.send(scene)
-        progress.tell("rendering")
+        progress.show("rendering")
         frame = daemon.render(scene, _camera(options, scene), layers=layers, **values)
     progress.clear()
     for warning in frame.warnings:
@@ -172,7 +172,7 @@ def _render(options: argparse.Namespace, progress: _Progress) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The exit status."""
+    """Runs the command; returns the exit status."""
     options = _parser().parse_args(arguments)
     progress = _Progress()
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a daemon is: an address, or a daemon of one's own."""
+"""Addresses of daemons, and private daemons."""
 from __future__ import annotations
 
 import contextlib
@@ -17,38 +17,39 @@ from typing import IO, Optional
 from .errors import ConnectionLost, Error, FileFailed, InvalidValue, TimedOut
 
 REMOTE_SOCKET = "/run/farlight/farlight.sock"
-TRY_AGAIN_STATUS, FIRST_SIGNAL_STATUS = 75, 128  # of our programs; ssh has 255
-# What a program needs that reads files of others; tokens and passwords are not for it (client/lib/process.c).
+TRY_AGAIN_STATUS, FIRST_SIGNAL_STATUS = 75, 128  # our programs' statuses; ssh has 255
+# Variables for a program that reads other people's files; it must not see tokens and passwords (client/lib/process.c).
 PASSED = re.compile("PATH|LANG|LANGUAGE|LC_.*|TZ|TZDIR|LD_.*|GLIBC_.*|GCOV_.*|LLVM_PROFILE_FILE|(A|L|UB)SAN_OPTIONS|FARLIGHT_UNCONFINED")
-TALK_BYTES = 16 << 20  # that ssh may say before it is ended: another host chooses part of it
+TALK_BYTES = 16 << 20  # limit of ssh's output before it is ended, since another host chooses a part of it
 
 
 @dataclass
 class Link:
-    """A connected socket, and the program that holds its other end, if we started one."""
+    """A connected socket, and the program at its other end, if we started it."""
     socket: socket.socket
     process: Optional["subprocess.Popen[bytes]"] = None
-    talk: Optional[IO[bytes]] = None  # what the program says
-    remote: tuple[str, str] = ("", "")  # of ssh: the host, and the daemon's address there
-    name: str = ""  # of the program
-    server: str = "farlightd"  # the address, where there is one
+    talk: Optional[IO[bytes]] = None  # the program's output
+    remote: tuple[str, str] = ("", "")  # ssh only: the host, and the daemon's address there
+    name: str = ""  # the program's name
+    server: str = "farlightd"  # the address, if there is one
     is_final: bool = False
-    words: str = ""  # how it ended, once that was asked
+    words: str = ""  # how the program ended, once this is known
 
     def last_line(self) -> str:
-        """Of what the program has said."""
+        """The last line of the program's output."""
         if self.talk is None:
             return ""
-        number = self.talk.fileno()  # whose place the program shares
+        number = self.talk.fileno()  # its file offset is shared with the program, hence pread
         end = os.pread(number, 2048, max(0, os.fstat(number).st_size - 2048))
         lines = [one for one in end.strip().splitlines() if not one.startswith(b"READY")]
-        name = self.name.encode() + b": "  # in front of an error and, in the next line, its remedy
+        name = self.name.encode() + b": "  # prefix of an error and, in the next line, its remedy
         told = [one.removeprefix(name) for one in itertools.takewhile(lambda one: one.startswith(name), reversed(lines))]
         line = b"; ".join(reversed(told or lines[-1:]))[:400]
         return "".join(one if one.isprintable() else "?" for one in line.decode("utf-8", "replace"))
 
     def last_words(self) -> tuple[str, bool]:
-        """How a program that has closed its end ended, with its last line; and whether it would do so again."""
+        """Says how a program that has closed its end ended, with its last line, and whether another start would end the same
+        way."""
         if self.process is None:
             return "", False
         try:
@@ -66,7 +67,7 @@ class Link:
             self.process.terminate()
 
     def close(self) -> None:
-        """Closes the socket, and sees that the program ends."""
+        """Closes the socket and waits for the program's end."""
         self.socket.close()
         if self.talk is not None:
             self.talk.close()
@@ -81,7 +82,7 @@ class Link:
 
 
 def find_program(name: str) -> str:
-    """In the folder of FARLIGHT_LIBEXEC, else in PATH."""
+    """Finds a program in the folder FARLIGHT_LIBEXEC, else in PATH."""
     folder = os.environ.get("FARLIGHT_LIBEXEC")
     found = (shutil.which(name, path=folder) if folder else None) or shutil.which(name)
     if found is None:
@@ -91,13 +92,13 @@ def find_program(name: str) -> str:
 
 
 def _bound_talk(process: int) -> None:
-    with contextlib.suppress(ImportError, AttributeError, OSError):  # of systems other than Linux
+    with contextlib.suppress(ImportError, AttributeError, OSError):  # systems other than Linux
         import resource  # pylint: disable=import-outside-toplevel
         resource.prlimit(process, resource.RLIMIT_FSIZE, (TALK_BYTES, TALK_BYTES))
 
 
 def start_program(name: str, arguments: list[str], remote: tuple[str, str] = ("", "")) -> Link:
-    """Starts a program with a socket as its descriptor, or, as ssh wants it, as its standard input and output."""
+    """Starts a program with a socket as a descriptor, or for ssh as standard input and output."""
     path = find_program(name)
     ours, theirs = socket.socketpair()
     talk = tempfile.TemporaryFile()
@@ -107,7 +108,7 @@ def start_program(name: str, arguments: list[str], remote: tuple[str, str] = (""
             _bound_talk(process.pid)
         else:
             environment = {variable: value for variable, value in os.environ.items() if PASSED.fullmatch(variable)}
-            # In a process group of its own: a Ctrl-C is for us, and we end it properly.
+            # The daemon gets a process group of its own: Ctrl-C is for us, and we end the daemon properly.
             process = subprocess.Popen([path, "--fd", str(theirs.fileno()), *arguments], pass_fds=[theirs.fileno()],
                                        stdin=subprocess.DEVNULL, stdout=talk, stderr=talk, process_group=0,
                                        env=None if name == "farlightd" else environment)
@@ -162,23 +163,23 @@ def _start_ssh(server: str) -> Link:
 
 
 def usual_server() -> str | None:
-    """What is meant where no address is given: FARLIGHT_SERVER; None: a daemon of one's own."""
+    """The default address: FARLIGHT_SERVER; None: a private daemon."""
     return os.environ.get("FARLIGHT_SERVER") or None
 
 
 def usual_key(server: str | None) -> str | None:
-    """FARLIGHT_KEY, over TCP."""
+    """The default key file for TCP: FARLIGHT_KEY."""
     return os.environ.get("FARLIGHT_KEY") or None if server and server.startswith("tcp:") else None
 
 
 def broken(why: OSError, link: Link | None) -> ConnectionLost:
-    """Of a system call. A program of ours that ends resets its socket or not, as it happens: either way it has closed it."""
+    """Converts a failed system call. A program of ours that ends may or may not reset its socket: both mean that it closed it."""
     has_closed = link is not None and link.process is not None and isinstance(why, (BrokenPipeError, ConnectionResetError))
     return ConnectionLost("the daemon closed the connection" if has_closed else f"the connection broke: {why.strerror}")
 
 
-def tell_end(why: Error | None, link: Link | None) -> bool:
-    """Adds to a lost connection how the program at its other end ended, if we started it; whether it would do so again."""
+def add_end(why: Error | None, link: Link | None) -> bool:
+    """Adds to a lost connection how the program at the other end ended, if we started it; returns whether it would do so again."""
     if link is None or not isinstance(why, ConnectionLost):
         return link is not None and link.is_final
     why.field = why.field or link.server
@@ -189,9 +190,9 @@ def tell_end(why: Error | None, link: Link | None) -> bool:
 
 
 def explain(why: Error, link: Link) -> None:
-    """Adds to an error of the beginning where it happened, and what the program there said."""
+    """Adds the address and the program's output to an error of connecting."""
     why.field = why.field or link.server
-    if tell_end(why, link):
+    if add_end(why, link):
         why.retryable = False
     if not any(link.remote) or not isinstance(why, ConnectionLost):
         return
@@ -215,7 +216,7 @@ def _open(server: str | None, timeout: float) -> Link:
 
 
 def open_link(server: str | None, timeout: float) -> Link:
-    """unix:PATH, tcp:HOST:PORT, ssh:HOST[:SOCKET]; None starts a daemon, which ends with the connection."""
+    """Connects to unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]; None starts a private daemon, which ends with the connection."""
     link = _open(server, timeout)
     link.server = server or link.server
     return link

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The asyncio client: as the plain one, with awaits; several tasks may use it at once."""
+"""The asyncio client: like the plain one, with awaits; several tasks may use it at once."""
 from __future__ import annotations
 
 import asyncio
@@ -30,17 +30,17 @@ class AsyncView:
         self._client, self._job, self._core = client, job, client._core
 
     def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
-        """As View.look()."""
+        """Moves the camera; see View.look()."""
         number = self._core.look(self._job, command(camera, moving, time_s))
         self._client._flush(self._core)
         return number
 
     async def next_frame(self) -> Frame:
-        """As View.next_frame()."""
+        """Returns the newest frame; see View.next_frame()."""
         return await self._client._operate(self._core, self._core.next_frame(self._job))
 
     async def close(self) -> None:
-        """Ends it."""
+        """Ends the view."""
         if self._core.failure is None:
             await self._client._operate(self._core, self._core.cancel(self._job))
 
@@ -60,7 +60,7 @@ class AsyncClient:
         self._link: address.Link | None = None
         self._writer: asyncio.StreamWriter | None = None
         self._pump_task: asyncio.Task[None] | None = None
-        self._changed = asyncio.Event()  # replaced whenever something has come
+        self._changed = asyncio.Event()  # replaced whenever something has arrived
         self._connecting = asyncio.Lock()
         self._closed = False
 
@@ -85,7 +85,7 @@ class AsyncClient:
             await asyncio.gather(self._pump_task, return_exceptions=True)
             self._pump_task = None
         if self._writer is not None:
-            # Its socket may be closed only when the loop has let go of it: a new one may have the same number.
+            # The socket may be closed only after the loop has removed it, since a new one may get the same number.
             self._writer.transport.abort()
             with contextlib.suppress(OSError):
                 await self._writer.wait_closed()
@@ -107,7 +107,7 @@ class AsyncClient:
         self._changed = asyncio.Event()
 
     async def _pump(self, core: Core, reader: asyncio.StreamReader) -> None:
-        """Brings the core what comes, until the connection is given up."""
+        """Passes received bytes to the core until the connection is dropped."""
         quiet, writer = 0, self._writer
         while core.failure is None:
             try:
@@ -122,11 +122,11 @@ class AsyncClient:
             except OSError as why:
                 core.fail(address.broken(why, self._link))
             if core.failure is not None and self._link is not None:
-                await asyncio.to_thread(address.tell_end, core.failure, self._link)
+                await asyncio.to_thread(address.add_end, core.failure, self._link)
             self._flush(core)
             self._wake()
         if writer is not None:
-            writer.transport.abort()  # what cannot be sent is not waited for
+            writer.transport.abort()  # unsent bytes are dropped
 
     def _flush(self, core: Core) -> None:
         if core is self._core and self._writer is not None and (unsent := core.unsent()):
@@ -135,7 +135,7 @@ class AsyncClient:
             self._writer.write(data)
 
     async def _operate(self, core: Core, operation: Operation[T]) -> T:
-        with contextlib.closing(operation):  # at once where the task is cancelled
+        with contextlib.closing(operation):  # closes at once if the task is cancelled
             while True:
                 changed = self._changed
                 try:
@@ -147,7 +147,7 @@ class AsyncClient:
                 await self._wait(core, changed)
 
     async def _wait(self, core: Core, changed: asyncio.Event) -> None:
-        """Until something has come, or what was to be sent is on its way."""
+        """Waits until something has arrived, or until queued bytes are being sent."""
         if not core.unsent():
             await changed.wait()
             return
@@ -156,7 +156,7 @@ class AsyncClient:
             if self._writer is not None:
                 await self._writer.drain()
         except OSError:
-            await changed.wait()  # the pump says why
+            await changed.wait()  # the pump sets the reason
 
     async def _again(self, attempt: Callable[[Core], Operation[T]]) -> T:
         retry = Retry(self._options.retry_for)
@@ -171,63 +171,63 @@ class AsyncClient:
 
     @property
     def limits(self) -> dict[str, int]:
-        """Those of the daemon; 0: not told."""
+        """The daemon's limits; 0: not known."""
         return dict(self._core.limits)
 
     async def send(self, scene: Scene, base_revision: int = 0) -> int:
-        """As Client.send()."""
+        """Sends the scene's changes; see Client.send()."""
         return await self._again(lambda core: core.commit(scene, base_revision))
 
     async def close_scene(self, scene: Scene) -> None:
-        """As Client.close_scene()."""
+        """Releases a scene at the daemon; see Client.close_scene()."""
         await self._again(lambda core: core.close_scene(scene))
 
     async def attach(self, name: str) -> Scene:
-        """As Client.attach()."""
+        """Attaches to a scene; see Client.attach()."""
         scene = Scene(name)
         scene.is_attached = True
         await self._again(lambda core: core.open(scene))
         return scene
 
     def changed(self, scene: Scene) -> int:
-        """As Client.changed()."""
+        """The newest revision by other clients; see Client.changed()."""
         return self._core.changed(scene)
 
     async def objects(self, scene: Scene, kind: messages.ObjectKind | str, name: str = "") -> list[messages.ObjectEntry]:
-        """As Client.objects()."""
+        """Lists objects of a scene; see Client.objects()."""
         return await self._again(lambda core: core.objects(scene, kind, name))
 
     async def read(self, scene: Scene, thing: Object) -> tuple[Message, int]:
-        """As Client.read()."""
+        """Reads an object; see Client.read()."""
         return await self._again(lambda core: core.read(scene, thing))
 
     async def describe(self, scene: Scene) -> messages.SceneDescription:
-        """As Client.describe()."""
+        """Describes a scene; see Client.describe()."""
         await self.send(scene)
         return await self._again(lambda core: core.describe(scene))
 
     async def scenes(self) -> list[messages.SceneEntry]:
-        """As Client.scenes()."""
+        """Lists scenes; see Client.scenes()."""
         reply, _ = await self._again(lambda core: core.ask(messages.SceneList(), messages.SceneListReply))
         entries: list[messages.SceneEntry] = list(reply.scenes)
         return entries
 
     async def stats(self) -> messages.StatsReply:
-        """As Client.stats()."""
+        """The daemon's state; see Client.stats()."""
         reply, _ = await self._again(lambda core: core.ask(messages.Stats(), messages.StatsReply))
         assert isinstance(reply, messages.StatsReply)
         return reply
 
     @takes(messages.job_keywords)
     async def render(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (), **values: Any) -> Frame:
-        """As Client.render()."""
+        """Renders a picture; see Client.render()."""
         frame, = [frame async for frame in self.frames(scene, camera, layers=layers, **one_frame(values))]
         return frame
 
     @takes(messages.job_keywords)
     def frames(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (),
                **values: Any) -> AsyncGenerator[Frame, None]:
-        """As Client.frames()."""
+        """Renders a range of frames; see Client.frames()."""
         return self._frames(scene, request(camera, layers, {**values, "kind": messages.JobKind.BATCH}))
 
     async def _frames(self, scene: Scene, render: messages.Render) -> AsyncGenerator[Frame, None]:
@@ -258,17 +258,17 @@ class AsyncClient:
 
     @takes(messages.view_keywords)
     async def view(self, scene: Scene, camera: CameraOf = None, **values: Any) -> AsyncView:
-        """As Client.view()."""
+        """Starts a view; see Client.view()."""
         render = request(camera, (), {**values, "kind": messages.JobKind.VIEW})
         return AsyncView(self, await self._again(lambda core: core.view(scene, render)))
 
     async def ask(self, message: Message, answer: type[Message] = messages.Ok) -> Message:
-        """As Client.ask()."""
+        """Sends any request; see Client.ask()."""
         made: Message = (await self._again(lambda core: core.ask(message, answer)))[0]
         return made
 
     async def close(self) -> None:
-        """As Client.close()."""
+        """Ends the connection; see Client.close()."""
         if not self._closed and self._writer is not None:
             self._core.leave()
             self._flush(self._core)
@@ -287,7 +287,7 @@ class AsyncClient:
 
 async def connect(server: str | None = None, *, key_file: str | os.PathLike[str] | None = None, name: str = "python",
                   timeout: float = SILENCE_S, retry_for: float = 0.0, progress: Progress | None = None) -> AsyncClient:
-    """As farlight.connect()."""
+    """Connects to a daemon; see farlight.connect()."""
     client = AsyncClient(Options(server, key_file, name, timeout, retry_for, progress, has_tasks=True))
     retry = Retry(retry_for)
     while True:

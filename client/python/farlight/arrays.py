@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the caller gives as arrays and vectors, checked and brought into the form of the protocol. Every refusal names the
-argument, what it is, and what is allowed."""
+"""Arrays and vectors from the caller, checked and converted to the protocol's form. Every error names the argument, its value,
+and the allowed values."""
 from __future__ import annotations
 
 from typing import Any
@@ -18,7 +18,7 @@ U32_MAX, HALF_MAX = 0xffffffff, 65504.0
 
 
 def numbers(values: Numbers, field: str, wanted: str) -> Array:
-    """Any array of numbers; no copy of one."""
+    """Converts to an array of numbers, without copying one."""
     try:
         array = np.asarray(values)
     except ValueError:
@@ -30,7 +30,7 @@ def numbers(values: Numbers, field: str, wanted: str) -> Array:
 
 
 def table(values: Numbers, kind: str, columns: int, field: str, count: int | None = None) -> Array:
-    """A contiguous little-endian copy with that many columns, which cannot be written to."""
+    """A contiguous, read-only little-endian copy with this number of columns."""
     rows = "n" if count is None else str(count)
     shape = f"({rows},)" if columns == 1 else f"({rows}, {columns})"
     wanted = f"the shape {shape}, {'whole numbers of 0 .. 4294967295' if kind == '<u4' else 'numbers'}"
@@ -45,7 +45,7 @@ def table(values: Numbers, kind: str, columns: int, field: str, count: int | Non
                                remedy="make whole numbers of it with .astype(numpy.uint32)")
         if array.min() < 0 or array.max() > U32_MAX:
             raise InvalidValue(f"{array.min()} .. {array.max()}; allowed: {wanted}", field=field)
-    with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused below
+    with np.errstate(over="ignore"):  # values that are too large become infinite, and are refused below
         made = np.array(array, dtype=kind, order="C")
     if kind[1] == "f" and made.size and not (np.isfinite(made.min()) and np.isfinite(made.max())):  # min() keeps NaN
         wrong = np.argwhere(~np.isfinite(made))[0]
@@ -55,7 +55,7 @@ def table(values: Numbers, kind: str, columns: int, field: str, count: int | Non
 
 
 def vector(values: Numbers, field: str, count: int = 3) -> list[float]:
-    """That many finite numbers."""
+    """Reads `count` finite numbers."""
     wanted = f"{count} finite numbers"
     array = numbers(values, field, wanted)
     if array.shape != (count,) or not np.isfinite(array).all():
@@ -64,7 +64,7 @@ def vector(values: Numbers, field: str, count: int = 3) -> list[float]:
 
 
 def number(value: Any, field: str) -> float:
-    """A finite one."""
+    """Reads a finite number."""
     array = numbers(value, field, "a finite number")
     if array.ndim or not np.isfinite(array):
         raise InvalidValue(f"{value!r:.80}; allowed: a finite number", field=field)
@@ -72,7 +72,7 @@ def number(value: Any, field: str) -> float:
 
 
 def transform(matrix: Numbers | None) -> list[float]:
-    """A 4 x 4 or 3 x 4 matrix as the 12 numbers of the protocol; None: the identity."""
+    """Converts a 4 x 4 or 3 x 4 matrix to the protocol's 12 numbers; None: the identity."""
     wanted = "a matrix with the shape (4, 4) or (3, 4)"
     remedy = "farlight.translate(x, y, z) and farlight.look_at(eye, target) make matrices"
     array = numbers(IDENTITY if matrix is None else matrix, "transform", wanted)
@@ -85,7 +85,7 @@ def transform(matrix: Numbers | None) -> list[float]:
 
 
 def as_bytes(array: Array, field: str) -> Array:
-    """uint8 of whole numbers of 0 .. 255, or of floats, which are clipped to 0 .. 1."""
+    """Converts whole numbers of 0 .. 255, or floats clipped to 0 .. 1, to uint8."""
     if array.dtype == np.uint8:
         return array
     if array.dtype.kind == "f":
@@ -98,7 +98,7 @@ def as_bytes(array: Array, field: str) -> Array:
 
 
 def image(values: Numbers, field: str) -> Array:
-    """Height x width x 4 of uint8: of grey, x 3 or x 4."""
+    """Converts grey, x 3 or x 4 values to height x width x 4 of uint8."""
     wanted = "the shape (height, width), (height, width, 3) or (height, width, 4), uint8 or floats of 0 .. 1"
     array = numbers(values, field, wanted)
     if array.ndim == 3 and array.shape[2] == 1:
@@ -111,7 +111,7 @@ def image(values: Numbers, field: str) -> Array:
 
 
 def colours(values: Numbers, field: str, count: int) -> Array:
-    """count x 4 of uint16, or of uint8 where these hold all of it: of x 3 or x 4."""
+    """Converts x 3 or x 4 values to count x 4 of uint16, or of uint8 if that loses nothing."""
     wanted = f"the shape ({count}, 3) or ({count}, 4), uint8 or floats of 0 .. 1"
     array = numbers(values, field, wanted)
     if array.ndim != 2 or array.shape[0] != count or array.shape[1] not in (3, 4):
@@ -125,7 +125,7 @@ def colours(values: Numbers, field: str, count: int) -> Array:
 
 
 def sky(values: Numbers, field: str) -> Array:
-    """Height x width x 4 half floats: of height x width x 3 linear floats."""
+    """Converts height x width x 3 linear floats to height x width x 4 half floats."""
     wanted = "the shape (height, width, 3), finite linear numbers of 0 and more"
     pixels = numbers(values, field, wanted)
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not pixels.size:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names of bulk data."""
+"""Hashes that name bulk data."""
 from __future__ import annotations
 
 import concurrent.futures
@@ -16,7 +16,7 @@ def _hash(data: Bytes) -> bytes:
 
 
 def blob_hash(data: Bytes) -> bytes:
-    """BLAKE2b-256 over the BLAKE2b-256 hashes of the chunks; those of large data in threads."""
+    """Computes BLAKE2b-256 over the BLAKE2b-256 hashes of the chunks, for large data in threads."""
     view = memoryview(data).cast("B")
     chunks = (view[at:at + CHUNK_BYTES] for at in range(0, len(view), CHUNK_BYTES))
     if len(view) < THREADS_FROM_BYTES:

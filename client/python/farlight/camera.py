@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cameras, and the messages of jobs that look through them."""
+"""Cameras, and requests of pictures with them."""
 from __future__ import annotations
 
 import math
@@ -16,8 +16,8 @@ from .frame import LayersOf, layer_set
 from .messages import Encoding, ObjectKind
 from .objects import Object, make
 
-CLAMP, CLAMP_SAMPLES, CLAMP_MIN = 10.0, 64, 1.25  # as the command `farlight render` has it
-FOV_MIN, FOV_MAX = 0.06, 177.6  # degrees: what messages may have, in radians
+CLAMP, CLAMP_SAMPLES, CLAMP_MIN = 10.0, 64, 1.25  # the command `farlight render` has the same
+FOV_MIN, FOV_MAX = 0.06, 177.6  # degrees: the limits of messages, which are in radians
 
 
 def look_at(eye: Numbers, target: Numbers, up: Numbers = (0, 1, 0)) -> Array:
@@ -36,14 +36,14 @@ def look_at(eye: Numbers, target: Numbers, up: Numbers = (0, 1, 0)) -> Array:
 
 
 def translate(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
-    """The 4 x 4 transform of a node at that place."""
+    """The 4 x 4 transform of a node at this place."""
     made = np.eye(4)
     made[:3, 3] = arrays.vector((x, y, z), "translate")
     return made
 
 
 def command(camera: Any, moving: bool, time_s: float) -> messages.ViewCamera:
-    """A camera for a view."""
+    """Makes a camera message of a view."""
     if not isinstance(camera, Camera):
         raise InvalidValue(f"{camera!r:.80} is no farlight.Camera", field="camera")
     return messages.ViewCamera(moving=int(moving), time_s=time_s, eye_world=camera.eye, look_at_world=camera.look_at,
@@ -52,7 +52,7 @@ def command(camera: Any, moving: bool, time_s: float) -> messages.ViewCamera:
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera of a job: where it is, what is at the centre of its picture, its vertical field of view."""
+    """A camera of a job: its position, the point at the centre of its picture, its vertical field of view."""
     eye: Sequence[float]
     look_at: Sequence[float] = (0.0, 0.0, 0.0)
     up: Sequence[float] = (0.0, 1.0, 0.0)
@@ -70,8 +70,8 @@ class Camera:
     @classmethod
     def from_matrix(cls, world_from_camera: Numbers, fov_degrees: float = 40.0, *, convention: str = "opengl",
                     time_s: float = 0.0) -> Camera:
-        """From a 4 x 4 or 3 x 4 pose. convention: "opengl", as of Blender and of Frame.world_from_view, looks along -z with y
-        up; "opencv", as of COLMAP's inverse poses, along +z with y down."""
+        """Makes a camera from a 4 x 4 or 3 x 4 pose. convention: "opengl", as in Blender and Frame.world_from_view, has the
+        view along -z and y up; "opencv", as in COLMAP's inverse poses, along +z and y down."""
         if convention not in ("opengl", "opencv"):
             raise InvalidValue(f"{convention!r:.80}; allowed: opengl, opencv", field="convention")
         pose = np.array(arrays.transform(world_from_camera)).reshape(3, 4)
@@ -82,9 +82,9 @@ class Camera:
     @classmethod
     def intrinsics(cls, K: Numbers, width: int, height: int, world_from_camera: Numbers, *,
                    convention: str = "opencv", time_s: float = 0.0) -> tuple[Camera, dict[str, int]]:
-        """From a 3 x 3 matrix of a pinhole, of pixels the first of which has its middle at (0.5, 0.5), and a pose as of
-        from_matrix(). The camera, and the values of render() that make the picture of that size: one whose principal point is not
-        its middle is a part of a larger one. The point is rounded to half a pixel."""
+        """Makes a camera from a pinhole's 3 x 3 matrix, where the centre of the first pixel is (0.5, 0.5), and a pose as in
+        from_matrix(). Returns the camera, and the values for render() that give the picture this size: a picture whose
+        principal point is not its centre is a part of a larger one. The point is rounded to half a pixel."""
         k = arrays.numbers(K, "K", "3 x 3 numbers")
         if k.shape != (3, 3) or not k[0, 0] > 0 or not abs(k[1, 1] - k[0, 0]) <= 1e-3 * k[0, 0] or abs(k[0, 1]) > 1e-3 * k[0, 0]:
             raise InvalidValue("has pixels that are not square, or is no matrix of a pinhole", field="K",
@@ -103,7 +103,7 @@ class Camera:
         return cls.from_matrix(world_from_camera, math.degrees(fov), convention=convention, time_s=time_s), values
 
     def key(self) -> messages.CameraKey:
-        """As a job's camera."""
+        """Converts to a key of a job's camera."""
         return messages.CameraKey(self.time_s, self.eye, self.look_at, self.up, math.radians(self.fov_degrees))
 
 
@@ -126,8 +126,8 @@ def _look(render: messages.Render, camera: CameraOf) -> None:
 
 
 def request(camera: CameraOf, layers: LayersOf, values: dict[str, Any]) -> messages.Render:
-    """The message of a job, valid but for the scene. camera: one, a node of the scene that shows one, several as keys over
-    time, or None: all of the scene is in view. `clips` may be those of the scene: clips=scene.objects("clip")."""
+    """Makes the message of a job, complete except for the scene. camera: a Camera, a node of the scene with a camera, several
+    cameras as keys over time, or None: the whole scene in view. `clips` may be the scene's: clips=scene.objects("clip")."""
     if isinstance(values.get("clips"), (list, tuple)):
         values = {**values, "clips": [messages.ClipUse(one.number, 0.0, 1.0) if isinstance(one, Object) and one.kind == ObjectKind.CLIP
                                       else one for one in values["clips"]]}
@@ -148,12 +148,12 @@ def request(camera: CameraOf, layers: LayersOf, values: dict[str, Any]) -> messa
 
 
 def usual_clamp(samples: int) -> float:
-    """The clamp of indirect light that suits a picture of so many samples: the fewer they are, the more a rare bright one shows."""
+    """The clamp of indirect light for a picture with this number of samples: the fewer, the more visible are rare bright ones."""
     return max(CLAMP * min(samples / CLAMP_SAMPLES, 1.0), CLAMP_MIN)
 
 
 def one_frame(values: dict[str, Any]) -> dict[str, Any]:
-    """The values of a job of one picture."""
+    """Returns the values for a job of one picture."""
     first = values.get("first_frame", 0)
     if values.get("last_frame", first) != first:
         raise InvalidValue("render() makes one picture", field="render.last_frame", remedy="frames() makes several")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The plain client: each call returns when it is done."""
+"""The plain client: each call returns when its work is done."""
 from __future__ import annotations
 
 import contextlib
@@ -30,14 +30,14 @@ PAUSE_S, PAUSE_MAX_S = 0.25, 10.0  # between attempts
 
 
 class Retry:
-    """How long, and at which pace, a daemon is waited for that is lost or has no place."""
+    """Decides how long, and at which intervals, to retry after a lost connection or a busy daemon."""
 
     def __init__(self, for_s: float) -> None:
         self.for_s, self.pause_s = for_s, PAUSE_S
         self.since: float | None = None
 
     def succeeded(self) -> None:
-        """The next failure is a new one."""
+        """Treats the next failure as a new one."""
         self.since, self.pause_s = None, PAUSE_S
 
     def pause(self, why: Error) -> float:
@@ -52,7 +52,7 @@ class Retry:
 
 
 class Options:
-    """What both clients are connected by."""
+    """Connection options of both clients."""
 
     def __init__(self, server: str | None, key_file: str | os.PathLike[str] | None, name: str, timeout: float,
                  retry_for: float, progress: Progress | None, has_tasks: bool = False) -> None:
@@ -68,7 +68,7 @@ class Options:
         self.has_tasks = has_tasks
 
     def core(self, lost: Core | None) -> Core:
-        """For a new connection."""
+        """Makes the core of a new connection."""
         return Core(self.name, self.key, lost, self.progress, self.has_tasks)
 
 
@@ -79,17 +79,17 @@ class View:
         self._client, self._job, self._core = client, job, client._core
 
     def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
-        """Moves the camera; the number that frames have as begin.command. moving: more will follow soon."""
+        """Moves the camera; returns the number that frames carry as begin.command. moving: more cameras will follow soon."""
         number = self._core.look(self._job, command(camera, moving, time_s))
         self._client._flush()
         return number
 
     def next_frame(self) -> Frame:
-        """The newest; waits for it. While nothing changes and all samples are there, none comes."""
+        """Waits for the newest frame. No frame arrives while nothing changes and all samples are there."""
         return self._client._operate(self._core.next_frame(self._job))
 
     def close(self) -> None:
-        """Ends it."""
+        """Ends the view."""
         if self._core.failure is None:
             self._client._operate(self._core.cancel(self._job))
 
@@ -102,7 +102,7 @@ class View:
 
 class Client:
     """A connection to a daemon; a context manager. Made by connect(). Not for several threads at once. A forked process, such
-    as that of a data loader, connects anew at its first call."""
+    as a data loader's, connects again at its first call."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
@@ -142,7 +142,7 @@ class Client:
             self._link = None
 
     def _leave_parent(self) -> None:
-        """In a forked process: what it has of the connection is its parent's, which goes on with it."""
+        """Drops the connection in a forked process, as the parent continues to use it."""
         if self._process == os.getpid():
             return
         self._process = os.getpid()
@@ -151,11 +151,11 @@ class Client:
         self._selector.close()
         self._selector = selectors.DefaultSelector()
         if self._link is not None:
-            self._link.socket.close()  # without a word to the daemon; its program is not ours to end
+            self._link.socket.close()  # says nothing to the daemon and does not end its program, which is the parent's
             self._link = None
 
     def _ensure(self) -> None:
-        """Connects, and again if the connection was lost, or is found to be; anew in a forked process."""
+        """Connects, and reconnects after a loss, noticed or not; a forked process gets its own connection."""
         if self._closed:
             raise ConnectionLost("the client is closed", retryable=False)
         self._leave_parent()
@@ -166,7 +166,7 @@ class Client:
             self._connect()
 
     def _receive(self) -> bool:
-        """Takes what has come; False: nothing has."""
+        """Receives available bytes; False: there were none."""
         assert self._link is not None
         try:
             self._core.receive(self._link.socket.recv(RECEIVE_BYTES))
@@ -178,7 +178,7 @@ class Client:
             return True
 
     def _flush(self) -> bool:
-        """Sends what can be sent without waiting; whether that was anything."""
+        """Sends what can be sent without waiting; returns whether that was anything."""
         assert self._link is not None
         has_sent = False
         try:
@@ -190,16 +190,16 @@ class Client:
         except BlockingIOError:
             pass
         except OSError as why:
-            # The daemon may have said why before it closed.
+            # The daemon may have sent a reason before it closed.
             while self._core.failure is None and self._receive():
                 pass
             self._core.fail(address.broken(why, self._link))
-            address.tell_end(self._core.failure, self._link)
+            address.add_end(self._core.failure, self._link)
         return has_sent
 
     def _exchange(self, silence_s: float) -> None:
-        """Sends, and waits until something has come or could be sent."""
-        # What has been sent has left room, for which an upload may have waited: nothing need come first.
+        """Sends, and waits until something has arrived or could be sent."""
+        # Sent bytes free space, for which an upload may be waiting, so there is no need to wait for the daemon.
         if self._flush() or self._core.failure is not None:
             return
         assert self._link is not None
@@ -210,19 +210,19 @@ class Client:
             ready = self._selector.select(silence_s / 3)
             if ready and ready[0][1] & selectors.EVENT_READ:
                 self._receive()
-                address.tell_end(self._core.failure, self._link)
+                address.add_end(self._core.failure, self._link)
             if ready:
                 return
             quiet += 1
             if quiet == 3:
                 self._core.fail(TimedOut(f"the daemon has been silent for {silence_s:g} s"))
-                address.tell_end(self._core.failure, self._link)
+                address.add_end(self._core.failure, self._link)
                 return
             self._core.ping()
             self._flush()
 
     def _operate(self, operation: Operation[T], silence_s: float | None = None) -> T:
-        with contextlib.closing(operation):  # a Ctrl-C must not leave it where it waits
+        with contextlib.closing(operation):  # closes the operation at once after Ctrl-C
             while True:
                 try:
                     next(operation)
@@ -233,7 +233,7 @@ class Client:
                 self._exchange(silence_s or self._options.timeout)
 
     def _again(self, attempt: Callable[[], T]) -> T:
-        """Attempts it until it succeeds or the time of retry_for is over."""
+        """Attempts the operation until it succeeds or the time of retry_for is over."""
         retry = Retry(self._options.retry_for)
         while True:
             try:
@@ -251,67 +251,67 @@ class Client:
 
     @property
     def limits(self) -> dict[str, int]:
-        """Those of the daemon; 0: not told."""
+        """The daemon's limits; 0: not known."""
         return dict(self._core.limits)
 
     def send(self, scene: Scene, base_revision: int = 0) -> int:
-        """Sends what has changed in the scene; its revision. Rendering does that by itself. base_revision: refused with
-        `conflict` if others have changed the same objects since."""
+        """Sends the scene's changes; returns its revision. Rendering does this by itself. base_revision: fails with `conflict`
+        if other clients have changed the same objects since."""
         return self._call(lambda: self._core.commit(scene, base_revision))
 
     def close_scene(self, scene: Scene) -> None:
-        """Releases it at the daemon; the next use sends it again."""
+        """Releases the scene at the daemon; the next use sends it again."""
         self._call(lambda: self._core.close_scene(scene))
 
     def attach(self, name: str) -> Scene:
-        """A kept or shared scene that is there, to be rendered and edited; objects() says what it has."""
+        """Attaches to an existing kept or shared scene, for rendering and editing; objects() lists its contents."""
         scene = Scene(name)
         scene.is_attached = True
         self._call(lambda: self._core.open(scene))
         return scene
 
     def changed(self, scene: Scene) -> int:
-        """The revision that others have made of a kept or shared scene since it was opened here; 0: none."""
+        """The newest revision of a kept or shared scene that other clients have made since it was opened here; 0: none."""
         self._ensure()
         return self._core.changed(scene)
 
     def objects(self, scene: Scene, kind: messages.ObjectKind | str, name: str = "") -> list[messages.ObjectEntry]:
-        """Those that the daemon has, also others' ones."""
+        """Lists the scene's objects at the daemon, other clients' included."""
         return self._call(lambda: self._core.objects(scene, kind, name))
 
     def read(self, scene: Scene, thing: Object) -> tuple[Message, int]:
-        """A node, material, light or camera as the daemon has it, and the revision for send(base_revision=...)."""
+        """Reads a node, material, light or camera at the daemon, and the revision for send(base_revision=...)."""
         return self._call(lambda: self._core.read(scene, thing))
 
     def describe(self, scene: Scene) -> messages.SceneDescription:
-        """Bounds, cameras and clips."""
+        """Returns bounds, cameras and clips."""
         self.send(scene)
         return self._call(lambda: self._core.describe(scene))
 
     def scenes(self) -> list[messages.SceneEntry]:
-        """Those that the client may attach to."""
+        """Lists the scenes to which the client may attach."""
         reply, _ = self._call(lambda: self._core.ask(messages.SceneList(), messages.SceneListReply))
         entries: list[messages.SceneEntry] = list(reply.scenes)
         return entries
 
     def stats(self) -> messages.StatsReply:
-        """The daemon's state."""
+        """Returns the daemon's state."""
         reply, _ = self._call(lambda: self._core.ask(messages.Stats(), messages.StatsReply))
         assert isinstance(reply, messages.StatsReply)
         return reply
 
     @takes(messages.job_keywords)
     def render(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (), **values: Any) -> Frame:
-        """One picture. camera: a Camera, a node with one, or None: the whole scene in view. layers: "depth" or
-        ("beauty", "normal"), as floats. `values`: fields of messages.Render, such as width, samples, integrator="path"."""
+        """Renders a picture. camera: a Camera, a node with one, or None: the whole scene in view. layers: "depth" or ("beauty",
+        "normal"), as floats. `values`: fields of messages.Render, such as width, samples, integrator="path"."""
         frame, = self.frames(scene, camera, layers=layers, **one_frame(values))
         return frame
 
     @takes(messages.job_keywords)
     def frames(self, scene: Scene, camera: CameraOf = None, *, layers: LayersOf = (), **values: Any) -> Generator[Frame, None, None]:
-        """The frames first_frame .. last_frame, one after the other. After a lost connection it goes on with the next
-        one, if there is a retry_for. Several cameras are keys over time. Arguments are checked at once; the job begins with
-        the first frame that is asked for, and ends with the generator."""
+        """Renders the frames first_frame .. last_frame in order. After a lost connection it continues with the next frame, if
+        retry_for is set. Several cameras are keys over time. Arguments are checked at once; the job starts with the first
+        requested frame, and ends with the generator."""
         return self._frames(scene, request(camera, layers, {**values, "kind": messages.JobKind.BATCH}))
 
     def _frames(self, scene: Scene, render: messages.Render) -> Generator[Frame, None, None]:
@@ -340,17 +340,17 @@ class Client:
 
     @takes(messages.view_keywords)
     def view(self, scene: Scene, camera: CameraOf = None, **values: Any) -> View:
-        """A picture that follows a camera."""
+        """Starts a picture that follows a camera."""
         render = request(camera, (), {**values, "kind": messages.JobKind.VIEW})
         return View(self, self._call(lambda: self._core.view(scene, render)))
 
     def ask(self, message: Message, answer: type[Message] = messages.Ok) -> Message:
-        """Any request of the protocol, and its answer."""
+        """Sends any request of the protocol; returns its answer."""
         made: Message = self._call(lambda: self._core.ask(message, answer))[0]
         return made
 
     def close(self) -> None:
-        """Says goodbye; a daemon of one's own ends."""
+        """Ends the connection; a private daemon ends, too."""
         self._leave_parent()
         if not self._closed and self._link is not None:
             self._core.leave()
@@ -370,10 +370,10 @@ def connect(server: str | None = None, *, key_file: str | os.PathLike[str] | Non
             timeout: float = SILENCE_S, retry_for: float = 0.0, progress: Progress | None = None) -> Client:
     """Connects to a daemon.
 
-    server: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]; None: FARLIGHT_SERVER, else a daemon of one's own, which ends
-    with the client. key_file: the daemon's key: the connection is sealed (default over TCP: FARLIGHT_KEY). timeout:
-    seconds that the daemon may be silent. retry_for: seconds for which a daemon that is lost or has no place is waited
-    for; scenes are sent to it again, and animations go on where they were. progress: is called with "sending", bytes that
-    were and bytes in all, while the arrays of a scene are.
+    server: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]; None: FARLIGHT_SERVER, else a private daemon, which ends with the
+    client. key_file: the daemon's key, which seals the connection (default over TCP: FARLIGHT_KEY). timeout: maximum silence
+    of the daemon in seconds. retry_for: time in seconds to retry after a lost connection or a busy daemon; scenes are then
+    sent again, and animations continue. progress: called with "sending", bytes done and bytes in all, while arrays of a
+    scene are sent.
     """
     return Client(Options(server, key_file, name, timeout, retry_for, progress))

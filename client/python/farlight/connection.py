@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A connection without I/O: bytes in, bytes out, no socket and no clock. It believes nothing that comes: every failure
-ends up in `failure`, which all operations raise.
+"""A connection without I/O: bytes in, bytes out, no socket and no clock. It does not trust the peer: every fault is stored
+in `failure`, which all operations raise.
 
-What takes more than one step is an operation, a generator: it yields where it waits for something to arrive or to be
-sent, and returns its result. Several may wait at once.
+Operations with several steps are generators: they yield while they wait for something to arrive or to be sent, and return
+their result. Several may wait at once.
 """
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ T = TypeVar("T")
 Operation = Generator[None, None, T]
 
 UPLOAD_CHANNEL = 1
-QUEUED_BYTES = 4 << 20  # that may wait to be sent before an operation waits
+QUEUED_BYTES = 4 << 20  # bytes that may be queued before an operation waits
 STATES_CHANGE = (ErrorCode.SHUTTING_DOWN, ErrorCode.DEVICE_LOST, ErrorCode.BUSY)
 
 
 def refused(error: messages.Error) -> Refused:
-    """The exception of a message."""
+    """Converts an error message to an exception."""
     kind = Cancelled if error.code == ErrorCode.CANCELLED else Refused
     code = ErrorCode(int(error.code))
     return kind(error.text or code.word, code=code, field=error.field, remedy=error.remedy,
@@ -34,7 +34,7 @@ def refused(error: messages.Error) -> Refused:
 
 
 class Connection:
-    """From the handshake to the goodbye: messages, requests and their answers, frames of jobs."""
+    """A connection from the handshake to the goodbye: messages, requests and their answers, frames of jobs."""
 
     def __init__(self, name: str, key: bytes | None) -> None:
         self._in, self._out = bytearray(), bytearray()
@@ -47,13 +47,13 @@ class Connection:
         self._pending: dict[int, Pending] = {}
         self._jobs: dict[int, Job] = {}
         self._request = self._scene_number = 0
-        self._credit = 0  # bytes of blobs that may be sent in all
+        self._credit = 0  # total of blob bytes that may be sent
         self._out += handshake.hello(name)
 
     # ---- bytes
 
     def unsent(self) -> Bytes:
-        """What is to be sent now."""
+        """The bytes to send now."""
         if self._seal is None:
             return self._out
         if self._out and self._seal.may_seal:
@@ -62,11 +62,11 @@ class Connection:
         return self._seal.out
 
     def sent(self, count: int) -> None:
-        """So many bytes of unsent() were."""
+        """Removes bytes of unsent() that were sent."""
         del (self._out if self._seal is None else self._seal.out)[:count]
 
     def receive(self, data: Bytes) -> None:
-        """Takes what came; empty: the other side has closed."""
+        """Processes received bytes; empty: the other side has closed."""
         if self.failure is not None:
             return
         try:
@@ -79,7 +79,7 @@ class Connection:
             self.fail(why)
 
     def fail(self, why: Error) -> None:
-        """Gives the connection up."""
+        """Drops the connection."""
         if self.failure is None:
             self.failure = why
 
@@ -92,7 +92,7 @@ class Connection:
         self._out += framing.pack(message, request, channel)
 
     def _take_one(self) -> bool:
-        """False: there is no whole message."""
+        """Handles a message; False: there is no whole one."""
         if not self._is_greeted:
             return self._take_reply()
         received = framing.cut(self._in, ("server", "both"))
@@ -111,7 +111,7 @@ class Connection:
         return reply is not None
 
     def greet(self) -> Operation[None]:
-        """Until the handshake is done."""
+        """Waits for the end of the handshake."""
         return self._until(lambda: self._is_greeted)
 
     # ---- messages that come
@@ -183,7 +183,7 @@ class Connection:
         return self._request, pending
 
     def _has_room(self) -> bool:
-        """Of the requests that may be in flight one is left for a cancel."""
+        """True if another request may be sent; the last one in flight is reserved for a cancel."""
         return len(self._pending) < max(self.limits.get("requests_in_flight") or 64, 2) - 1 and self._has_space()
 
     def _has_space(self) -> bool:
@@ -198,23 +198,23 @@ class Connection:
 
     def ask(self, message: Message, answer: type[Message] = messages.Ok,
             extra: type[Message] | None = None) -> Operation[tuple[Any, Any]]:
-        """Sends a request; its answer, and what came before it."""
+        """Sends a request; returns its answer, and the message before it."""
         if not isinstance(message, Message) or message.SENDER not in ("client", "both"):
             raise InvalidValue(f"{message!r:.80} is no message of a client", field="message")
-        framing.pack(message)  # whether it is valid, before anything is begun
+        framing.pack(message)  # checks the message before anything is sent
         yield from self._until(self._has_room)
         request, pending = self._begin((answer,), extra)
         self._send(message, request)
         return (yield from self._answer(pending)), pending.came
 
     def ping(self) -> None:
-        """Asks for a sign of life."""
+        """Sends a ping."""
         if self._is_greeted and self.failure is None and self._has_room():
             request, _ = self._begin((messages.Pong,))
             self._send(messages.Ping(0), request)
 
     def leave(self) -> None:
-        """Says goodbye; the connection takes nothing more."""
+        """Says goodbye; the connection ignores everything after that."""
         if self._is_greeted and self.failure is None:
             self._send(messages.Goodbye(ErrorCode.NONE, ""))
             self.unsent()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a client does with a connection, as operations: scenes, their blobs and edits, jobs and their frames. The plain and
-the asyncio clients drive it."""
+"""Operations of a client on a connection: scenes, their blobs and edits, jobs and their frames. The plain and the asyncio
+client drive it."""
 from __future__ import annotations
 
 import collections
@@ -25,25 +25,25 @@ READABLE: dict[ObjectKind, type[Message]] = {
     ObjectKind.NODE: messages.SetNode, ObjectKind.MATERIAL: messages.SetMaterial, ObjectKind.LIGHT: messages.SetLight,
     ObjectKind.CAMERA: messages.SetCamera, ObjectKind.ENVIRONMENT: messages.SetEnvironment,
 }
-Progress = Callable[[str, int, int], None]  # what is done, bytes of it, bytes in all
+Progress = Callable[[str, int, int], None]  # activity, bytes done, bytes in all
 
 
 @dataclass
 class SceneState:
-    """What the daemon has of a scene."""
+    """The state of a scene at the daemon."""
     scene: int = 0  # identifier on this connection; 0: not opened yet
-    version: int = 0  # Scene.version that was committed
+    version: int = 0  # Scene.version of the last commit
     revision: int = 0
     is_busy: bool = False
 
 
 class Core(Connection):
-    """`lost`: the previous connection's core, whose scenes may still linger at the daemon."""
+    """The core of a client. `lost`: the previous connection's core, whose scenes may still linger at the daemon."""
 
     def __init__(self, name: str = "python", key: bytes | None = None, lost: Core | None = None,
                  progress: Progress | None = None, has_tasks: bool = False) -> None:
         super().__init__(name, key)
-        self.has_tasks = has_tasks  # that use it at once
+        self.has_tasks = has_tasks  # several tasks use the core at once
         self._channel = UPLOAD_CHANNEL
         self._uploaded = 0
         self._held: set[bytes] = set()
@@ -89,7 +89,7 @@ class Core(Connection):
                     if self._progress is not None:
                         self._progress("sending", self._uploaded - before, total)
                     yield
-            except BaseException:  # a Ctrl-C may come at any place
+            except BaseException:  # Ctrl-C may arrive at any place
                 self.fail(ConnectionLost("an upload was left in its middle"))
                 raise
         for pending in on_way:
@@ -114,7 +114,7 @@ class Core(Connection):
             try:
                 answer, _ = yield from self.ask(messages.SceneAttach(number, scene.name))
                 state.revision = answer.revision
-                # It has not changed since: it has all that was sent.
+                # An unchanged revision shows that the daemon has everything that was sent.
                 state.version = before.version if before and before.revision == answer.revision else 0
                 state.scene = number
                 return
@@ -127,7 +127,7 @@ class Core(Connection):
         state.scene = number
 
     def open(self, scene: Scene) -> Operation[SceneState]:
-        """The scene as the daemon has it, opened or attached to."""
+        """The scene's state at the daemon, opened or attached if necessary."""
         if not isinstance(scene, Scene):
             raise InvalidValue(f"{scene!r:.80} is no farlight.Scene", field="scene", remedy="farlight.load(FILE) makes one of a file")
         state = self._scenes.setdefault(scene, SceneState())
@@ -158,7 +158,7 @@ class Core(Connection):
         return answer
 
     def commit(self, scene: Scene, base_revision: int = 0) -> Operation[int]:
-        """Sends what has changed in the scene since the last time; its revision."""
+        """Sends the scene's changes since the last commit; returns its revision."""
         state = yield from self.open(scene)
         yield from self._until(lambda: not state.is_busy)
         scene.show_unplaced()
@@ -167,7 +167,7 @@ class Core(Connection):
         state.is_busy = True
         try:
             version, edits = scene.version, scene.edits_since(state.version)
-            payloads = [(edit.TYPE, fields.encode(edit)) for edit in edits]  # all are valid before the first is sent
+            payloads = [(edit.TYPE, fields.encode(edit)) for edit in edits]  # checks all before the first is sent
             yield from self._upload(scene.blobs_of(edits))
             answer = yield from self._transact(messages.EditBegin(state.scene, base_revision), payloads)
             state.revision, state.version = answer.revision, version
@@ -176,18 +176,18 @@ class Core(Connection):
         return state.revision
 
     def close_scene(self, scene: Scene) -> Operation[None]:
-        """Releases it; what ends with it ends."""
+        """Releases the scene, which ends its jobs."""
         state = self._scenes.pop(scene, None)
         if state is not None and state.scene:
             yield from self.ask(messages.SceneClose(state.scene))
 
     def changed(self, scene: Scene) -> int:
-        """The revision of others' last change."""
+        """The revision of other clients' last change."""
         state = self._scenes.get(scene)
         return self._changes.get(state.scene, 0) if state else 0
 
     def read(self, scene: Scene, thing: Object) -> Operation[tuple[Message, int]]:
-        """An object as the daemon has it, and the scene's revision."""
+        """Reads an object at the daemon, and the scene's revision."""
         if not isinstance(thing, Object) or thing.kind not in READABLE:
             raise InvalidValue(f"{thing!r:.80} cannot be read; allowed: {', '.join(kind.word for kind in READABLE)}",
                                field="object")
@@ -201,7 +201,7 @@ class Core(Connection):
 
     def objects(self, scene: Scene, kind: messages.ObjectKind | str,
                 name: str) -> Operation[list[messages.ObjectEntry]]:
-        """Those of a kind, or those of a name."""
+        """Lists objects of a kind, or of a name."""
         state = yield from self.open(scene)
         found: list[messages.ObjectEntry] = []
         at = 0
@@ -214,7 +214,7 @@ class Core(Connection):
             at = reply.next
 
     def describe(self, scene: Scene) -> Operation[messages.SceneDescription]:
-        """Bounds, cameras and clips."""
+        """Returns bounds, cameras and clips."""
         state = yield from self.open(scene)
         answer, _ = yield from self.ask(messages.SceneDescribe(state.scene), messages.SceneDescription)
         assert isinstance(answer, messages.SceneDescription)
@@ -227,14 +227,14 @@ class Core(Connection):
 
     def _start(self, render: messages.Render) -> Operation[Job]:
         most = self.limits.get("views_per_client") or 4
-        # Where nothing would end another job meanwhile, the daemon says that they are too many.
+        # If no other job is about to end, the daemon itself reports that there are too many.
         yield from self._until(lambda: self._has_room() and (
             len(self._jobs) < most or not any(self._will_end(job) for job in self._jobs.values())))
         self._channel += 1
         render.channel = self._channel
         fields.encode(render)
         request, pending = self._begin((messages.Ok,))
-        # With the words as values, to compare what comes.
+        # Words become values, for comparison with received messages.
         plain = fields.decode(messages.Render, fields.encode(render))
         assert isinstance(plain, messages.Render)
         job = self._jobs[self._channel] = Job(request, self._channel, plain, pending, plain.credit)
@@ -242,7 +242,7 @@ class Core(Connection):
         return job
 
     def hand_out(self, job: Job) -> Frame | None:
-        """The next frame that is there; another one may come for it."""
+        """Takes a frame out of the queue and grants credit for another one."""
         if not job.frames:
             return None
         if self.failure is None and job.pending.answer is None:
@@ -251,7 +251,7 @@ class Core(Connection):
         return job.frames.popleft()
 
     def abandon(self, job: Job) -> None:
-        """Ends a job without waiting for it."""
+        """Cancels a job without waiting."""
         job.is_abandoned = True
         job.frames.clear()
         job.data = bytearray()
@@ -274,7 +274,7 @@ class Core(Connection):
         return Names.of(nodes, (yield from self.objects(scene, ObjectKind.MATERIAL, "")))
 
     def batch(self, scene: Scene, render: messages.Render) -> Generator[Frame | None, None, None]:
-        """Commits the scene; then the frames of a batch. None: nothing has come yet."""
+        """Commits the scene, then yields the frames of a batch. None: no frame has arrived yet."""
         render.credit = FRAMES_AHEAD
         job = yield from self._render_of(scene, render)
         try:
@@ -294,12 +294,12 @@ class Core(Connection):
             self.abandon(job)
 
     def view(self, scene: Scene, render: messages.Render) -> Operation[Job]:
-        """Begins a view."""
+        """Starts a view."""
         render.credit = FRAMES_AHEAD
         return (yield from self._render_of(scene, render))
 
     def look(self, job: Job, camera: messages.ViewCamera) -> int:
-        """Moves a view's camera; the number by which frames name it."""
+        """Moves a view's camera; returns the number that frames carry."""
         if self.failure is not None:
             raise self.failure
         camera.channel, camera.command = job.channel, job.command + 1
@@ -308,7 +308,7 @@ class Core(Connection):
         return job.command
 
     def next_frame(self, job: Job) -> Operation[Frame]:
-        """Of a view; raises where the view has ended."""
+        """Waits for a frame of a view; raises if the view has ended."""
         yield from self._until(lambda: bool(job.frames) or job.pending.answer is not None)
         frame = self.hand_out(job)
         if frame is not None:
@@ -318,7 +318,7 @@ class Core(Connection):
         raise ConnectionLost("the view has ended", retryable=False)
 
     def cancel(self, job: Job) -> Operation[None]:
-        """Ends a job, and waits for its end."""
+        """Cancels a job, and waits for its end."""
         if job.pending.answer is None:
             self.abandon(job)
             yield from self._until(lambda: job.pending.answer is not None)

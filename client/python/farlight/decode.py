@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The pixels of frames: raw, or decoded by the system's libzstd and libturbojpeg. What has lost nothing is checked against
-the digest that the daemon computed, where the system has libxxhash. H.264 and `predicted` are not there."""
+"""Pixels of frames: raw, or decoded by the system's libzstd and libturbojpeg. Lossless pixels are checked against the daemon's
+digest if the system has libxxhash. H.264 and `predicted` are not supported."""
 from __future__ import annotations
 
 import ctypes
@@ -16,8 +16,8 @@ from .messages import Encoding, FrameBegin
 Pixels = npt.NDArray[np.uint8]
 
 DECODED = (Encoding.RAW, Encoding.ZSTD, Encoding.JPEG)
-JPEG_EXTRA_BYTES = 65536  # beside its pixels, as the C client has it
-RGBA, STOP_ON_WARNING, LIMIT_SCANS = 7, 8192, 32768  # of turbojpeg.h
+JPEG_EXTRA_BYTES = 65536  # besides its pixels, as in the C client
+RGBA, STOP_ON_WARNING, LIMIT_SCANS = 7, 8192, 32768  # constants of turbojpeg.h
 
 _POINTER, _SIZE, _INT, _LONG = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_ulong
 _OUT = ctypes.POINTER(ctypes.c_int)
@@ -42,7 +42,7 @@ def _turbojpeg() -> ctypes.CDLL:
 
 
 def check_wanted(render: messages.Render) -> None:
-    """That frames of the job can be decoded: InvalidValue, or FileFailed for a library that is missing."""
+    """Checks that frames of the job can be decoded. Raises InvalidValue, or FileFailed for a missing library."""
     for name in ("encoding", "still_encoding"):
         encoding = Encoding(int(getattr(render, name)))
         if encoding not in DECODED:
@@ -56,7 +56,7 @@ def check_wanted(render: messages.Render) -> None:
 
 
 def encoded_bytes_max(begin: FrameBegin, pixels_bytes: int) -> int:
-    """Of a correctly encoded picture."""
+    """Maximum size of a correctly encoded picture."""
     if begin.encoding == Encoding.ZSTD:  # ZSTD_compressBound
         return pixels_bytes + (pixels_bytes >> 8) + max(0, (131072 - pixels_bytes) >> 11)
     if begin.encoding == Encoding.JPEG:  # tjBufSize without subsampling
@@ -80,7 +80,7 @@ def _decode_jpeg(encoded: Pixels, pixels: Pixels, begin: FrameBegin) -> None:
         failed = library.tjDecompressHeader3(decoder, encoded.ctypes.data, encoded.size, *size)
         if failed or (size[0].value, size[1].value) != (begin.width, begin.height):
             raise ProtocolError(f"this is no JPEG of {begin.width}x{begin.height}", field="frame_data")
-        # Of scans, each of which takes time for all pixels, a hostile one may have any number.
+        # A hostile JPEG may have any number of scans, each of which costs time for all pixels.
         if library.tjDecompress2(decoder, encoded.ctypes.data, encoded.size, pixels.ctypes.data, begin.width, 0, begin.height,
                                  RGBA, STOP_ON_WARNING | LIMIT_SCANS):
             raise ProtocolError("the JPEG is damaged", field="frame_data")
@@ -97,7 +97,7 @@ def _xxhash() -> ctypes.CDLL | None:
 
 
 def decode(begin: FrameBegin, data: bytearray, pixels_bytes: int) -> tuple[memoryview, bool]:
-    """The pixels, which cannot be written to, and whether they have the daemon's digest; ProtocolError for others."""
+    """Returns the pixels, read-only, and whether they match the daemon's digest; raises ProtocolError if they do not."""
     encoded = np.frombuffer(data, np.uint8)
     pixels = encoded if begin.encoding == Encoding.RAW else np.empty(pixels_bytes, np.uint8)
     if begin.encoding == Encoding.JPEG:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""What can go wrong. Every exception of this package is an Error: it names the field at fault, says what is wrong, and
-where there is one, what to do about it."""
+"""Exceptions. Every exception of this package is an Error: it names the field at fault, says what is wrong, and if possible
+what to do about it."""
 from __future__ import annotations
 
 
 class Error(Exception):
-    """`field`: the field, file or address at fault. `retryable`: the same may succeed later."""
+    """An error. `field`: the field, file or address at fault. `retryable`: the same call may succeed later."""
 
     def __init__(self, text: str, *, field: str = "", remedy: str = "", retryable: bool = False) -> None:
         super().__init__(text)
@@ -16,11 +16,11 @@ class Error(Exception):
 
 
 class InvalidValue(Error, ValueError):
-    """A value that may not be sent: nothing was."""
+    """A value is not allowed; nothing was sent."""
 
 
 class FileFailed(Error):
-    """A model, a key or a program that cannot be used."""
+    """A model, a key or a program cannot be used."""
 
 
 class ImportFailed(Error):
@@ -35,15 +35,15 @@ class ConnectionLost(Error):
 
 
 class TimedOut(ConnectionLost):
-    """The daemon was silent for too long. The connection is given up."""
+    """The daemon was silent for too long. The connection is dropped."""
 
 
 class ProtocolError(Error):
-    """The other side sent what is no valid message. The connection is given up."""
+    """The other side sent an invalid message. The connection is dropped."""
 
 
 class Refused(Error):
-    """The daemon's own error; `code` is the value of messages.ErrorCode."""
+    """The daemon answered with an error; `code` is its messages.ErrorCode."""
 
     def __init__(self, text: str, *, code: int, field: str = "", remedy: str = "", retryable: bool = False,
                  retry_after_s: float = 0) -> None:
@@ -52,4 +52,4 @@ class Refused(Error):
 
 
 class Cancelled(Refused):
-    """The job was ended by its own client."""
+    """The job was cancelled by its own client."""

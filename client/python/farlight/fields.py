@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Fields of messages: what each may hold, and how it lies on the wire. Both ways every value is checked; a payload
-becomes a whole message or an error that names the field.
+"""Fields of messages: their allowed values, and their form on the wire. Every value is checked in both directions; a payload
+becomes a complete message or an error that names the field.
 
-A payload: u16 size of the fixed part, the fixed fields without gaps, then strings, arrays and bulk data, each behind a
-u32 count. A fixed part that is shorter than ours is an older peer's: what it lacks has its default. One that is longer
-is a newer one's: the rest is skipped.
-"""
+A payload: u16 size of the fixed part, the fixed fields without gaps, then strings, arrays and bulk data, each after a u32
+count. A shorter fixed part than ours is from an older peer: missing fields get their defaults. A longer one is from a newer
+peer: the rest is skipped."""
 from __future__ import annotations
 
 import enum
@@ -26,7 +25,7 @@ BULK_MAX_BYTES = 262144 + 4096
 
 
 class _Default:
-    """A default that signatures show, and that stands for no value."""
+    """A default that signatures show, and that is no value."""
 
     def __init__(self, meaning: str) -> None:
         self.meaning = meaning
@@ -40,8 +39,8 @@ KEPT: Any = _Default("as it is")
 
 
 def takes(signature: Callable[P, None]) -> Callable[[Callable[..., T]], Callable[P, T]]:
-    """A method that takes the fields of a message as keywords: with all of them in its signature, for help(), editors and type
-    checkers."""
+    """Decorates a method that takes the fields of a message as keywords: its signature lists them all, for help(), editors and
+    type checkers."""
     def decorate(method: Callable[..., T]) -> Callable[P, T]:
         named = inspect.signature(signature)
         setattr(method, "__signature__", named.replace(return_annotation=inspect.signature(method).return_annotation))
@@ -50,11 +49,11 @@ def takes(signature: Callable[P, None]) -> Callable[[Callable[..., T]], Callable
 
 
 class Word(enum.IntEnum):
-    """An enumeration of the protocol; its words are accepted where its values are."""
+    """An enumeration of the protocol; its words are accepted in place of its values."""
 
     @classmethod
     def of(cls, value: int | str) -> Word:
-        """ValueError where it is none."""
+        """Converts a word or number; raises ValueError if it is invalid."""
         if isinstance(value, str):
             member = cls.__members__.get(value.upper().replace("-", "_"))
             if member is None:
@@ -64,7 +63,7 @@ class Word(enum.IntEnum):
 
     @property
     def word(self) -> str:
-        """As people read and type it."""
+        """The word that people read and type."""
         return self.name.lower().replace("_", "-")
 
 
@@ -83,24 +82,24 @@ class Message(Record):
 
 
 class Reader:
-    """A cursor; what is not there is a ProtocolError."""
+    """A cursor over received bytes; missing bytes raise ProtocolError."""
 
     def __init__(self, data: Bytes) -> None:
         self.data, self.at = memoryview(data), 0
 
     def take(self, count: int, path: str) -> memoryview:
-        """The next bytes; nothing is reserved for what did not come."""
+        """Reads the next bytes; nothing is allocated for missing ones."""
         if count > len(self.data) - self.at:
             raise ProtocolError(f"{count} bytes where {len(self.data) - self.at} are left", field=path)
         self.at += count
         return self.data[self.at - count:self.at]
 
     def left(self) -> int:
-        """Bytes behind the cursor."""
+        """Number of bytes after the cursor."""
         return len(self.data) - self.at
 
     def count(self, maximum: int, path: str) -> int:
-        """The u32 before a counted field."""
+        """Reads the u32 before a counted field."""
         number = int.from_bytes(self.take(4, path), "little")
         if number > maximum:
             raise ProtocolError(f"{number} of them where {maximum} are allowed", field=path)
@@ -108,20 +107,20 @@ class Reader:
 
 
 class Field:
-    """One field; `fixed_bytes` is 0 for counted ones."""
+    """A field of a message; `fixed_bytes` is 0 for counted fields."""
     fixed_bytes = 0
-    least_bytes = 4  # of a counted field: its count
+    least_bytes = 4  # minimum size of a counted field: its count
 
     def __init__(self, name: str) -> None:
-        self.name = name  # of the attribute: a keyword of Python has an underscore behind it
+        self.name = name  # name of the attribute; a keyword of Python gets an underscore
         self.wire_name = name.rstrip("_")
 
     def encode(self, value: Any, out: bytearray, path: str) -> None:
-        """Appends it; InvalidValue."""
+        """Appends the value; raises InvalidValue."""
         raise NotImplementedError
 
     def decode(self, reader: Reader, path: str) -> Any:
-        """ProtocolError, or the value."""
+        """Reads a value; raises ProtocolError."""
         raise NotImplementedError
 
 
@@ -136,7 +135,7 @@ class _Whole(Field):
         self.fixed_bytes = struct.calcsize("<" + letter)
 
     def fault(self, value: int) -> str:
-        """Empty: it is allowed."""
+        """Why the value is not allowed; empty: it is."""
         if self.listed and value not in self.listed:
             return f"{value} is none of {', '.join(map(str, self.listed))}"
         if not self.low <= value <= self.high and not (self.zero and value == 0):
@@ -185,7 +184,7 @@ def _as_f32(value: float) -> float:
 
 
 class _Real(Field):
-    """One f32, or a fixed number of them."""
+    """An f32, or a fixed number of them."""
 
     def __init__(self, name: str, low: float, high: float, count: int, zero: bool) -> None:
         super().__init__(name)
@@ -194,7 +193,7 @@ class _Real(Field):
         self.fixed_bytes = self.form.size
 
     def check(self, values: Sequence[float], path: str, kind: type[Error]) -> None:
-        """NaN is within nothing."""
+        """NaN is outside every range."""
         for i, value in enumerate(values):
             if not self.low <= value <= self.high and not (self.zero and value == 0):
                 raise kind(_out_of_range(value, self.low, self.high), field=f"{path}[{i}]" if self.count else path)
@@ -291,7 +290,7 @@ class _Array(Field):
 
 
 class _Bulk(Field):
-    """Aligned to 8 bytes within the payload."""
+    """Bulk data, aligned to 8 bytes within the payload."""
 
     def __init__(self, name: str, maximum: int) -> None:
         super().__init__(name)
@@ -312,47 +311,47 @@ class _Bulk(Field):
 
 
 def whole(name: str, letter: str, low: int, high: int, listed: tuple[int, ...] = (), zero: bool = False) -> Field:
-    """u8 .. u64; `zero`: 0 stands for a default, whatever the range."""
+    """Describes a u8 .. u64; `zero`: 0 stands for a default, whatever the range."""
     return _Whole(name, letter, low, high, listed, zero)
 
 
 def choice(name: str, words: type[Word]) -> Field:
-    """A value of an enumeration."""
+    """Describes a value of an enumeration."""
     return _Choice(name, words)
 
 
 def real(name: str, low: float, high: float, count: int = 0, zero: bool = False) -> Field:
-    """f32; with a count so many."""
+    """Describes an f32, or `count` of them."""
     return _Real(name, low, high, count, zero)
 
 
 def exactly(name: str, count: int) -> Field:
-    """So many bytes."""
+    """Describes `count` bytes."""
     return _Exactly(name, count)
 
 
 def text(name: str, maximum: int) -> Field:
-    """UTF-8 without NUL."""
+    """Describes UTF-8 without NUL."""
     return _Text(name, maximum)
 
 
 def array(name: str, record: type[Record], maximum: int) -> Field:
-    """At most so many records."""
+    """Describes an array of at most `maximum` records."""
     return _Array(name, record, maximum)
 
 
 def bulk(name: str, maximum: int) -> Field:
-    """At most so many bytes, decoded as a view into the payload."""
+    """Describes at most `maximum` bytes, decoded as a view into the payload."""
     return _Bulk(name, maximum)
 
 
 def payload_max_bytes(kind: type[Message]) -> int:
-    """Of such a message."""
+    """Maximum payload of a message of this kind."""
     return BULK_MAX_BYTES if any(isinstance(field, _Bulk) for field in kind.FIELDS) else CONTROL_MAX_BYTES
 
 
 def encode(message: Message) -> bytes:
-    """The payload; InvalidValue names the field."""
+    """Encodes the payload; InvalidValue names the field."""
     out = bytearray(2)
     fixed_bytes = sum(field.fixed_bytes for field in message.FIELDS)
     out[:] = fixed_bytes.to_bytes(2, "little")
@@ -365,7 +364,7 @@ def encode(message: Message) -> bytes:
 
 
 def decode(kind: type[Message], payload: Bytes) -> Message:
-    """ProtocolError names the field."""
+    """Decodes a payload; ProtocolError names the field."""
     reader = Reader(payload)
     size = int.from_bytes(reader.take(2, f"{kind.NAME}.struct_bytes"), "little")
     fixed = Reader(reader.take(size, f"{kind.NAME}.struct_bytes"))

@@ -23,20 +23,20 @@ _TYPES = {PixelFormat.RGBA8: "u1", PixelFormat.RGBA16F: "<f2", PixelFormat.RGBA3
 
 
 def pixels_bytes(begin: FrameBegin) -> int:
-    """Of all its images, decoded."""
+    """Size of all images, decoded."""
     bytes_per_pixel = 4 * np.dtype(_TYPES[PixelFormat(int(begin.format))]).itemsize
     return begin.width * begin.height * bytes_per_pixel * begin.layers.bit_count()
 
 
 def _layers_of(name: Union[str, Layer]) -> "list[Layer]":
-    """A name without its digit stands for all that have it: "crypto-object"."""
+    """Finds layers; a name without its digit stands for all layers of the series: "crypto-object"."""
     wanted = name.replace("_", "-").lower() if isinstance(name, str) else ""
     whole = [layer for layer in Layer if wanted and layer.word.rstrip("0123456789").replace("_", "-") == wanted]
     return whole or [Layer(Layer.of(name))]
 
 
 def layer_set(layers: LayersOf) -> int:
-    """The set of bits of "depth", or of ("beauty", "depth")."""
+    """Converts "depth", or ("beauty", "depth"), to a set of bits."""
     try:
         names = (layers,) if isinstance(layers, (str, Layer)) else tuple(layers)
         return sum({1 << int(layer) for name in names for layer in _layers_of(name)})
@@ -46,10 +46,10 @@ def layer_set(layers: LayersOf) -> int:
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture as it came. `begin` and `end` are all that the daemon says of it: camera, revision, samples, digest,
-    rays, times of the stages. Arrays are views of `data`, its pixels, rows from the top, and cannot be written to.
-    `is_checked`: they have the digest that the daemon computed; not known of JPEG, and without libxxhash. `window`: of a
-    crop, the pixels left of it and above it, and the size of the whole picture. `known`: the scene's names, with the layer id."""
+    """A received picture. `begin` and `end` hold what the daemon reports about it: camera, revision, samples, digest, rays,
+    times of the stages. Arrays are read-only views of `data`, its pixels, rows from the top. `is_checked`: the pixels match the
+    daemon's digest; unknown for JPEG, and without libxxhash. `window`, for a crop: the pixels left of it and above it, and the
+    size of the whole picture. `known`: the scene's names, with the layer id."""
     begin: FrameBegin
     end: FrameEnd
     data: memoryview
@@ -65,7 +65,7 @@ class Frame:
 
     @property
     def number(self) -> int:
-        """In the job's range."""
+        """The frame's number in the job's range."""
         return self.begin.frame
 
     @property
@@ -75,11 +75,11 @@ class Frame:
 
     @property
     def layers(self) -> list[Layer]:
-        """Those that are there, in the order of their images."""
+        """The layers of the frame, in the order of their images."""
         return [layer for layer in Layer if self.begin.layers >> layer & 1]
 
     def layer(self, layer: str | Layer) -> Array:
-        """Height x width x 4 numbers of one layer: what the protocol says of it."""
+        """The values of one layer, height x width x 4, as the protocol defines them."""
         try:
             wanted = Layer(Layer.of(layer))
         except ValueError as why:
@@ -95,61 +95,61 @@ class Frame:
 
     @property
     def colour(self) -> Array:
-        """Height x width x 4: the picture itself. uint8: tone-mapped sRGB and straight alpha; else linear floats and
+        """The picture itself, height x width x 4. uint8: tone-mapped sRGB and straight alpha; else linear floats and
         premultiplied alpha."""
         return self.layer(Layer.BEAUTY)
 
     @property
     def depth(self) -> Array:
-        """Height x width: metres along the view to the first surface; infinite where there is none."""
+        """Distance in metres along the view to the first surface, height x width; infinite where there is none."""
         layer = self.layer(Layer.DEPTH)
         return np.where(layer[..., 3] > 0, layer[..., 0], np.inf).astype(layer.dtype)
 
     @property
     def normal(self) -> Array:
-        """Height x width x 3: the shading normal in world space; 0 where there is no surface."""
+        """Shading normal in world space, height x width x 3; 0 where there is no surface."""
         layer: Array = self.layer(Layer.NORMAL)[..., :3]
         return layer
 
     @property
     def albedo(self) -> Array:
-        """Height x width x 3: base colour."""
+        """Base colour, height x width x 3."""
         layer: Array = self.layer(Layer.ALBEDO)[..., :3]
         return layer
 
     @property
     def position(self) -> Array:
-        """Height x width x 3: world position of the first surface, metres."""
+        """World position of the first surface, metres, height x width x 3."""
         layer: Array = self.layer(Layer.POSITION)[..., :3]
         return layer
 
     @property
     def ids(self) -> Array:
-        """Height x width x 2: the numbers of node and material of the first surface; 0 where there is none."""
+        """Numbers of node and material of the first surface, height x width x 2; 0 where there is none."""
         numbers: Array = self.layer(Layer.ID)[..., :2].astype(np.uint32)
         return numbers
 
     @property
     def motion(self) -> Array:
-        """Height x width x 4: from where the first surface is seen to where it is seen a frame later, x and y, then to where it
-        was seen a frame earlier, x and y; pixels, x to the right and y up. What OpenCV and data sets call the optical flow has
-        y down: `frame.motion[..., :2] * (1, -1)`. Only the camera's path and clips count: a scene that is edited between two
-        frames, or another camera of the next render(), is not known beforehand."""
+        """Motion of the first surface, height x width x 4: from its place to its place a frame later, x and y, then to its
+        place a frame earlier, x and y; pixels, x to the right and y up. The optical flow of OpenCV and data sets has y down:
+        `frame.motion[..., :2] * (1, -1)`. Only the camera's path and clips count: edits of the scene between two frames, or
+        another camera in the next render(), are not known in advance."""
         return self.layer(Layer.MOTION)
 
     @property
     def names(self) -> dict[int, str]:
-        """The names of the nodes by their numbers, which `ids` has; without the layer id none."""
+        """Names of the nodes by the numbers in `ids`; empty without the layer id."""
         return {number: entry.name for number, entry in self.known.nodes.items()}
 
     @property
     def material_names(self) -> dict[int, str]:
-        """Likewise, of materials."""
+        """Names of the materials by the numbers in `ids`; empty without the layer id."""
         return {number: entry.name for number, entry in self.known.materials.items()}
 
     def mask(self, thing: Object | str) -> Array:
-        """Height x width: where the first surface is of that node, or hangs below it, or of that material. A name stands for all
-        nodes that have it, and for materials if no node has."""
+        """A mask, height x width: true where the first surface is of this node, a node below it, or this material. A name
+        stands for all nodes with this name, and for materials if no node has it."""
         if isinstance(thing, str):
             nodes, materials = self.known.called(thing)
             if not nodes and not materials:
@@ -174,9 +174,9 @@ class Frame:
         return np.array([*self.begin.world_from_view, 0, 0, 0, 1], dtype=np.float64).reshape(4, 4)
 
     @property
-    def K(self) -> Array:  # as everybody calls it
-        """3 x 3: from the camera's space, with z along the view and y down, to pixels; the first one's middle is (0.5, 0.5). Of
-        an orthographic camera there is none."""
+    def K(self) -> Array:  # the usual name
+        """The camera matrix, 3 x 3: from the camera's space, with z along the view and y down, to pixels; the centre of the
+        first pixel is (0.5, 0.5). An orthographic camera has none."""
         left, above, width, height = self.window or (0, 0, *self.size)
         if not self.begin.fov_y > 0:
             raise InvalidValue("the camera is orthographic", field="K")
@@ -184,11 +184,11 @@ class Frame:
         return np.array([[focal, 0, width / 2 - left], [0, focal, height / 2 - above], [0, 0, 1]])
 
     def _repr_png_(self) -> bytes | None:
-        """For notebooks; floats have no tone map, and show as text."""
+        """PNG for notebooks; frames of floats have no tone map and show as text."""
         return png.encode(self.colour) if self.begin.format == PixelFormat.RGBA8 and Layer.BEAUTY in self.layers else None
 
     @property
     def warnings(self) -> list[str]:
-        """What the picture lacks, and the remedy, in the tracer's words."""
+        """Warnings about missing parts of the picture, and remedies, in the tracer's words."""
         rows: list[StructureRow] = list(self.end.structure)
         return [row.warning for row in rows if row.warning]

@@ -16,25 +16,25 @@ _IGNORABLE = 0x8000  # a type that an older peer skips
 
 
 class Received(NamedTuple):
-    """A message that has come."""
+    """A received message."""
     message: Message
     request: int
     channel: int
 
 
 def pack(message: Message, request: int = 0, channel: int = 0) -> bytes:
-    """As it is sent; InvalidValue names the field."""
+    """Encodes a message for sending; InvalidValue names the field."""
     return wrap(message.TYPE, fields.encode(message), request, channel)
 
 
 def wrap(kind: int, payload: bytes, request: int = 0, channel: int = 0) -> bytes:
-    """A payload of that type of message, as it is sent."""
+    """Adds the header and padding to a payload of this type of message."""
     return b"".join((_HEADER.pack(len(payload), kind, 0, request, channel), payload, bytes(-len(payload) % 8)))
 
 
 def cut(data: bytearray, senders: tuple[str, ...]) -> Received | None:
-    """Takes the first message off; None: it has not come as a whole. Type, sender and size are checked as soon as the
-    header is there, so that `data` need not hold more than the largest message."""
+    """Cuts off the first message; None: it is incomplete. Type, sender and size are checked as soon as the header is there, so
+    that `data` need not hold more than the largest message."""
     while len(data) >= _HEADER.size:
         size, kind, flags, request, channel = _HEADER.unpack_from(data)
         row = MESSAGES.get(kind)
@@ -53,7 +53,7 @@ def cut(data: bytearray, senders: tuple[str, ...]) -> Received | None:
         if len(data) < whole:
             return None
         with memoryview(data) as view:
-            payload = bytes(view[_HEADER.size:end])  # one copy, where a slice of `data` would be two
+            payload = bytes(view[_HEADER.size:end])  # a single copy; slicing `data` would make two
         if any(data[end:whole]):
             raise ProtocolError("padding is not zero", field=name)
         del data[:whole]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The first bytes of a connection; their layout never changes. No I/O."""
+"""The handshake: the first bytes of a connection, whose layout never changes. No I/O."""
 from __future__ import annotations
 
 import os
@@ -16,7 +16,7 @@ NAME_MAX_BYTES, LIMITS_MAX_BYTES, FIXED_BYTES = 64, 256, 48
 
 
 def hello(name: str) -> bytes:
-    """A client's; `name` is what the daemon shows of it."""
+    """Makes a client's hello; the daemon shows `name`."""
     encoded = name.encode("utf-8", "replace") if isinstance(name, str) else b"\0"
     if len(encoded) > NAME_MAX_BYTES or b"\0" in encoded:
         raise InvalidValue(f"{name!r} is not at most {NAME_MAX_BYTES} bytes without NUL", field="name")
@@ -27,14 +27,14 @@ def hello(name: str) -> bytes:
 
 @dataclass(frozen=True)
 class Reply:
-    """A daemon's, which lets us in; `size` bytes were it."""
+    """A daemon's reply that accepts the client; its size was `size` bytes."""
     limits: dict[str, int]
     daemon: str
     size: int
 
 
 def _limits(data: bytes) -> dict[str, int]:
-    """What an older daemon lacks is 0, what a newer one has is skipped."""
+    """Reads the limits; those that an older daemon lacks are 0, and further ones of a newer daemon are skipped."""
     limits, at = {}, 0
     for name, letter, _ in messages.LIMITS:
         size = 8 if letter == "Q" else 4
@@ -44,8 +44,8 @@ def _limits(data: bytes) -> dict[str, int]:
 
 
 def parse(data: bytearray) -> Reply | None:
-    """None: it has not come as a whole. ProtocolError for a wrong byte as soon as it is there, Refused with the daemon's
-    reason."""
+    """Parses the daemon's reply; None: it is incomplete. Raises ProtocolError for a wrong byte at once, Refused with the
+    daemon's reason."""
     if not MAGIC.startswith(bytes(data[:4])):
         raise ProtocolError("the server there is no farlight daemon", field="handshake")
     if len(data) < FIXED_BYTES:

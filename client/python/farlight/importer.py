@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Scenes from model files. Files are read by farlight-import, a program of farlight's own in a sandbox; we are the server
-that it speaks to, and believe it no more than one believes a client."""
+"""Scenes from model files. The program farlight-import reads the files in a sandbox; this module is the server that it speaks
+to, and trusts it no more than a server trusts a client."""
 from __future__ import annotations
 
 import os
@@ -17,14 +17,14 @@ from .messages import ObjectKind
 from .objects import Object
 from .scene import Scene
 
-WINDOW_BYTES = 16 << 20  # that the importer may send ahead
+WINDOW_BYTES = 16 << 20  # bytes that the importer may send ahead
 RECEIVE_BYTES = 1 << 20
 BYTES_MAX = 8 << 30
 MODELS_MAX = 64
 
 
 class _Import:
-    """What has come of it so far."""
+    """The state of an import."""
 
     def __init__(self, scene: Scene, max_bytes: int, progress: Progress | None = None) -> None:
         self.scene, self.left, self.progress = scene, max_bytes, progress
@@ -44,7 +44,7 @@ class _Import:
             self.out += framing.pack(messages.Credit(UPLOAD_CHANNEL, self.credit))
 
     def receive(self, data: bytes) -> None:
-        """ProtocolError or ImportFailed."""
+        """Handles a message; raises ProtocolError or ImportFailed."""
         self.incoming += data
         while (received := framing.cut(self.incoming, ("client", "both", "local"))) is not None:
             self._take(received.message, received.request)
@@ -132,7 +132,7 @@ def _run(link: address.Link, work: _Import, timeout: float, names: str) -> None:
 
 
 def _word(path: str | os.PathLike[str]) -> str:
-    """A name may begin with '-'."""
+    """Protects a path that begins with '-'."""
     try:
         name = os.fsdecode(path)
     except TypeError:
@@ -151,13 +151,11 @@ def load(*models: str | os.PathLike[str], environment: str | os.PathLike[str] | 
          environment_degrees: float = 0.0, variant: str | None = None, point_size: float | None = None,
          name: str = "", sharing: messages.Sharing | str = "private", arguments: Sequence[str] = (),
          timeout: float = 600.0, max_bytes: int = BYTES_MAX, progress: Progress | None = None) -> Scene:
-    """A scene from model files (glTF, OBJ, NFF, PLY and more), to be changed and rendered like any other; several in
-    one space. `scene.notes` says what a file has that is not shown. environment: an image that lights the scene.
-    arguments: further ones of farlight-import, such as --at. It holds the models' bytes in memory: at most max_bytes.
-    progress: is called with "importing", bytes that were read and bytes in all; 0: not known.
-
-    FileFailed, or ImportFailed with the importer's words.
-    """
+    """Makes a scene from model files (glTF, OBJ, NFF, PLY and more), to be changed and rendered like any other; several files
+    share one space. `scene.notes` lists contents of the files that are not shown. environment: an image that lights the scene.
+    arguments: further ones of farlight-import, such as --at. The models' bytes are held in memory: at most max_bytes. progress:
+    called with "importing", bytes read and bytes in all; 0: not known. Raises FileFailed, or ImportFailed with the importer's
+    message."""
     words = ["--scene", "1", *arguments]
     if environment is not None:
         words += ["--environment", _word(environment), f"--environment-rotation={environment_degrees:.9g}"]
@@ -174,7 +172,7 @@ def load(*models: str | os.PathLike[str], environment: str | os.PathLike[str] | 
     link = address.start_program("farlight-import", words)
     try:
         _run(link, _Import(scene, max_bytes, progress), timeout, ", ".join(map(os.fsdecode, models)) or "environment")
-    except BaseException:  # a Ctrl-C, too: it need not go on
+    except BaseException:  # an interrupted importer need not finish
         link.end()
         raise
     finally:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Requests on their way, and the frames of those that are jobs. No I/O; what comes is checked against what was asked for."""
+"""Requests in flight, and the frames of jobs. No I/O; received messages are checked against the request."""
 from __future__ import annotations
 
 import collections
@@ -16,16 +16,16 @@ from .objects import Names
 
 @dataclass
 class Pending:
-    """A request on its way."""
+    """A request in flight."""
     finals: tuple[type[Message], ...]
-    extra: Optional[type[Message]] = None  # what may come once before the answer
+    extra: Optional[type[Message]] = None  # message that may arrive once before the answer
     came: Optional[Message] = None
     answer: Optional[Message] = None
 
 
 @dataclass
 class Job:
-    """A request whose frames come on a channel of its own."""
+    """A request whose frames arrive on a channel of its own."""
     request: int
     channel: int
     render: messages.Render
@@ -44,7 +44,7 @@ class Job:
         return self.render.kind == messages.JobKind.VIEW
 
     def check_begin(self, begin: messages.FrameBegin) -> None:
-        """That it is a frame of what was asked for: no more than that is kept."""
+        """Checks that the frame matches the request, so that no more than that is kept."""
         render, pixels = self.render, begin.width * begin.height
         width = render.crop_width or render.width * render.views_across
         height = render.crop_height or render.height * render.views_down
@@ -70,7 +70,7 @@ class Job:
         return (render.crop_x, render.crop_y, render.width, render.height) if render.crop_width else None
 
     def take(self, message: Message) -> Optional[Frame]:
-        """A frame's message; the frame that is complete with it."""
+        """Handles a message of a frame; returns the frame that it completes."""
         if isinstance(message, messages.FrameBegin):
             if not self.is_abandoned:
                 self.check_begin(message)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A scene as its client keeps it: objects by kind and number, each the message that makes it. No connection: clients send
-what has changed since the last time; to a new connection they send all of it."""
+"""A scene at its client: objects by kind and number, each stored as the message that makes it. No connection: clients send the
+changes since the last time; a new connection gets everything."""
 from __future__ import annotations
 
 import collections
@@ -18,7 +18,7 @@ from .messages import NodeKind, ObjectKind, Sharing
 
 
 class Object(NamedTuple):
-    """An object of a scene: its kind and its number among those of that kind."""
+    """An object of a scene: its kind, and its number among objects of that kind."""
     kind: ObjectKind
     number: int
 
@@ -26,8 +26,8 @@ class Object(NamedTuple):
         return f"<{self.kind.word} {self.number}>"
 
 
-ENVIRONMENT = Object(ObjectKind.ENVIRONMENT, 1)  # of every scene
-ATTACHED_FROM = 1 << 20  # identifiers of new objects in a scene that others have made
+ENVIRONMENT = Object(ObjectKind.ENVIRONMENT, 1)  # part of every scene
+ATTACHED_FROM = 1 << 20  # first identifier of new objects in a scene that other clients have made
 KINDS: dict[type[Message], ObjectKind] = {
     messages.SetNode: ObjectKind.NODE, messages.SetMesh: ObjectKind.MESH, messages.SetSpheres: ObjectKind.SPHERES,
     messages.SetMaterial: ObjectKind.MATERIAL, messages.SetTexture: ObjectKind.TEXTURE,
@@ -41,22 +41,22 @@ SHOWN = {ObjectKind.MESH: NodeKind.MESH, ObjectKind.SPHERES: NodeKind.SPHERES, O
 
 @dataclass(frozen=True, eq=False)
 class Names:
-    """What the objects of a scene were called when it was sent: entries as of Client.objects()."""
+    """Names of the objects of a scene at the time of sending: entries as from Client.objects()."""
     nodes: dict[int, messages.ObjectEntry]
     materials: dict[int, messages.ObjectEntry]
 
     @classmethod
     def of(cls, nodes: Iterable[messages.ObjectEntry], materials: Iterable[messages.ObjectEntry]) -> Names:
-        """Of lists."""
+        """Makes names from lists of objects."""
         return cls({one.object: one for one in nodes}, {one.object: one for one in materials})
 
     def called(self, name: str) -> tuple[set[int], set[int]]:
-        """The numbers of the nodes of that name and of all below them; where there is none, of its materials."""
+        """The numbers of the nodes with this name and of all nodes below them; if there is none, of the materials."""
         nodes = self.below({number for number, entry in self.nodes.items() if entry.name == name})
         return nodes, set() if nodes else {number for number, entry in self.materials.items() if entry.name == name}
 
     def below(self, nodes: set[int]) -> set[int]:
-        """They and all that hang below them."""
+        """Adds all nodes below these nodes."""
         children: dict[int, list[int]] = {}
         for number, entry in self.nodes.items():
             children.setdefault(entry.parent, []).append(number)
@@ -69,7 +69,7 @@ class Names:
 
 
 def kind_of(kind: ObjectKind | str) -> ObjectKind:
-    """By its word, too."""
+    """Converts an object kind or its word."""
     try:
         return ObjectKind(ObjectKind.of(kind))
     except ValueError as why:
@@ -77,7 +77,7 @@ def kind_of(kind: ObjectKind | str) -> ObjectKind:
 
 
 def _check_names(kind: type[Message], given: Iterable[str], known: Sequence[str]) -> None:
-    """InvalidValue for a name that is not known, with those that are like it, else with all."""
+    """Raises InvalidValue for an unknown name, and suggests similar names, else lists all."""
     for name in given:
         if name not in known:
             like = difflib.get_close_matches(name, known)
@@ -86,19 +86,19 @@ def _check_names(kind: type[Message], given: Iterable[str], known: Sequence[str]
 
 
 def make(kind: type[Message], values: dict[str, Any]) -> Any:
-    """A message of those values; one that has no such field is InvalidValue."""
+    """Makes a message with these values; raises InvalidValue for an unknown field."""
     _check_names(kind, values, [field.name for field in kind.FIELDS])
     return kind(**values)
 
 
 def _changeable(edit: Message) -> list[str]:
-    """What change() takes: every field but the object's own number, which would make another object."""
+    """Lists the keywords of change(): every field except the object's own number, which would make another object."""
     lit = isinstance(edit, (messages.SetLight, messages.SetEnvironment))
     return [field.name for field in edit.FIELDS if edit.NAME != f"set_{field.name}"] + ["intensity"] * lit
 
 
 def _with_intensity(edit: Message, values: dict[str, Any]) -> dict[str, Any]:
-    """`intensity` of lights and of the environment is the largest of their colour's numbers, as `farlight view` has it."""
+    """Replaces `intensity` of lights and of the environment, the largest number of their colour, as in `farlight view`."""
     if "intensity" not in values:
         return values
     assert isinstance(edit, (messages.SetLight, messages.SetEnvironment))
@@ -120,10 +120,10 @@ class Objects:
             raise InvalidValue(f"{name!r:.80} is no text", field="scene_open.name")
         self.name, self.is_attached = name, False
         self.version = 0  # counts changes
-        self.notes: list[str] = []  # of an import
-        self._objects: dict[Object, tuple[int, Message, bytes]] = {}  # version, message, and that encoded
-        self._made: dict[Object, int] = {}  # the version that made it
-        self._removed: dict[Object, tuple[int, int]] = {}  # the versions that made and removed it
+        self.notes: list[str] = []  # notes of an import
+        self._objects: dict[Object, tuple[int, Message, bytes]] = {}  # version, message, and its encoding
+        self._made: dict[Object, int] = {}  # version that made the object
+        self._removed: dict[Object, tuple[int, int]] = {}  # versions that made and removed the object
         self._numbers: dict[ObjectKind, int] = {}
         self._blobs: dict[bytes, Bytes] = {}
 
@@ -136,15 +136,15 @@ class Objects:
         return thing in self._objects
 
     def set(self, edit: Message) -> Object:
-        """Creates or replaces an object by its message; what it names in blobs is given by blob(). The message that it
-        already has changes nothing."""
+        """Creates or replaces an object by its message, whose blobs were registered by blob(). An equal message changes
+        nothing."""
         kind = KINDS.get(type(edit))
         if kind is None:
             raise InvalidValue("is no edit of an object", field=getattr(edit, "NAME", "edit"))
         encoded = fields.encode(edit)
         key = ENVIRONMENT if kind == ObjectKind.ENVIRONMENT else Object(kind, getattr(edit, edit.FIELDS[0].name))
         if key in self._objects and self._objects[key][2] == encoded:
-            return key  # as it is: nothing to be sent
+            return key  # unchanged: nothing to send
         self.version += 1
         self._objects[key] = (self.version, copy.copy(edit), encoded)
         self._made.setdefault(key, self._removed[key][0] if key in self._removed else self.version)
@@ -153,7 +153,7 @@ class Objects:
         return key
 
     def check(self, thing: Object, kinds: Iterable[ObjectKind], field: str) -> int:
-        """The number of an argument; InvalidValue where it is no object of those kinds, or is not here."""
+        """The number of an argument; raises InvalidValue if it is not an object of these kinds or not of this scene."""
         if not isinstance(thing, Object) or thing.kind not in kinds:
             wanted = "object" if kinds is ObjectKind else " or ".join(kind.word for kind in kinds)
             raise InvalidValue(f"{thing!r:.80} is no {wanted} of the scene", field=field,
@@ -163,7 +163,7 @@ class Objects:
         return thing.number
 
     def get(self, thing: Object) -> Any:
-        """A copy of the message that makes it; change() changes it."""
+        """A copy of the object's message; use change() to change the object."""
         self.check(thing, ObjectKind, "object")
         if thing in self._objects:
             return copy.copy(self._objects[thing][1])
@@ -174,9 +174,9 @@ class Objects:
 
     @takes(messages.change_keywords)
     def change(self, thing: Object, **values: Any) -> None:
-        """Other values for some of its fields: change(steel, roughness=0.2), change(farlight.ENVIRONMENT, rotation=1).
-        Lights and the environment have `intensity` as well: the largest of the colour's numbers. Type checkers know the
-        fields of all kinds of objects, and not which kind this one is."""
+        """Changes some fields of an object: change(steel, roughness=0.2), change(farlight.ENVIRONMENT, rotation=1). Lights and
+        the environment also have `intensity`: the largest of the colour's numbers. Type checkers know the fields of all kinds
+        of objects, but not which kind this one is."""
         edit = self.get(thing)
         _check_names(type(edit), values, _changeable(edit))
         try:
@@ -186,14 +186,15 @@ class Objects:
         self.set(replace(edit, **values))
 
     def shown(self, node: Object) -> Object | None:
-        """What a node shows: change(shown(light), colour=(9, 9, 9))."""
+        """The object that a node shows: change(shown(light), colour=(9, 9, 9))."""
         self.check(node, (ObjectKind.NODE,), "node")
         edit = self.get(node)
         kind = next((kind for kind, shows in SHOWN.items() if shows == edit.kind), None)
         return None if kind is None else Object(kind, edit.object)
 
     def remove(self, thing: Object) -> None:
-        """With a node all below it, as the daemon does it; refused at the commit if a remaining node uses it."""
+        """Removes an object, and with a node all nodes below it, as at the daemon; the commit fails if a remaining node uses
+        it."""
         self.check(thing, [kind for kind in ObjectKind if kind != ObjectKind.ENVIRONMENT], "object")
         children: dict[int, list[Object]] = {}
         if thing.kind == ObjectKind.NODE:
@@ -203,25 +204,25 @@ class Objects:
         below = [thing]
         for one in below:
             below += children.pop(one.number, ())
-        for one in reversed(below):  # each before what is above it
+        for one in reversed(below):  # children before their parents
             self.version += 1
-            # One that was not set here is another client's: it has been there since before the first version.
+            # An object that was not set here is another client's, and older than the first version.
             self._removed[one] = (self._made.pop(one, 0), self.version)
             self._objects.pop(one, None)
 
     def find(self, kind: ObjectKind | str, name: str) -> list[Object]:
-        """Those of a name: those of a file have the file's."""
+        """Finds the objects with this name; objects from a file have the file's names."""
         wanted = kind_of(kind)
         return [key for key, (_, edit, _) in self._objects.items()
                 if key.kind == wanted and getattr(edit, "name", None) == name]
 
     def objects(self, kind: ObjectKind | str) -> list[Object]:
-        """All of a kind."""
+        """Lists all objects of a kind."""
         wanted = kind_of(kind)
         return [key for key in self._objects if key.kind == wanted]
 
     def blob(self, data: Bytes) -> messages.BlobRef:
-        """Keeps the bytes, and names them."""
+        """Stores the bytes, and returns the reference to them."""
         try:
             view = memoryview(data).cast("B")
         except TypeError:
@@ -231,7 +232,7 @@ class Objects:
         return messages.BlobRef(len(view), name)
 
     def blob_bytes(self, reference: messages.BlobRef) -> Bytes:
-        """Those that it names."""
+        """The stored bytes of a reference."""
         return self._blobs[reference.hash]
 
     def _next(self, kind: ObjectKind) -> int:
@@ -241,7 +242,7 @@ class Objects:
     # ---- for clients
 
     def names(self) -> Names:
-        """Those of now."""
+        """The current names."""
         entries: dict[ObjectKind, list[messages.ObjectEntry]] = {ObjectKind.NODE: [], ObjectKind.MATERIAL: []}
         for key, (_, edit, _) in self._objects.items():
             if isinstance(edit, messages.SetNode):
@@ -251,7 +252,7 @@ class Objects:
         return Names.of(entries[ObjectKind.NODE], entries[ObjectKind.MATERIAL])
 
     def edits_since(self, version: int) -> list[Message]:
-        """What makes of the scene at that version this one."""
+        """Makes the edits that turn the scene at this version into the current one."""
         gone = sorted((at, thing) for thing, (made, at) in self._removed.items() if made <= version < at)
         edits: list[Message] = [messages.Remove(thing.kind, thing.number) for _, thing in gone]
         named = {one.hash for _, edit, _ in self._objects.values() for one in getattr(edit, "arrays", ())}
@@ -259,6 +260,6 @@ class Objects:
         return edits + [edit for at, edit, _ in sorted(self._objects.values(), key=lambda one: one[0]) if at > version]
 
     def blobs_of(self, edits: Iterable[Message]) -> dict[bytes, Bytes]:
-        """By their hashes: those that edits name."""
+        """The blobs that the edits refer to, by hash."""
         named = (one for edit in edits for one in getattr(edit, "arrays", ()) if one.size_bytes)
         return {one.hash: self._blobs[one.hash] for one in named}

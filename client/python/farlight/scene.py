@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Scenes from arrays. Lengths are metres, colours linear Rec. 709, transforms 4 x 4 or 3 x 4 matrices that take a node's
-space to its parent's."""
+"""Scenes from arrays. Lengths are metres, colours linear Rec. 709, transforms 4 x 4 or 3 x 4 matrices from a node's space to
+its parent's."""
 from __future__ import annotations
 
 import math
@@ -22,14 +22,14 @@ from .objects import ENVIRONMENT, SHOWN, Object, Objects, make
 __all__ = ["ENVIRONMENT", "Camera", "CameraOf", "Object", "Scene", "Sharing", "look_at"]
 
 PLACES = tuple(place.name.lower() for place in messages.MaterialTexture)
-RANGES_MAX = 4096  # of a mesh or of spheres
+RANGES_MAX = 4096  # limit for a mesh or for spheres
 MaterialsOf = Union[Sequence[Union[Object, int]], Array, None]
 Textures = Union[Object, Mapping[Union[int, str], Object], None]
 
 
 class Scene(Objects):
-    """Objects by number. `sharing`: who else may attach to it, and whether it lingers (private, kept, shared; the last
-    two need a name). `origin`: what farlight.load() subtracted from all places of a model that is far from the origin."""
+    """A scene: objects by number. `sharing`: which clients may attach to it, and whether it lingers (private, kept, shared; the
+    last two need a name). `origin`: subtracted by farlight.load() from all positions of a model that is far from the origin."""
 
     def __init__(self, name: str = "", sharing: Sharing | str = Sharing.PRIVATE) -> None:
         super().__init__(name, sharing)
@@ -44,7 +44,8 @@ class Scene(Objects):
         return super().set(edit)
 
     def show_unplaced(self) -> None:
-        """Shows what was added and no node shows. Clients do so before they send the scene; one that shows nothing warns."""
+        """Adds nodes for objects that no node shows. Clients call it before they send the scene; without a call the daemon
+        warns about an empty scene."""
         for thing in [one for one in self._unplaced if one in self]:
             self.add_node(thing)
         self._unplaced.clear()
@@ -63,7 +64,7 @@ class Scene(Objects):
     @takes(messages.material_keywords)
     def add_material(self, base_colour: Numbers = (0.8, 0.8, 0.8, 1.0), *, roughness: float = 0.5,
                      textures: Textures = None, **values: Any) -> Object:
-        """A material of glTF 2.0. base_colour: 3 or 4 numbers of 0 .. 1; `values` are other fields of set_material
+        """Adds a material of glTF 2.0. base_colour: 3 or 4 numbers of 0 .. 1; `values` are other fields of set_material
         (messages.SetMaterial). textures: one for the base colour, or {place: texture} with a place of scene.PLACES."""
         wanted = "3 or 4 numbers of 0 .. 1"
         base = arrays.numbers(base_colour, "base_colour", wanted)
@@ -90,8 +91,8 @@ class Scene(Objects):
 
     @takes(messages.texture_keywords)
     def add_texture(self, image: Numbers, *, srgb: bool = True, **values: Any) -> Object:
-        """Height x width (grey), x 3 or x 4, rows from the top: whole numbers of 0 .. 255, or floats, which are clipped to
-        0 .. 1. `srgb`: colours; False: data."""
+        """Adds a texture: height x width (grey), x 3 or x 4, rows from the top; whole numbers of 0 .. 255, or floats, which are
+        clipped to 0 .. 1. `srgb`: colours; False: data."""
         texels = arrays.image(image, "image")
         made = messages.TextureFormat.RGBA8_SRGB if srgb else messages.TextureFormat.RGBA8_LINEAR
         start = {"texture": self._next(ObjectKind.TEXTURE), "width": texels.shape[1], "height": texels.shape[0],
@@ -117,10 +118,10 @@ class Scene(Objects):
     def add_mesh(self, positions: Numbers, triangles: Numbers | None = None, *, material: Object | None = None,
                  materials: MaterialsOf = None, normals: Numbers | None = None, tangents: Numbers | None = None,
                  texcoords: Numbers | None = None, colours: Numbers | None = None, place: bool = True, **values: Any) -> Object:
-        """positions: n x 3. triangles: m x 3 indices, counter-clockwise where they are in front; None: each three
-        positions are one. materials: that of each triangle, or its number, neighbours alike: at most 4096 runs. normals
-        n x 3, tangents n x 4, texcoords n x 2, colours n x 3 or 4, linear, of 0 .. 255 or floats of 0 .. 1. Arrays are
-        copied once. place: it is shown where its positions are, unless a node shows it by the time that the scene is sent."""
+        """Adds a mesh. positions: n x 3. triangles: m x 3 indices, counter-clockwise seen from the front; None: each three
+        positions form a triangle. materials: one for all, or one for each triangle, in at most 4096 runs of equal neighbours.
+        normals n x 3, tangents n x 4, texcoords n x 2, colours n x 3 or 4, linear, of 0 .. 255 or floats of 0 .. 1. Arrays are
+        copied once. place: shows the mesh at its positions, unless a node shows it by the time that the scene is sent."""
         points = arrays.table(positions, "<f4", 3, "positions")
         if triangles is None and len(points) % 3:
             raise InvalidValue(f"{len(points)} points; allowed without triangles: three for each triangle", field="positions",
@@ -144,7 +145,7 @@ class Scene(Objects):
     @takes(messages.spheres_keywords)
     def add_spheres(self, centres: Numbers, radii: Numbers, *, material: Object | None = None, materials: MaterialsOf = None,
                     place: bool = True, **values: Any) -> Object:
-        """Exact spheres: centres n x 3, radii n or one for all; materials and place as of add_mesh()."""
+        """Adds exact spheres: centres n x 3, radii n or one for all; materials and place as for add_mesh()."""
         points = arrays.table(centres, "<f4", 3, "centres")
         wanted = f"one positive number, or one for each of the {len(points)} centres"
         sizes = arrays.numbers(radii, "radii", wanted)
@@ -161,7 +162,7 @@ class Scene(Objects):
     @takes(messages.disc_keywords)
     def add_disc(self, centre: Numbers, normal: Numbers, radius: float, *, material: Object | None = None,
                  **values: Any) -> Object:
-        """A disc in world space, such as a ground."""
+        """Adds a disc in world space, such as a ground."""
         direction = arrays.vector(normal, "normal")
         length = math.hypot(*direction)
         if not length > 0:
@@ -174,7 +175,7 @@ class Scene(Objects):
     # ---- lights, cameras, places
 
     def _place(self, made: Message, transform: Numbers | None, parent: Object | None) -> Object:
-        """The node of something new; nothing is new where the node cannot be."""
+        """Adds the node of a new object, and neither if the node is invalid."""
         fields.encode(made)
         node = self._node(NodeKind.GROUP, 0, transform, parent)
         shows = self.set(made)
@@ -187,42 +188,42 @@ class Scene(Objects):
     @takes(messages.light_keywords)
     def add_light(self, kind: LightKind | str, colour: Numbers, transform: Numbers | None = None,
                   parent: Object | None = None, **values: Any) -> Object:
-        """A light, and the node that places it, which is returned: scene.move(light, ...). The colour is power in the
-        kind's unit: point and spot W/sr, directional W/m2, rectangle and sphere W/(m2 sr)."""
+        """Adds a light and its node, which is returned: scene.move(light, ...). The colour is power in the kind's unit: point
+        and spot W/sr, directional W/m2, rectangle and sphere W/(m2 sr)."""
         start = {"light": self._next(ObjectKind.LIGHT), "kind": kind, "colour": colour}
         return self._place(make(messages.SetLight, {**start, **values}), transform, parent)
 
     @takes(messages.camera_keywords)
     def add_camera(self, fov_degrees: float = 40.0, transform: Numbers | None = None, parent: Object | None = None,
                    **values: Any) -> Object:
-        """A camera of the scene, and the node that places it, which is returned: render(camera=node)."""
+        """Adds a camera and its node, which is returned: render(camera=node)."""
         start = {"camera": self._next(ObjectKind.CAMERA), "fov_y": math.radians(arrays.number(fov_degrees, "fov_degrees"))}
         return self._place(make(messages.SetCamera, {**start, **values}), transform, parent)
 
     @takes(messages.node_keywords)
     def add_node(self, shows: Object | None = None, transform: Numbers | None = None, *, parent: Object | None = None,
                  **values: Any) -> Object:
-        """Puts a mesh, spheres, a light or a camera where it is seen; without `shows` a group."""
+        """Adds a node that places a mesh, spheres, a light or a camera; without `shows` a group."""
         number = 0 if shows is None else self.check(shows, SHOWN, "shows")
         node = self._node(NodeKind.GROUP if shows is None else SHOWN[shows.kind], number, transform, parent)
         make(messages.SetNode, values)
         return self.set(replace(node, **values))
 
     def add_instances(self, shows: Object, transforms: Iterable[Numbers], parent: Object | None = None) -> list[Object]:
-        """The same thing at many places: it is stored once."""
+        """Adds nodes that show an object, stored once, at many places."""
         if not isinstance(transforms, Iterable):
             raise InvalidValue(f"{transforms!r:.80}; allowed: several matrices", field="transforms")
         return [self.add_node(shows, transform, parent=parent) for transform in transforms]
 
     def move(self, node: Object, transform: Numbers) -> None:
-        """Another place for a node."""
+        """Moves a node to another place."""
         self.check(node, (ObjectKind.NODE,), "node")
         self.change(node, parent_from_node=arrays.transform(transform))
 
     @takes(messages.environment_keywords)
     def set_environment(self, colour: Numbers = (1, 1, 1), image: Numbers | None = None, **values: Any) -> Object:
-        """Light from all around; image: height x width x 3 linear floats, equirectangular, rows from +y down; the colour
-        multiplies it. change(farlight.ENVIRONMENT, rotation=1.5) keeps the image."""
+        """Sets the light from all around. image: height x width x 3 linear floats, equirectangular, rows from +y down; the
+        colour multiplies it. change(farlight.ENVIRONMENT, rotation=1.5) keeps the image."""
         start: dict[str, Any] = {"colour": arrays.vector(colour, "colour")}
         if image is not None:
             texels = arrays.sky(image, "image")

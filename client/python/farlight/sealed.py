@@ -20,7 +20,7 @@ from .messages import ErrorCode
 KEY_BYTES = 32
 HELLO_BYTES, PROVING_BYTES, HEAD_BYTES, TAG_BYTES = 72, 64, 8, 17
 PLAIN_MAX_BYTES = 65536
-STATE_BYTES = 52  # of crypto_secretstream_xchacha20poly1305_state
+STATE_BYTES = 52  # size of crypto_secretstream_xchacha20poly1305_state
 MESSAGE, FINAL = 0, 3  # tags
 WRONG_KEY, TOO_MANY, NO_KEY, OTHER_VERSION = 1, 2, 3, 4
 REFUSALS = {
@@ -42,7 +42,7 @@ def _sodium() -> ctypes.CDLL:
 
 
 def read_key(path: str | os.PathLike[str]) -> bytes:
-    """The 32 bytes of a key file, which its owner alone may read or write."""
+    """Reads the 32 bytes of a key file, which only its owner may be able to read or write."""
     name = os.fspath(path)
     try:
         with open(os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK), "rb") as file:
@@ -72,7 +72,8 @@ def _blake2b(key: bytes, *parts: bytes) -> bytes:
 
 
 class Seal:
-    """A client's end. receive() turns what came into plain text; seal() the other way; `out` is to be sent."""
+    """A client's end of a sealed connection. receive() turns received bytes into plain text, seal() the reverse; `out` is to be
+    sent."""
 
     def __init__(self, key: bytes) -> None:
         self._key, self._in, self.out = key, bytearray(), bytearray()
@@ -82,12 +83,12 @@ class Seal:
         self._answer = self._proving = self._up = self._down = b""
         self._sending: ctypes.Array[ctypes.c_char] | None = None
         self._receiving: ctypes.Array[ctypes.c_char] | None = None
-        self.is_whole = False  # the last record has come: nothing was left off
+        self.is_whole = False  # the last record has arrived: nothing is missing
         self.out += self._hello
 
     @property
     def may_seal(self) -> bool:
-        """Records may be sent, which is before the daemon's proof has come."""
+        """True once records may be sent, which is before the daemon's proof arrives."""
         return self._sending is not None
 
     # ---- handshake
@@ -97,7 +98,7 @@ class Seal:
         return _blake2b(self._key, label.ljust(32, b"\0"), self._up, self._down, self._hello, self._answer)
 
     def _message(self, number: int, size: int) -> bytes:
-        """The next message of the daemon; empty: it has not come. What is wrong is said as soon as it is seen."""
+        """Handles the next message of the daemon; empty: it is incomplete. A fault is reported as soon as its byte is there."""
         begun, wanted = bytes(self._in[:HEAD_BYTES]), _head(number)
         for i, byte in enumerate(begun):
             if i != 5 and byte != wanted[i]:
@@ -142,7 +143,7 @@ class Seal:
     # ---- records
 
     def seal(self, plain: Bytes) -> None:
-        """Appends records to `out`. Empty: the last one."""
+        """Appends records to `out`. Empty plain text makes the last one."""
         if self._sending is None:
             raise ProtocolError("nothing can be sealed yet", field="sealed")
         sodium = _sodium()
@@ -157,7 +158,7 @@ class Seal:
             self.out += length + record.raw
 
     def _open(self) -> bytes | None:
-        """The plain text of the next record; None: it has not come."""
+        """Opens the next record; None: it is incomplete."""
         if len(self._in) < 4:
             return None
         size = int.from_bytes(self._in[:4], "little")
@@ -178,7 +179,7 @@ class Seal:
         return plain.raw[:size - TAG_BYTES]
 
     def receive(self, data: Bytes) -> bytes:
-        """The plain text that is complete with it; ProtocolError or Refused."""
+        """Processes received bytes; returns the plain text that is complete; raises ProtocolError or Refused."""
         self._in += data
         plain = bytearray()
         if not self._answer and (answer := self._message(2, HELLO_BYTES)):
@@ -194,6 +195,6 @@ class Seal:
         return bytes(plain)
 
     def check_end(self) -> None:
-        """The other side has closed: ConnectionLost where something was left off."""
+        """Handles a close by the other side; raises ConnectionLost if something is missing."""
         if not self.is_whole:
             raise ConnectionLost("the daemon closed the connection, or it was cut on the way: its sealed end is missing")
