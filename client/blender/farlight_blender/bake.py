@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Surfaces whose materials come from nodes that no field says: pictures of what the nodes say, laid out by the active UV map."""
+"""Baked textures: pictures of the values of nodes that no field of a material can express, laid out by the active UV map."""
 from __future__ import annotations
 
 import functools
@@ -14,14 +14,15 @@ import numpy as np
 from .shading import Points
 
 SIZE_MAX, SIZE_MIN = 1024, 128  # texels along a side
-AT_FULL_SIZE = 4  # meshes with one material whose pictures have the full size; more have smaller ones, as many texels in all
-SAMPLES = 4096  # of a mean
-MARGIN = 1.5  # texels beyond a triangle's edges, which filtering reaches
-BATCH = 1 << 20  # texels that are tried at once
+# Up to this number of meshes with one material, its pictures have the full size; beyond it the total number of texels stays
+AT_FULL_SIZE = 4
+SAMPLES = 4096  # samples of a mean
+MARGIN = 1.5  # texels beyond a triangle's edges that filtering reaches
+BATCH = 1 << 20  # texels tested at once
 
 
 def size_for(users: int) -> int:
-    """Of the pictures of a material that so many meshes have."""
+    """Size of the pictures of a material that this number of meshes have."""
     size = SIZE_MAX
     while size > SIZE_MIN and (size / SIZE_MAX) ** 2 * users > AT_FULL_SIZE:
         size //= 2
@@ -30,14 +31,15 @@ def size_for(users: int) -> int:
 
 @dataclass
 class Picture:
-    """Texels of a square that triangles cover. transform: rows (a b c), (d e f) of the protocol, from its texture coordinates."""
+    """The texels of a square that triangles cover. transform: rows (a b c), (d e f) of the protocol, from the mesh's texture
+    coordinates."""
     size: int
     texels: Any
     points: Points
     transform: tuple[float, ...]
 
     def filled(self, values: Any) -> Any:
-        """Size x size (x width) of what was found at the points; what no triangle covers is their mean."""
+        """Makes an image of size x size (x width) from values at the points; texels without a triangle get their mean."""
         made = np.empty((self.size * self.size, *values.shape[1:]), np.float32)
         made[:] = values.mean(axis=0)
         made[self.texels] = values
@@ -45,7 +47,7 @@ class Picture:
 
 
 def _batches(corners: Any) -> Iterator[tuple[Any, Any]]:
-    """Numbers of triangles, and the texels of their bounds, n x texels x 2: triangles of a size together."""
+    """Yields numbers of triangles, and the texels of their bounds, n x texels x 2; triangles of similar size form a batch."""
     low = np.floor(corners.min(axis=1)).astype(np.int64)
     span = (np.ceil(corners.max(axis=1)).astype(np.int64) - low).max(axis=1)
     side = 1 << np.ceil(np.log2(np.maximum(span, 1))).astype(np.int64)
@@ -59,12 +61,14 @@ def _batches(corners: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def _covered(corners: Any, size: int) -> tuple[Any, Any, Any]:
-    """Of a square of texels those that triangles cover (m x 3 x 2 texels): which, by which triangle, and the weights of its corners."""
+    """Finds the covered texels of a square, for triangles of m x 3 x 2 texels: their indices, triangles and barycentric
+    weights."""
     owner = np.full(size * size, -1, np.int64)
     triangles, weights = np.zeros(size * size, np.int64), np.zeros((size * size, 3))
-    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # across from each corner
+    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # opposite edge of each corner
     area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    heights = np.abs(area)[:, None] / np.maximum(np.sqrt((edges ** 2).sum(axis=2)), 1e-12)  # texels from each corner to its edge
+    # Texels from each corner to its opposite edge
+    heights = np.abs(area)[:, None] / np.maximum(np.sqrt((edges ** 2).sum(axis=2)), 1e-12)
     useful = np.flatnonzero(np.abs(area) > 1e-9)
     grown = np.stack((corners.min(axis=1) - MARGIN, corners.max(axis=1) + MARGIN), axis=1)
     for chosen, texels in _batches(grown[useful]):
@@ -79,7 +83,7 @@ def _covered(corners: Any, size: int) -> tuple[Any, Any, Any]:
         for rank, accepted in ((0, (beyond >= -MARGIN) & (beyond < 0)), (1, beyond >= 0)):
             found = np.nonzero(accepted & is_there)
             at = texels[found][:, 1] * size + texels[found][:, 0]
-            free = owner[at] < 2 * rank  # what lies beyond an edge leaves what lies within one
+            free = owner[at] < 2 * rank  # a texel beyond an edge never replaces one within a triangle
             at, found = at[free], tuple(one[free] for one in found)
             owner[at], triangles[at], weights[at] = rank, which[found[0]], shares[found]
     there = np.flatnonzero(owner >= 0)
@@ -87,14 +91,14 @@ def _covered(corners: Any, size: int) -> tuple[Any, Any, Any]:
 
 
 class Surface:
-    """A mesh of Blender's while it is read. `key` is its own."""
+    """A mesh of Blender's while it is read. `key` identifies it."""
 
     def __init__(self, mesh: bpy.types.Mesh, key: Hashable) -> None:
         self.key, self._mesh = key, mesh
 
     @functools.cached_property
     def _arrays(self) -> dict[str, Any]:
-        """Of each corner; "uv" only where there is a map."""
+        """Arrays with a value for each corner; "uv" only if there is a map."""
         from .meshes import read, shape  # pylint: disable=import-outside-toplevel,cyclic-import
         mesh = self._mesh
         mesh.calc_loop_triangles()
@@ -111,14 +115,14 @@ class Surface:
 
     @functools.cached_property
     def digest(self) -> bytes:
-        """The same for the same arrays."""
+        """A digest that is equal for equal arrays."""
         hashed = hashlib.blake2b(digest_size=16)
         for name, values in self._arrays.items():
             hashed.update(name.encode() + np.ascontiguousarray(values).tobytes())
         return hashed.digest()
 
     def extent(self) -> float:
-        """The smallest side of its bounds."""
+        """The smallest side of the bounds."""
         place = self._arrays["place"]
         return float((place.max(axis=0) - place.min(axis=0)).min()) if len(place) else 0.0
 
@@ -127,7 +131,7 @@ class Surface:
         return chosen if len(chosen) else self._arrays["triangles"]
 
     def _points(self, corners: Any, weights: Any) -> Points:
-        """Inside triangles (n x 3 corners)."""
+        """Random points inside triangles (n x 3 corners)."""
         arrays = self._arrays
 
         def inside(values: Any) -> Any:
@@ -144,7 +148,7 @@ class Surface:
                       inside(arrays["normal"]), colours)
 
     def samples(self, slot: int) -> Optional[Points]:
-        """Places all over the triangles of a slot, always the same."""
+        """Places spread over the triangles of a slot, always the same ones."""
         triangles = self._triangles(slot)
         if not len(triangles):
             return None
@@ -172,14 +176,14 @@ class Surface:
 
 
 def anywhere() -> Points:
-    """For what has no mesh, such as hairs: the unit square."""
+    """Points of the unit square, for objects without a mesh, such as hairs."""
     uv = np.random.default_rng(1).random((SAMPLES, 2)).astype(np.float32)
     place = np.column_stack((uv, np.full(SAMPLES, 0.5, np.float32)))
     return Points(uv, place, place, np.tile(np.array((0, 0, 1), np.float32), (SAMPLES, 1)), lambda name: None)
 
 
 def digest_of(tree: bpy.types.NodeTree, of_image: Callable[[bpy.types.Image], bytes]) -> bytes:
-    """The same for the same nodes, those of groups included."""
+    """A digest that is equal for equal nodes, including those of groups."""
     hashed = hashlib.blake2b(digest_size=16)
 
     def add(*given: Any) -> None:
@@ -207,6 +211,6 @@ def digest_of(tree: bpy.types.NodeTree, of_image: Callable[[bpy.types.Image], by
     return hashed.digest()
 
 
-# What of a node is where it lies in the editor.
+# Properties of a node that concern its place in the editor only.
 LAYOUT = {"location", "location_absolute", "width", "width_hidden", "height", "select", "show_options", "show_preview", "show_texture", "hide",
           "label", "color", "use_custom_color", "dimensions", "warning_propagation"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Blender's shaders, and mixtures of them, as one material of metal, dielectric and alpha."""
+"""Blender's shaders, and mixtures of them, as a single material of metal, dielectric and alpha."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -12,15 +12,15 @@ import numpy as np
 from . import nodes, shading
 from .shading import Points
 
-# Blender's varnish of 1 mirrors a quarter of what Fresnel's equations say, until 4.0.
+# Before 4.0, Blender's varnish of strength 1 mirrors a quarter of the light that Fresnel's equations give.
 CLEARCOAT_SHARE = 0.25 if bpy.app.version < (4, 0) else 1.0
-# Blender's sheen until 4.0, Schlick's weight of the angle between light and facet, sends 1.2 % of the light from all around. The nearest fibres:
-# by 2 % of the light of three balls below a sky and a panel; those of 4.0 are the same ones as here.
+# Before 4.0, Blender's sheen, Schlick's weight of the angle between light and facet, reflects 1.2 % of uniform light. These
+# fibres are the nearest, within 2 % of the light of three balls below a sky and a panel; the sheen of 4.0 is the protocol's.
 IS_OLD_SHEEN = bpy.app.version < (4, 0)
 SHEEN_SHARE, SHEEN_ROUGHNESS = (0.11, 0.34) if IS_OLD_SHEEN else (1.0, 0.5)
-LEFT_OUT = ("Subsurface", "Subsurface Weight", "Anisotropic", "Specular Tint")  # inputs of the Principled BSDF
+LEFT_OUT = ("Subsurface", "Subsurface Weight", "Anisotropic", "Specular Tint")  # inputs of the Principled BSDF that are ignored
 PLAIN_IOR = 1.5
-PLAIN_MIRROR = 0.04  # of the light from above by that index
+PLAIN_MIRROR = 0.04  # mirrored share of perpendicular light for that index
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 Constant = Any  # a number, or a tuple of three
 
@@ -39,11 +39,11 @@ class Value:
         return self is other or self.socket is not None and self.socket == other.socket and self.scale == other.scale
 
     def unread(self) -> Constant:
-        """The socket's own."""
+        """The value of a socket."""
         return self.socket.default_value[:3] if self.socket is not None else WHITE
 
     def number(self) -> Optional[float]:
-        """Of a constant."""
+        """The constant as a number."""
         return self.constant if self.constant is None or isinstance(self.constant, float) else sum(self.constant) / 3
 
 
@@ -89,7 +89,7 @@ def rest(share: Value) -> Value:
 
 
 def mixed(one: Value, other: Value, share: Value) -> Value:
-    """The share of the other, and for the rest the one."""
+    """Mixes two values: `share` of the other, the rest of the one."""
     if share.constant == 0.0 or one.same(other):
         return one
     if share.constant == 1.0 or one.constant == 0.0 and other.constant == 1.0:
@@ -99,7 +99,7 @@ def mixed(one: Value, other: Value, share: Value) -> Value:
 
 @dataclass
 class Closure:
-    """A shader. kind: the part that matters to mixtures. more: fields of set_material by their names, of which MORE has the defaults."""
+    """A shader. kind: its role in mixtures. more: fields of set_material by name; MORE has the defaults."""
     kind: str
     base: Value = field(default_factory=lambda: constant((0.8, 0.8, 0.8)))
     alpha: Value = field(default_factory=lambda: constant(1.0))
@@ -121,13 +121,13 @@ NAMES = {"DIFFUSE": "Diffuse", "GLOSSY": "Glossy", "GLASS": "Glass", "REFRACTION
 
 
 class Closures:
-    """Reads the shaders of one material. note: says what is lacking."""
+    """Reads the shaders of a material. note: called with missing features."""
 
     def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
 
     def of(self, node: nodes.Node) -> Optional[Closure]:
-        """None: the node is not known."""
+        """Reads a node; None: its type is unknown."""
         read: dict[str, Callable[[nodes.Node], Optional[Closure]]] = {"BSDF_PRINCIPLED": self._principled, "EMISSION": self._emission, "BSDF_DIFFUSE": self._diffuse, "BSDF_GLOSSY": self._glossy,
                 "BSDF_GLASS": self._glass, "BSDF_REFRACTION": self._refraction, "BSDF_TRANSPARENT": self._transparent,
                 "BSDF_TRANSLUCENT": self._translucent, "MIX_SHADER": self._mixture, "ADD_SHADER": self._sum}
@@ -136,7 +136,7 @@ class Closures:
     # ---- values
 
     def value(self, socket: Optional[nodes.Socket], missing: float = 0.0) -> Value:
-        """Of an input."""
+        """Reads an input."""
         if socket is None:
             return constant(missing)
         start = nodes.source(socket)
@@ -172,7 +172,7 @@ class Closures:
                 "clearcoat": times(self.value(nodes.first(node, "Clearcoat", "Coat Weight")), constant(CLEARCOAT_SHARE)),
                 "clearcoat_roughness": self.value(nodes.first(node, "Clearcoat Roughness", "Coat Roughness"))}
         level = nodes.number(nodes.first(node, "Specular", "Specular IOR Level"), 0.5)
-        # Blender's specular is F0 / 0.08; Cycles makes the index of refraction from it, but for glass.
+        # Blender's specular is F0 / 0.08; Cycles derives the index of refraction from it, except for glass.
         share = float(np.sqrt(min(max(0.08 * level, 0), 0.98)))
         is_glass = more["transmission"].constant != 0.0
         more["ior"] = constant(max(nodes.number(node.inputs["IOR"]), 1.0) if is_glass else min((1 + share) / (1 - share), 10.0))
@@ -191,7 +191,7 @@ class Closures:
                        shine, node.inputs["Normal"], more)
 
     def _sheen_colour(self, node: nodes.Node, base: Value) -> Value:
-        """White, and by the tint that of the base, where nothing is metal or glass."""
+        """The sheen's colour: white, tinted by the base, and only where the surface is neither metal nor glass."""
         tint = self.value(node.inputs["Sheen Tint"])
         if not IS_OLD_SHEEN:
             return times(tint, constant(WHITE))
@@ -202,7 +202,7 @@ class Closures:
         return times(mixed(constant(WHITE), own, tint), scattered)
 
     def _emission(self, node: nodes.Node) -> Closure:
-        """Cycles shows a surface of the strength 1 as white: it is radiance."""
+        """Reads an emission. Cycles shows a surface of strength 1 as white: the strength is radiance."""
         shine = times(self.value(node.inputs["Color"]), self.value(node.inputs["Strength"]))
         return Closure("EMISSION", constant(BLACK), emission=shine, more={"specular": constant(0.0)})
 
@@ -235,7 +235,7 @@ class Closures:
     # ---- mixtures
 
     def _parts(self, node: nodes.Node) -> list[Closure]:
-        """Of a mixture. An empty socket is black, as in Cycles."""
+        """Reads the inputs of a mixture. An empty socket is black, as in Cycles."""
         made = []
         for socket in [one for one in node.inputs if one.type == "SHADER"]:
             start = nodes.source(socket)
@@ -277,7 +277,7 @@ class Closures:
         return self._blend(node, one, other, share, alpha)
 
     def _blend(self, node: nodes.Node, one: Closure, other: Closure, share: Value, alpha: Value) -> Closure:
-        """Fields of both, but what a part does not have is the other's."""
+        """Mixes the fields of two closures; a field that only one of them has is taken over."""
         if not one.metallic.same(other.metallic) and not one.base.same(other.base):
             made = _metal_over(one, other, share)
             if made is None:
@@ -288,12 +288,12 @@ class Closures:
         roughness = mixed(one.roughness, other.roughness, share)
         base = mixed(one.base, other.base, share)
         for first, second in ((one, other), (other, one)):
-            if first.get("specular").constant == 0.0 and first.kind != "REFRACTION":  # no lobe that a roughness blurs
+            if first.get("specular").constant == 0.0 and first.kind != "REFRACTION":  # there is no lobe that roughness blurs
                 roughness, more["ior"] = second.roughness, second.get("ior")
             for name, detail in (("clearcoat", "clearcoat_roughness"), ("diffuse_transmission", "diffuse_transmission_colour")):
                 if first.get(name).constant == 0.0:
                     more[detail] = second.get(detail)
-            if first.kind == "TRANSLUCENT":  # its base is none
+            if first.kind == "TRANSLUCENT":  # which has no base
                 base = second.base
         return Closure(one.kind if one.kind == other.kind else "PRINCIPLED", base, alpha, mixed(one.metallic, other.metallic, share), roughness,
                        mixed(one.emission, other.emission, share), self._normal(node, one, other, share), more)
@@ -326,7 +326,7 @@ class Closures:
 
 
 def _coated(below: Closure, above: Closure, share: Value) -> Optional[Closure]:
-    """A mirror of that share over what is scattered. None: it has no one colour."""
+    """Puts a mirror of this share over a scattering closure. None: the mirror's colour varies."""
     if share.constant is None or above.base.constant is None:
         return None
     colour = tuple(min(one / PLAIN_MIRROR, 1000.0) for one in above.base.constant)
@@ -335,8 +335,8 @@ def _coated(below: Closure, above: Closure, share: Value) -> Optional[Closure]:
 
 
 def _metal_over(one: Closure, other: Closure, share: Value) -> Optional[tuple[Closure, Closure]]:
-    """A metal and what scatters light, each of its own colour, as dielectrics with a coloured mirror: what they mirror and what they scatter
-    mix, and either adds up to the mixture's. None: this takes constants."""
+    """Mixes a metal and a scattering closure, each of a single colour, as dielectrics with coloured mirrors: mirrored and
+    scattered light are mixed separately, and both add up to the mixture's. None: a value is not constant."""
     if share.constant is None:
         return None
     parts = []
@@ -351,7 +351,8 @@ def _metal_over(one: Closure, other: Closure, share: Value) -> Optional[tuple[Cl
     mirrored, scattered, edge = (first + (second - first) * share.constant for first, second in zip(*parts))
     if edge <= 0:
         return None
-    below = np.clip(scattered / np.maximum(1 - mirrored, 1e-3), 0, 1).tolist()  # of each colour what is not mirrored gets there
+    # Light that is not mirrored reaches the base, colour by colour
+    below = np.clip(scattered / np.maximum(1 - mirrored, 1e-3), 0, 1).tolist()
     tint = np.clip(mirrored / edge / PLAIN_MIRROR, 0, 1000).tolist()
     more = {"ior": constant(PLAIN_IOR), "specular": constant(float(edge)), "specular_colour": constant(tuple(tint))}
     made = [replace(part, base=constant(tuple(below)), metallic=constant(0.0), more={**part.more, **more}) for part in (one, other)]
@@ -359,7 +360,7 @@ def _metal_over(one: Closure, other: Closure, share: Value) -> Optional[tuple[Cl
 
 
 def _dielectric(below: Closure, above: Closure, ior: float) -> Optional[Closure]:
-    """What is below a mirror by Fresnel's equations. None: it has none of its own kind."""
+    """Puts a mirror by Fresnel's equations over a closure. None: the closure's kind has no such mirror."""
     if below.kind not in {"DIFFUSE", "GLASS", "REFRACTION", "TRANSLUCENT"} or above.base.constant is None:
         return None
     more = {**below.more, "ior": constant(ior), "specular": constant(1.0), "specular_colour": above.base}

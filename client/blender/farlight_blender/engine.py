@@ -16,11 +16,11 @@ from . import cameras, motion, session, settings
 from .mirror import Mirror, forget_all, mirror, moment
 from .viewport import Viewport
 
-NOTHING_THERE = 1e10  # what Blender's depth has where there is no surface
+NOTHING_THERE = 1e10  # Blender's depth where there is no surface
 ALBEDO = "Denoising Albedo"
-GROUP = "Combined_"  # and the name of a light group, as Cycles calls that pass
-NOTES_LIGHT = ("path", "distributed")  # integrators whose samples have one path each
-FULLY_DENOISED = 128  # from so many samples on a daemon's `auto` leaves noise as it is
+GROUP = "Combined_"  # followed by the name of a light group: Cycles' name of that pass
+NOTES_LIGHT = ("path", "distributed")  # integrators whose samples are single paths
+FULLY_DENOISED = 128  # number of samples from which a daemon's `auto` filters no noise
 
 
 def _names(groups: dict[str, int]) -> dict[str, str]:
@@ -34,13 +34,13 @@ def _wanted_layers(layer: bpy.types.RenderLayer, names: dict[str, str]) -> tuple
 
 
 def _steps(samples: int, most: int) -> tuple[int, int]:
-    """How often, and how many samples."""
+    """Number of steps, and samples of each."""
     count = -(-samples // most)
     return count, -(-samples // count)
 
 
 def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Motion]) -> dict[str, Any]:
-    """Fields of render that F12 asks for."""
+    """Fields of a request for F12."""
     chosen = scene.farlight
     most = chosen.step_samples
     if moves is not None and moves.has_watchers():
@@ -52,7 +52,8 @@ def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Moti
             "clamp": settings.clamp_of(chosen), "denoise": chosen.denoise, "background": background, "seed": scene.frame_current}
     if moves is None or not moves.has_any():
         return job
-    if chosen.denoise == "auto" and steps * samples > FULLY_DENOISED:  # which the daemon does not know: it sees frames of few
+    # The daemon cannot know this, as its frames have few samples
+    if chosen.denoise == "auto" and steps * samples > FULLY_DENOISED:
         job["denoise"] = "off"
     return {**job, **moves.job(steps)}
 
@@ -60,7 +61,7 @@ def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Moti
 def _passes(frame: Frame, view: cameras.Lens, names: dict[str, str], is_transparent: bool) -> dict[str, Any]:
     """Arrays by the names of Blender's passes, rows from the top."""
     made = {"Combined": frame.colour}
-    if not is_transparent:  # what is seen of the world is no hole in the picture, however dark it is
+    if not is_transparent:  # the visible world is opaque, however dark
         made["Combined"] = np.array(frame.colour)
         made["Combined"][..., 3] = 1
     words = [one.word for one in frame.layers]
@@ -76,24 +77,24 @@ def _passes(frame: Frame, view: cameras.Lens, names: dict[str, str], is_transpar
 
 
 def _vectors(frame: Frame) -> Any:
-    """As Cycles has them: from here to where a surface was a frame earlier, and from where it will be a frame later to here. Nothing
-    moves where there is no surface."""
+    """Motion vectors as in Cycles: from here to the surface's place a frame earlier, and from its place a frame later to here. Zero
+    where there is no surface."""
     vectors = np.concatenate((frame.motion[..., 2:], -frame.motion[..., :2]), axis=-1)
     return np.where(np.isinf(frame.depth)[..., None], 0, vectors)
 
 
-_told: set[str] = set()  # to those who look at a viewport
+_reported: set[str] = set()  # notes already shown to users of viewports
 
 
 class _Mean:
-    """The picture of frames that each show a part of the shutter's time."""
+    """The mean of frames that each cover a part of the shutter's time."""
 
     def __init__(self, frames: int) -> None:
         self._middle, self._added = frames // 2, 0
         self._images: dict[str, Any] = {}
 
     def add(self, images: dict[str, Any]) -> dict[str, Any]:
-        """What there is with this frame. A depth has no mean: it is that of the middle."""
+        """Adds a frame; returns the images so far. Depths are not averaged: the middle frame's is kept."""
         for name, image in images.items():
             before = self._images.get(name)
             if name == "Depth":
@@ -105,7 +106,7 @@ class _Mean:
 
 
 class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
-    """Blender makes one for each picture."""
+    """The render engine; Blender makes an instance for each picture."""
     bl_idname, bl_label = settings.ENGINE, "farlight"
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True  # for the preview of materials
@@ -114,7 +115,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
     # ---- what Blender calls
 
     def update_render_passes(self, scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> None:
-        """Tells which passes there will be."""
+        """Registers the passes."""
         self.register_pass(scene, layer, "Combined", 4, "RGBA", "COLOR")
         if layer.use_pass_z:
             self.register_pass(scene, layer, "Depth", 1, "Z", "VALUE")
@@ -128,7 +129,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self.register_pass(scene, layer, GROUP + group.name, 3, "RGB", "COLOR")
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """One picture of one view layer."""
+        """Renders a view layer."""
         try:
             self._render(depsgraph)
         except session.Stopped:
@@ -139,11 +140,11 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self._fail(str(why))
 
     def view_update(self, _: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        """The viewport's scene has changed."""
+        """Called after changes of the viewport's scene."""
         self._seen(lambda: self._note(self._viewport_of(depsgraph).update(depsgraph)))
 
     def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        """The viewport is drawn."""
+        """Called to draw the viewport."""
         self._seen(lambda: self._viewport_of(depsgraph).draw(context, depsgraph.scene_eval))
 
     def _viewport_of(self, depsgraph: bpy.types.Depsgraph) -> Viewport:
@@ -152,10 +153,10 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         return self._viewport
 
     def _note(self, notes: list[str]) -> None:
-        """Tells what the viewport lacks: each once a session, as every change of the scene would tell it again."""
+        """Reports features that the viewport lacks, once a session, since every change of the scene would repeat them."""
         for note in notes:
-            if note not in _told:
-                _told.add(note)
+            if note not in _reported:
+                _reported.add(note)
                 self._warn(note)
 
     def _seen(self, action: Callable[[], None]) -> None:
@@ -167,7 +168,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
     # ---- a picture
 
     def say(self, text: str) -> None:
-        """In the picture's or the viewport's corner."""
+        """Shows a text in the picture's or the viewport's corner."""
         self.update_stats("", f"farlight: {text}")
 
     def _warn(self, text: str) -> None:
@@ -206,10 +207,10 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             job = _job(scene, view, moves if motion.is_wanted(scene) else None)
             self._show(result, daemon, image, node, view, job, self._vector_pass(scene, daemon, image, node, view, moves))
         finally:
-            self.end_result(result)  # with what has come
+            self.end_result(result)  # shows the partial picture
 
     def _moves(self, depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> Optional[motion.Motion]:
-        """Evaluates Blender's scene at the keys of what moves, then at the frame's time again."""
+        """Evaluates Blender's scene at the keys of the shutter, then at the frame's time again."""
         scene = depsgraph.scene_eval
         if not motion.is_wanted(scene) and not motion.has_vectors(scene, depsgraph.view_layer_eval):
             return None
@@ -222,7 +223,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
 
     def _vector_pass(self, scene: bpy.types.Scene, daemon: session.Session, image: Mirror, node: Any, view: cameras.Lens,
                      moves: Optional[motion.Motion]) -> dict[str, Any]:
-        """The array of the pass Vector by its name; none where that is not wanted, or nothing moves."""
+        """The pass Vector by its name; empty if it is not wanted or nothing moves."""
         if moves is None or motion.is_wanted(scene) or not moves.has_any():
             return {}
         job = {**view.fields(may_crop=True), "aperture": 0, "tracer": scene.farlight.tracer, **moves.vector_job()}
@@ -248,7 +249,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
 
 
 def _write(layer: bpy.types.RenderLayer, images: dict[str, Any]) -> None:
-    """All passes at once, rows from below: one by one Blender takes them as Python lists, fifty times slower."""
+    """Writes all passes at once, rows from below: set one by one, Blender converts them to Python lists, fifty times slower."""
     nothing = np.zeros(images["Combined"].shape[:2])
     rows = [images[one.name] if one.name in images else np.repeat(nothing[..., None], one.channels, axis=2) for one in layer.passes]
     layer.passes.foreach_set("rect", np.concatenate([one[::-1].astype(np.float32).ravel() for one in rows]))
@@ -272,14 +273,14 @@ def _forget(_: Any) -> None:
 
 
 def register() -> None:
-    """With the add-on."""
+    """Called when the add-on is enabled."""
     bpy.utils.register_class(FarlightEngine)
     bpy.app.handlers.load_pre.append(_forget)
     bpy.app.timers.register(session.idle, persistent=True)
 
 
 def unregister() -> None:
-    """With the add-on."""
+    """Called when the add-on is disabled."""
     bpy.app.timers.unregister(session.idle)
     bpy.app.handlers.load_pre.remove(_forget)
     bpy.utils.unregister_class(FarlightEngine)

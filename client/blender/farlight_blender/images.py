@@ -10,7 +10,7 @@ import numpy as np
 
 
 def pixels(image: bpy.types.Image) -> Optional[Any]:
-    """Height x width x 4 floats as the file has them; None: the image cannot be read."""
+    """Height x width x 4 floats as in the file; None: the image cannot be read."""
     width, height = image.size
     if not width or not height or not image.has_data and not len(image.pixels):
         return None
@@ -25,17 +25,17 @@ def pixels(image: bpy.types.Image) -> Optional[Any]:
 
 
 def is_srgb(image: bpy.types.Image) -> bool:
-    """Whether its numbers are those of a screen; those of float images are linear in Blender."""
+    """True if the numbers are display values; float images are linear in Blender."""
     return not image.is_float and image.colorspace_settings.name == "sRGB"
 
 
 def to_linear(values: Any) -> Any:
-    """From sRGB."""
+    """Converts sRGB to linear values."""
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
 def from_linear(values: Any) -> Any:
-    """To sRGB."""
+    """Converts linear values to sRGB."""
     return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055)
 
 
@@ -48,7 +48,7 @@ def linear(image: bpy.types.Image) -> Optional[Any]:
 
 
 def channel(image: bpy.types.Image, name: str) -> Optional[Any]:
-    """Height x width linear floats: Red, Green, Blue, Alpha, or the grey of a Color."""
+    """A channel of an image, height x width linear floats: Red, Green, Blue, Alpha, or the grey of a Color."""
     values = pixels(image)
     if values is None:
         return None
@@ -61,7 +61,7 @@ def channel(image: bpy.types.Image, name: str) -> Optional[Any]:
 
 
 def digest(image: bpy.types.Image) -> bytes:
-    """The same for the same picture."""
+    """A digest that is equal for equal pictures."""
     values = pixels(image)
     told = repr((image.name_full, image.colorspace_settings.name)).encode()
     return hashlib.blake2b(told if values is None else told + np.ascontiguousarray(values).tobytes(), digest_size=16).digest()

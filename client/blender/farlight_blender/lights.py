@@ -15,29 +15,31 @@ from mathutils import Vector
 if TYPE_CHECKING:
     from .mirror import Mirror
 
-# A point of P watts shines alike in all directions, a spot as if it did: P / 4 pi W/sr.
+# A point of P watts has P / 4 pi W/sr in all directions; a spot has the same within its cone.
 INTENSITY_OF_POWER = 1 / (4 * math.pi)
-# A sphere of the radius r has the same intensity as a point, spread over the disc pi r^2 that it is seen as.
+# A sphere of radius r has the same intensity as a point, spread over its visible disc pi r^2.
 RADIANCE_OF_INTENSITY = 1 / math.pi
-# Cycles takes P of an area A as the radiance P / (4 A), where a Lambertian panel of P watts has P / (pi A).
+# Cycles gives P watts on an area A the radiance P / (4 A), where a Lambertian panel of P watts has P / (pi A).
 RADIANCE_OF_AREA_POWER = 1 / 4
 
 
-# A sun's disc is a sphere so many radii of the scene away: at the scene's edge its light is slanted by a quarter of a degree.
+# A sun's disc becomes a sphere at this multiple of the scene's radius: at the scene's edge its light is off by a quarter of a
+# degree.
 SUN_REACH = 256
-SUN_MIN = 1e-4  # radians; below, it is a point of the sky
-SUN_MAX = 1.5  # of half the angle: the scene is outside of the sphere
-# Cones whose sum is Blender's: where each begins and is full, from the edge (0) to the axis (1) by cosines: first + blend x second.
+SUN_MIN = 1e-4  # radians; a smaller sun is a point of the sky
+SUN_MAX = 1.5  # limit of half the angle, which keeps the scene outside of the sphere
+# Cones whose sum approximates Blender's: where each starts and is full, from the edge (0) to the axis (1) by cosines: first +
+# blend x second.
 CONES = (((0, 0), (0, 0.5)), ((0, 0), (0, 0.85)), ((0, 0), (0.5, 0.5)), ((0.3, 0), (1, 0)))
-HAS_COSINE = bpy.app.version < (4, 0)  # spots of Cycles were weaker by the cosine from their axis until then
-SPOT_MAX = 1.57  # radians from the axis: the protocol's spots end there
+HAS_COSINE = bpy.app.version < (4, 0)  # spots of Cycles were weaker by the cosine from their axis before 4.0
+SPOT_MAX = 1.57  # radians from the axis, the protocol's limit for spots
 GROUPS_MAX = Layer.LIGHT_GROUP7 - Layer.LIGHT_REST
 
 Part = tuple[LightKind, float, dict[str, Any]]  # kind, factor of the colour, other fields
 
 
 def _weights(columns: Any, wanted: Any) -> Any:
-    """Of the columns whose sum is nearest to what is wanted, none below 0: the best of all their sets."""
+    """Finds non-negative weights of columns whose sum is nearest to the wanted one, by trying all sets of columns."""
     best, error = np.zeros(columns.shape[1]), math.inf
     for chosen in range(1, 1 << columns.shape[1]):
         used = [one for one in range(columns.shape[1]) if chosen >> one & 1]
@@ -51,7 +53,7 @@ def _weights(columns: Any, wanted: Any) -> Any:
 
 @functools.lru_cache(64)
 def _cones(half_angle: float, blend: float) -> list[tuple[float, float, float]]:
-    """Weight, inner and outer angle of glTF's cones, whose edges are squares, that together are about Blender's, whose edge is a
+    """Weight, inner and outer angle of cones of glTF, whose edges are squares, that approximate Blender's cone, whose edge is a
     smooth step: within 1 % on average at a blend of 0.15, 3 % at 1."""
     edge = math.cos(half_angle)
     share = (np.arange(256) + 0.5) / 256
@@ -78,7 +80,7 @@ def _area(mirror: Mirror, source: bpy.types.Light, scale: Any) -> Part:
 
 
 def _parts(mirror: Mirror, source: bpy.types.Light, scale: Any, reach: float) -> list[Part]:
-    """What of the protocol's lights together is this one."""
+    """The lights of the protocol that together form this one."""
     if source.type == "SUN":
         if reach <= 0:
             return [(LightKind.DIRECTIONAL, source.energy, {})]
@@ -100,7 +102,7 @@ def _parts(mirror: Mirror, source: bpy.types.Light, scale: Any, reach: float) ->
 
 
 def groups(mirror: Mirror, layer: bpy.types.ViewLayer) -> dict[str, int]:
-    """Light groups of a view layer, by their names."""
+    """Light groups of a view layer, by name."""
     names = [one.name for one in layer.lightgroups]
     for name in names[GROUPS_MAX:]:
         mirror.note(f"the light group {name} is one too many: there may be {GROUPS_MAX}")
@@ -108,7 +110,7 @@ def groups(mirror: Mirror, layer: bpy.types.ViewLayer) -> dict[str, int]:
 
 
 def update(mirror: Mirror, key: Hashable, thing: bpy.types.Object, matrix: Any, radius: float) -> None:
-    """Sets a light and its node. radius: of the scene, from its origin."""
+    """Sets a light and its node. radius: the scene's, from its origin."""
     source = thing.data
     is_disc = source.type == "SUN" and source.angle >= SUN_MIN
     reach = SUN_REACH * radius if is_disc else 0.0

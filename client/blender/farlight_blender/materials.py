@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Blender's materials in the terms of glTF 2.0: closures as fields, images as textures, and what other nodes say as baked ones."""
+"""Blender's materials in the terms of glTF 2.0: closures as fields, images as textures, values of other nodes as baked
+textures."""
 from __future__ import annotations
 
 import math
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 BASE_COLOUR, NORMAL, METALLIC_ROUGHNESS, EMISSION, BUMP = 0, 1, 2, 4, 6  # places in set_material.textures
 UNLINKED = (1, 0, 0, 0, 1, 0)
 WRAPS = {"REPEAT": Wrap.REPEAT, "EXTEND": Wrap.CLAMP, "CLIP": Wrap.CLAMP, "MIRROR": Wrap.MIRROR}
-RANGES = {"specular_colour": 1000.0, "ior": 10.0}  # of fields that may be above 1
+RANGES = {"specular_colour": 1000.0, "ior": 10.0}  # limits of fields that may exceed 1
 
 
 @dataclass
@@ -34,7 +35,7 @@ class Material:
 
 @dataclass
 class _Reading:
-    """One material while it is read."""
+    """The state of reading a material."""
     name: str
     source: Optional[bpy.types.Material] = None
     surface: Optional[bake.Surface] = None
@@ -42,13 +43,14 @@ class _Reading:
     values: dict[str, Any] = field(default_factory=dict)
     textures: dict[int, TextureUse] = field(default_factory=dict)
     colour_attribute: Optional[str] = None
-    is_own: bool = False  # its mesh's alone
+    is_own: bool = False  # belongs to a single mesh
     is_nothing: bool = False
-    points: Optional[shading.Points] = None  # of means
+    points: Optional[shading.Points] = None  # points for means
 
 
 def _uv_transform(node: nodes.Node) -> Optional[tuple[float, ...]]:
-    """Rows (a b c), (d e f) of the protocol, of the Mapping node before an image. None: it is not laid out by the active UV map."""
+    """Rows (a b c), (d e f) of the protocol for the Mapping node before an image. None: the image is not laid out by the active
+    UV map."""
     start = nodes.source(node.inputs["Vector"])
     if start is None or start.node.type == "UVMAP" or (start.node.type == "TEX_COORD" and start.name == "UV"):
         return UNLINKED
@@ -71,7 +73,7 @@ def _uv_transform(node: nodes.Node) -> Optional[tuple[float, ...]]:
 
 
 def _image_of(start: Optional[nodes.Socket]) -> Optional[nodes.Node]:
-    """The node of an image that can be sent as it is."""
+    """The node of an image that can be sent unchanged."""
     if start is None or start.node.type != "TEX_IMAGE" or start.node.projection != "FLAT" or _uv_transform(start.node) is None:
         return None
     return start.node
@@ -82,14 +84,15 @@ def _colour(constant: closures.Constant) -> Any:
 
 
 class Reader:
-    """The materials of one update."""
+    """The materials of an update."""
 
     def __init__(self, mirror: Mirror) -> None:
         self._mirror = mirror
         self._made: dict[Hashable, Material] = {}
 
     def material(self, material: Optional[bpy.types.Material], surface: Optional[bake.Surface] = None, slot: int = 0) -> Material:
-        """That of a slot of a mesh; None: the slot is empty. Without a surface nodes that are not known as they are have their mean."""
+        """The material of a mesh's slot; None: the slot is empty. Without a surface, values of unknown nodes are replaced by
+        their mean."""
         name = material.name_full if material else ""
         own = (name, surface.key, slot) if surface else None
         for key in (name, own):
@@ -135,7 +138,8 @@ class Reader:
             self._volume(reading, volume, is_seen)
 
     def _volume(self, reading: _Reading, node: nodes.Node, is_seen: bool) -> None:
-        """What absorbs is a body of glass, without a surface one that mirrors and bends nothing; nothing else is drawn."""
+        """Reads absorption as a body of glass, which without a surface neither mirrors nor refracts; other volumes are not
+        drawn."""
         density = nodes.number(node.inputs["Density"]) if node.type == "VOLUME_ABSORPTION" and not node.inputs["Density"].is_linked else 0
         colour, is_known = nodes.colour(node.inputs["Color"]) if density > 0 else (closures.BLACK, False)
         if is_known and (not is_seen or reading.values.get("transmission", 0) > 0):
@@ -173,7 +177,7 @@ class Reader:
         return reading.points
 
     def _mean(self, reading: _Reading, value: Value, name: str) -> closures.Constant:
-        """Of what can only be one number or colour."""
+        """Reduces a value to one number or colour."""
         if value.constant is not None:
             return value.constant
         self._note(reading, f"the mean of what its nodes say is its {name}")
@@ -181,8 +185,7 @@ class Reader:
         return tuple(float(one) for one in made) if made.ndim else float(made)
 
     def _picture(self, reading: _Reading, place: int, values: tuple[Value, ...], pack: Callable[..., Any]) -> Optional[Any]:
-        """A texture of what values say at each texel, packed into a picture of 0 .. 1 and what is left over, which is returned.
-        None: there is no place for one."""
+        """Bakes values at each texel into a texture of 0 .. 1, and returns the remaining factors. None: no texture is possible."""
         surface, material = reading.surface, reading.source
         if surface is None or material is None:
             return None
@@ -208,7 +211,7 @@ class Reader:
         return left
 
     def _base(self, reading: _Reading, base: Value, alpha: Value) -> None:
-        """The colour, and what of it is there."""
+        """The colour, and the alpha."""
         start, veil = nodes.source(base.socket), nodes.source(alpha.socket)
         colour, through, image = _colour(base.constant), alpha.constant, _image_of(start)
         is_cut = veil is not None and image is not None and veil.node == image and veil.name == "Alpha" and alpha.scale == 1.0
@@ -227,7 +230,7 @@ class Reader:
             reading.values["alpha_mode"] = AlphaMode.BLEND
 
     def _baked_base(self, reading: _Reading, base: Value, alpha: Value) -> tuple[Any, Any, bool]:
-        """The factors of a picture of both, and whether it has an alpha."""
+        """The factors of a picture of both, and whether it has alpha."""
         colour, through, is_cut = _colour(base.constant), alpha.constant, alpha.constant is None
 
         def pack(colours: Any, veil: Any) -> Any:
@@ -252,7 +255,7 @@ class Reader:
         reading.values["emission"] = tuple(min(max(one, 0), 1e6) for one in colour or closures.BLACK)
 
     def _metallic_roughness(self, reading: _Reading, metallic: Value, roughness: Value) -> None:
-        """One image of both: green and blue."""
+        """Combines both in one image: green and blue."""
         values = {"roughness": roughness, "metallic": metallic}
         found = {name: self._channel(reading, value) for name, value in values.items()}
         is_plain = {name: value.constant is not None or found[name] is not None for name, value in values.items()}
@@ -277,7 +280,7 @@ class Reader:
         self._texture(reading, METALLIC_ROUGHNESS, given[0][0], key, packed, is_srgb=False)
 
     def _channel(self, reading: _Reading, value: Value) -> Optional[tuple[nodes.Node, Any, str]]:
-        """The image that feeds a number: its node, its values and which channel they are."""
+        """The image that feeds a number: its node, its values, and their channel."""
         start = nodes.source(value.socket)
         if start is None or not isinstance(value.scale, float):
             return None
@@ -330,7 +333,7 @@ class Reader:
     # ---- textures
 
     def _use(self, reading: _Reading, place: int, node: nodes.Node, strength: float = 1.0, has_alpha: bool = False) -> bool:
-        """An image at a place of the material; False: it cannot be read."""
+        """Puts an image at a place of the material; False: it cannot be read."""
         values = images.pixels(node.image) if node.image else None
         if values is None:
             self._unread(reading, node)
@@ -348,7 +351,7 @@ class Reader:
         if is_new:
             wrap = WRAPS.get(node.extension, Wrap.REPEAT)
             self._mirror.scene.add_texture(texels, srgb=is_srgb, texture=number, wrap_u=wrap, wrap_v=wrap,
-                                           nearest=int(node.interpolation == "Closest"))  # without its name, which is a file's
+                                           nearest=int(node.interpolation == "Closest"))  # no name, as it would be a file's
         reading.textures[place] = TextureUse(number, 0, _uv_transform(node) or UNLINKED, strength)
 
     def _unread(self, reading: _Reading, node: nodes.Node) -> None:
@@ -356,7 +359,7 @@ class Reader:
 
 
 def _coded(texels: Any) -> Any:
-    """Linear colours as sRGB, and an alpha as it is."""
+    """Converts linear colours to sRGB; alpha stays."""
     made = np.clip(texels, 0, 1)
     made[..., :3] = images.from_linear(made[..., :3])
     return made

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Evaluated meshes as arrays: triangles, split normals, coordinates of the active UV map, colours where a material asks."""
+"""Evaluated meshes as arrays: triangles, split normals, coordinates of the active UV map, colours that materials use."""
 from __future__ import annotations
 
 import functools
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from .mirror import Mirror
 
 DIFFER = "its points differ in number from time to time: its motion leaves out how it deforms"
-Steady = Callable[[str, Any], Any]  # Mirror.steady() of one mesh
+Steady = Callable[[str, Any], Any]  # Mirror.steady() for one mesh
 
 
 def read(items: Any, field: str, width: int, kind: Any = np.float32) -> Any:
-    """One field of each item: n numbers, or n x width."""
+    """Reads a field of all items: n numbers, or n x width."""
     values = np.empty(len(items) * width, kind)
     items.foreach_get(field, values)
     return values.reshape(-1, width) if width > 1 else values
@@ -38,7 +38,7 @@ def _normals(mesh: bpy.types.Mesh) -> Any:
 
 
 def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
-    """Four linear numbers of 0 .. 1 for each corner; None: there are no such ones."""
+    """Linear colours of 0 .. 1, four numbers for each corner; None: there is no such attribute."""
     attribute = mesh.color_attributes.get(name) or mesh.color_attributes.active_color
     if attribute is None:
         return None
@@ -49,12 +49,12 @@ def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
 
 
 def shape(mesh: bpy.types.Mesh) -> Any:
-    """Corners x 6: their positions and normals."""
+    """Positions and normals, corners x 6."""
     return np.column_stack((read(mesh.vertices, "co", 3)[read(mesh.loops, "vertex_index", 1, np.int32)], _normals(mesh)))
 
 
 def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict[str, Any]:
-    """What Scene.add_mesh() takes of each corner."""
+    """Arguments of Scene.add_mesh() for each corner."""
     corners = shape(mesh)
     arrays = {"positions": corners[:, :3], "normals": steady("normals", corners[:, 3:])}
     layer = next((one for one in mesh.uv_layers if one.active_render), None)
@@ -72,7 +72,7 @@ def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict
 
 
 def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Optional[Any]) -> Optional[dict[str, Any]]:
-    """What Scene.add_mesh() takes, and "moves". bent: keys of the shutter x corners x 6, positions and normals."""
+    """Arguments of Scene.add_mesh(), and "moves". bent: keys of the shutter x corners x 6, positions and normals."""
     mesh.calc_loop_triangles()
     triangles = read(mesh.loop_triangles, "loops", 3, np.int32)
     slots = np.clip(read(mesh.loop_triangles, "material_index", 1, np.int32), 0, len(uses) - 1)
@@ -80,13 +80,13 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Op
     triangles, slots = triangles[is_drawn], slots[is_drawn]
     if not len(triangles):
         return None
-    order = np.argsort(slots, kind="stable")  # few runs of materials
+    order = np.argsort(slots, kind="stable")  # sorting gives few runs of materials
     numbers = np.array([use.number for use in uses], np.uint32)
     corners = _corners(mesh, uses, steady)
     if bent is not None:
         bent[..., 3:] = steady("bent", bent[..., 3:])
         corners.update(with_moves(bent))
-    # Corners that are the same in everything are one vertex.
+    # Corners that are equal in everything become one vertex.
     rows = np.column_stack([np.ascontiguousarray(one, np.float32).view(np.uint8)
                             for one in corners.values() if one is not None])
     _, first, vertex = np.unique(rows.view(f"V{rows.shape[1]}").ravel(), return_index=True, return_inverse=True)
@@ -95,8 +95,8 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Op
 
 
 def with_moves(bent: Any) -> dict[str, Any]:
-    """What Scene.add_mesh() takes of the middle key, or the only one, and "moves" to others. bent: keys x vertices x 6, positions
-    and normals."""
+    """Arguments of Scene.add_mesh() from the middle or only key, and "moves" to the others. bent: keys x vertices x 6,
+    positions and normals."""
     middle = bent[MIDDLE if len(bent) > 1 else 0]
     made = {"positions": middle[:, :3], "normals": middle[:, 3:]}
     return {**made, "moves": np.column_stack(list(np.delete(bent, MIDDLE, axis=0) - middle))} if len(bent) > 1 else made
@@ -119,26 +119,26 @@ def with_targets(scene: Scene, arrays: dict[str, Any]) -> dict[str, Any]:
 
 
 class Names:
-    """Keys of meshes: what several objects share has one."""
+    """Keys of meshes; objects that share a mesh share its key."""
 
     def __init__(self) -> None:
         self._keys: dict[Hashable, tuple[str, int]] = {}
         self._named: dict[str, int] = {}
 
     def of(self, thing: bpy.types.Object) -> tuple[tuple[str, int], bool]:
-        """The key of an evaluated object's data, and whether it has not been asked for before."""
+        """The key of an evaluated object's data, and whether it is new."""
         names = tuple(slot.material.name_full if slot.material else "" for slot in thing.material_slots)
         what = thing.name_full if thing.type == "META" else thing.data.as_pointer(), names
         if what in self._keys:
             return self._keys[what], False
-        # The same name may stand for several meshes, of an object and of what geometry nodes make from it.
+        # Several meshes may have the same name: an object's, and those that geometry nodes make from it.
         count = self._named[thing.name_full] = self._named.get(thing.name_full, 0) + 1
         self._keys[what] = thing.name_full, count
         return self._keys[what], True
 
 
 class Shared:
-    """The meshes of one update: what several objects share is read and stored once."""
+    """The meshes of an update; a mesh that objects share is read and stored once."""
 
     def __init__(self, mirror: Mirror, reader: Reader, motion: Optional[Motion]) -> None:
         self._mirror, self._reader, self._motion = mirror, reader, motion
@@ -146,7 +146,7 @@ class Shared:
         self._made: dict[Hashable, tuple[Optional[Object], bool]] = {}
 
     def mesh(self, thing: bpy.types.Object) -> tuple[Optional[Object], bool]:
-        """That of an evaluated object, and whether it deforms while the shutter is open; None: it has no surface."""
+        """The mesh of an evaluated object, and whether it deforms while the shutter is open; None: it has no surface."""
         key, is_new = self._names.of(thing)
         if is_new:
             self._made[key] = self._make(thing, key)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Blender's evaluated scene as a farlight.Scene.
 
-A mirror outlives renders. Each time the whole scene is read again and set again under the numbers that it had; what is the
-same as before is no change of the farlight.Scene and is not sent. All nodes are below one that turns Blender's axes (z up)
-into the protocol's (y up), so that all transforms are Blender's own."""
+A mirror outlives renders. Each update reads the whole scene and sets the objects again under their old numbers; an unchanged
+object is no change of the farlight.Scene and is not sent. All nodes are below one that turns Blender's axes (z up) into the
+protocol's (y up), so that all transforms are Blender's own."""
 from __future__ import annotations
 
 import math
@@ -20,28 +20,29 @@ from mathutils import Vector
 from . import cameras, lights, materials, meshes, motion, strands, world
 
 WORLD_FROM_BLENDER = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
-WITH_SURFACE = {"MESH", "META"}  # the surfaces of curves and texts come as objects of the type mesh beside them
-# Blender adds the normals of faces up in several threads, in any order: by rounding they differ from time to time.
+WITH_SURFACE = {"MESH", "META"}  # surfaces of curves and texts come as further objects of type mesh
+# Blender sums the normals of faces in several threads, in any order, so that they differ by rounding from time to time.
 SAME_DIRECTION = 1e-5
-# What is removed first, as it uses the others, or goes with them.
+# Order of removal: users of other objects first.
 SWEPT = {ObjectKind.CHANNEL: 0, ObjectKind.CLIP: 1, ObjectKind.NODE: 2}
 WITHOUT_FACES = {"CURVES", "POINTCLOUD"}
 NOT_DRAWN = {"VOLUME": "volumes are not drawn: make a surface of it (modifier Volume to Mesh) or render it with Cycles",
              "GPENCIL": "grease pencil is not drawn: convert it to a curve or a mesh"}
 PARTICLES = {"HALO": "halos", "LINE": "lines"}
 
-ROOT, CAMERA = ("root",), ("camera",)  # keys of nodes that stand for no object of a name
+ROOT, CAMERA = ("root",), ("camera",)  # keys of nodes that represent no object of a name
 
 
 def _key(instance: bpy.types.DepsgraphObjectInstance) -> Hashable:
-    """Of the node that stands for it."""
+    """The key of the node of an instance."""
     thing = instance.object
-    name: Hashable = (thing.type, thing.name_full) if thing.type in WITHOUT_FACES else thing.name_full  # beside a mesh of that name
+    # Distinct from a mesh of the same name
+    name: Hashable = (thing.type, thing.name_full) if thing.type in WITHOUT_FACES else thing.name_full
     return (instance.parent.name_full, name, tuple(instance.persistent_id)) if instance.is_instance else name
 
 
 def _has_hairs(instance: bpy.types.DepsgraphObjectInstance) -> bool:
-    """Geometry nodes make meshes under the name of an object, whose hairs are not theirs."""
+    """True if the object's hairs belong to the instance; geometry nodes make meshes under an object's name without its hairs."""
     thing = instance.object
     if not instance.show_particles or thing.type != "MESH":
         return False
@@ -53,7 +54,7 @@ def _hairs_key(key: Hashable, system: str) -> Hashable:
 
 
 def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.Moment:
-    """Where things are, and the shapes of those that deform, at the time that Blender's scene has."""
+    """Places of objects, and shapes of deforming ones, at the current time of Blender's scene."""
     made, names, others = motion.Moment(), meshes.Names(), meshes.Names()
     scene = depsgraph.scene_eval
     for instance in depsgraph.object_instances:
@@ -80,30 +81,30 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
 
 
 class _Extent:
-    """How far from its origin the scene reaches."""
+    """The extent of the scene from its origin."""
 
     def __init__(self) -> None:
         self._radii: dict[Object, float] = {}
         self._farthest = 1e-3
 
     def add(self, shown: Object, thing: bpy.types.Object, matrix: Any) -> None:
-        """An object with a surface, at a place."""
+        """Extends it by an object with a surface, at a place."""
         if shown not in self._radii:
             self._radii[shown] = max(Vector(corner).length for corner in thing.bound_box)
         self._farthest = max(self._farthest, matrix.translation.length + self._radii[shown] * max(abs(one) for one in matrix.to_scale()))
 
     def radius(self) -> float:
-        """A power of two, so that it rarely changes."""
+        """The extent rounded up to a power of two, so that it rarely changes."""
         return float(2 ** math.ceil(math.log2(self._farthest)))
 
 
 class Mirror:
-    """`scene` is what clients send; `notes` is what could not be said in the protocol's terms."""
+    """A mirror of a scene. `scene` is the copy for clients; `notes` lists features that the protocol lacks."""
 
     def __init__(self) -> None:
         self.scene = farlight.Scene()
         self.notes: list[str] = []
-        self.light_groups: dict[str, int] = {}  # the view layer's, of which a node or the world has the number
+        self.light_groups: dict[str, int] = {}  # the view layer's; nodes and the world refer to them by number
         self._steady: dict[tuple[int, str], Any] = {}
         self._numbers: dict[tuple[ObjectKind, Hashable], int] = {}
         self._last: dict[ObjectKind, int] = {}
@@ -115,7 +116,7 @@ class Mirror:
     # ---- for the modules that read Blender's data
 
     def number(self, kind: ObjectKind, key: Hashable) -> int:
-        """Of the object that stands for the key: always the same. Others are removed at the end of update()."""
+        """The number of the key's object, which never changes. Objects that an update does not touch are removed at its end."""
         if (kind, key) not in self._numbers:
             self._last[kind] = self._last.get(kind, 0) + 1
             self._numbers[kind, key] = self._last[kind]
@@ -123,11 +124,11 @@ class Mirror:
         return self._numbers[kind, key]
 
     def is_seen(self, kind: ObjectKind, key: Hashable) -> bool:
-        """Whether this update has set it already."""
+        """True if this update has set the object already."""
         return (kind, key) in self._seen
 
     def steady(self, mesh: int, name: str, values: Any) -> Any:
-        """The directions that a mesh had the last time, if these differ from them by rounding alone."""
+        """The directions that a mesh had in the last update, if these differ by rounding only."""
         before = self._steady.get((mesh, name))
         if before is not None and before.shape == values.shape and np.abs(values - before).max(initial=0) < SAME_DIRECTION:
             return before
@@ -135,21 +136,21 @@ class Mirror:
         return values
 
     def remembered(self, key: Hashable, told: Hashable, make: Callable[[], Any]) -> Any:
-        """What takes long to make, anew where what is told of it differs. Gone after an update that did not ask."""
+        """Caches a slow result until its inputs differ; dropped after an update that does not use it."""
         self._asked.add(key)
         if key not in self._remembered or self._remembered[key][0] != told:
             self._remembered[key] = told, make()
         return self._remembered[key][1]
 
     def note(self, text: str) -> None:
-        """Says once what the picture lacks."""
+        """Records a missing feature once."""
         if text not in self.notes:
             self.notes.append(text)
 
     def place(self, key: Hashable, shows: Object, matrix: Any, thing: bpy.types.Object,
               rigid: Optional[Callable[[Any], Any]] = None, *, bends: bool = False) -> Object:
-        """Shows what stands for a thing at a place in Blender's world. rigid: what is left of a place, for a light or the camera.
-        bends: its mesh has targets."""
+        """Shows an object at a place in Blender's world. rigid: reduces a place, for a light or the camera, to a rigid one.
+        bends: the mesh has targets."""
         node = self.number(ObjectKind.NODE, key)
         if self._motion is not None and not self._motion.follow(key, node, rigid):
             self.note(f"{thing.name}: it is sheared, which its motion leaves out")
@@ -166,7 +167,7 @@ class Mirror:
     def update(self, depsgraph: bpy.types.Depsgraph,
                seen_by: Optional[tuple[bpy.types.Object, cameras.Lens]] = None,
                moves: Optional[motion.Motion] = None) -> Optional[Object]:
-        """Makes the scene what Blender's is. seen_by: a camera; its node is returned. moves: what does."""
+        """Updates the scene to Blender's. seen_by: a camera, whose node is returned. moves: the motion."""
         self._motion = moves
         self._seen.clear()
         self._asked.clear()
@@ -219,7 +220,7 @@ class Mirror:
         gone = [one for one in self._numbers if one not in self._seen]
         for kind, key in sorted(gone, key=lambda one: SWEPT.get(one[0], len(SWEPT))):
             number = self._numbers.pop((kind, key))
-            if Object(kind, number) in self.scene:  # a node has gone with the one above it
+            if Object(kind, number) in self.scene:  # a node is removed together with its parent
                 self.scene.remove(Object(kind, number))
             if kind == ObjectKind.MESH:
                 self._steady = {key: values for key, values in self._steady.items() if key[0] != number}
@@ -229,12 +230,12 @@ _mirrors: dict[Hashable, Mirror] = {}
 
 
 def mirror(key: Hashable) -> Mirror:
-    """That of a scene of Blender's: one for all its renders."""
+    """The mirror of a scene of Blender's, shared by all its renders."""
     return _mirrors.setdefault(key, Mirror())
 
 
 def forget_all() -> list[Mirror]:
-    """Another file has other scenes; those that were there."""
+    """Drops all mirrors, for another file; returns them."""
     gone = list(_mirrors.values())
     _mirrors.clear()
     return gone

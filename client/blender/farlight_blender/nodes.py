@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reading of Blender's shader nodes: where a socket's value comes from, past reroutes, muted nodes and the borders of groups."""
+"""Reading of Blender's shader nodes: sources of sockets, across reroutes, muted nodes and the borders of groups."""
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -8,13 +8,14 @@ from typing import Any, Optional
 import bpy
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-LINKS_MAX = 10000  # from one input; Blender marks links of a circle as invalid
+LINKS_MAX = 10000  # limit for one input; Blender marks cyclic links as invalid
 
 Groups = tuple[Any, ...]  # the nodes of groups that lead to a tree, the outermost first
 
 
 class _Within:
-    """Something of a node tree, and the groups that lead to it: a group used twice has its nodes twice. All else is Blender's."""
+    """A part of a node tree, and the groups that lead to it, since a group used twice has its nodes twice. Other attributes are
+    Blender's."""
 
     def __init__(self, own: Any, groups: Groups) -> None:
         self.own, self.groups = own, groups
@@ -45,7 +46,7 @@ class Node(_Within):
 
 
 class Socket(_Within):
-    """An input or an output; an input that nothing feeds may have the value that a group's node gives it."""
+    """An input or an output; an unlinked input of a group may get its value from the group's node."""
 
     @property
     def node(self) -> Node:
@@ -64,7 +65,7 @@ class Socket(_Within):
 
 
 class Sockets:
-    """Inputs or outputs, as Blender's."""
+    """Inputs or outputs of the node."""
 
     def __init__(self, own: Any, groups: Groups) -> None:
         self._own, self._groups = own, groups
@@ -84,7 +85,7 @@ class Sockets:
 
 
 def _as(given: bpy.types.NodeSocket, wanted: bpy.types.NodeSocket) -> Any:
-    """The value of a socket as one of another type has it, by Cycles' rules: reroutes and muted nodes that nothing feeds are 0."""
+    """Converts a socket's value to another type, by Cycles' rules: unlinked reroutes and muted nodes are 0."""
     value = getattr(given, "default_value", None)
     if value is not None and (given.node.type == "REROUTE" or given.node.mute):
         value = 0.0
@@ -103,7 +104,7 @@ def _named(sockets: Any, like: bpy.types.NodeSocket) -> Optional[bpy.types.NodeS
 
 
 def _behind(start: bpy.types.NodeSocket, groups: Groups) -> tuple[Optional[bpy.types.NodeSocket], Groups]:
-    """The input that an output of no node of its own hands on, and where that is; the output itself: it is one of a real node."""
+    """Follows an output of a reroute, muted node or group to the input behind it; an output of a real node is returned itself."""
     node = start.node
     if node.type == "REROUTE":
         return node.inputs[0], groups
@@ -119,7 +120,7 @@ def _behind(start: bpy.types.NodeSocket, groups: Groups) -> tuple[Optional[bpy.t
 
 
 def _trace(socket: Socket) -> tuple[Optional[Socket], Socket]:
-    """The output of a real node that feeds an input; where none does None, and the input whose own value counts."""
+    """The output of a real node that feeds an input; if there is none, None and the input whose own value counts."""
     at, groups = socket.own, socket.groups
     for _ in range(LINKS_MAX):
         start = next((link.from_socket for link in at.links if link.is_valid and not link.is_muted), None)
@@ -135,7 +136,7 @@ def _trace(socket: Socket) -> tuple[Optional[Socket], Socket]:
 
 
 def source(socket: Optional[Socket]) -> Optional[Socket]:
-    """The output that feeds it; None: it has its own value."""
+    """The output that feeds an input; None: the input has its own value."""
     return None if socket is None else _trace(socket)[0]
 
 
@@ -156,7 +157,7 @@ def volume(tree: bpy.types.NodeTree) -> Optional[Node]:
 
 
 def number(socket: Optional[Socket], missing: float = 0.0) -> float:
-    """Its value, or that of a Value node."""
+    """The value of an input, or of the Value node that feeds it."""
     if socket is None:
         return missing
     start = source(socket)
@@ -167,7 +168,7 @@ def number(socket: Optional[Socket], missing: float = 0.0) -> float:
 
 
 def colour(socket: Socket) -> tuple[tuple[float, float, float], bool]:
-    """Its colour, or that of an RGB node; and whether nothing else feeds it."""
+    """The colour of an input, or of the RGB node that feeds it; and whether no other node feeds it."""
     start = source(socket)
     if start is not None and start.node.type == "RGB":
         value = start.default_value
@@ -177,5 +178,5 @@ def colour(socket: Socket) -> tuple[tuple[float, float, float], bool]:
 
 
 def first(node: Node, *names: str) -> Optional[Socket]:
-    """The input that has one of the names: they differ between versions of Blender."""
+    """The input with one of these names, which differ between versions of Blender."""
     return next((node.inputs[name] for name in names if name in node.inputs), None)

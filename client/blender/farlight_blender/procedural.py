@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-LATTICE_MAX = 1 << 22  # cells; a pattern that has more between its corners is finer than a baked picture, and is its mean
+# Cells; a pattern with more cells between its corners is finer than a baked picture, and is replaced by its mean
+LATTICE_MAX = 1 << 22
 BEGIN = 0xDEADBEEF
 OCTAVES_MAX = 15
 
@@ -20,7 +21,7 @@ def _turned(values: Any, by: int) -> Any:
 
 
 def _hash(*keys: Any) -> Any:
-    """Jenkins' of two to four 32-bit numbers, as numbers of 0 .. 1."""
+    """Jenkins' hash of two to four 32-bit numbers, as numbers of 0 .. 1."""
     shape = np.broadcast_shapes(*(np.shape(key) for key in keys))
     full = [np.broadcast_to(np.asarray(key, np.uint32), shape) for key in keys]
     start = np.uint32((BEGIN + (len(keys) << 2) + 13) & 0xFFFFFFFF)
@@ -29,7 +30,7 @@ def _hash(*keys: Any) -> Any:
     if len(keys) > 2:
         c = c + full[2]
     if len(keys) > 3:
-        for first, by in zip((0, 1, 2, 0, 1, 2), (4, 6, 8, 16, 19, 4)):  # its macro `mix`
+        for first, by in zip((0, 1, 2, 0, 1, 2), (4, 6, 8, 16, 19, 4)):  # Jenkins' macro `mix`
             three = [a, b, c]
             x, y, z = three[first], three[(first + 1) % 3], three[(first + 2) % 3]
             x = (x - z) ^ _turned(z, by)
@@ -37,7 +38,7 @@ def _hash(*keys: Any) -> Any:
             three[first], three[(first + 2) % 3] = x, z
             a, b, c = three
         a = a + full[3]
-    for first, by in zip((2, 0, 1, 2, 0, 1, 2), (14, 11, 25, 16, 4, 14, 24)):  # `final`
+    for first, by in zip((2, 0, 1, 2, 0, 1, 2), (14, 11, 25, 16, 4, 14, 24)):  # Jenkins' macro `final`
         three = [a, b, c]
         before = three[(first + 2) % 3]
         three[first] = (three[first] ^ before) - _turned(before, by)
@@ -50,18 +51,18 @@ def _share(hashed: Any) -> Any:
 
 
 def _bits(values: Any) -> Any:
-    return np.ascontiguousarray(np.asarray(values, np.float32) + np.float32(0)).view(np.uint32)  # no negative zero
+    return np.ascontiguousarray(np.asarray(values, np.float32) + np.float32(0)).view(np.uint32)  # avoids negative zero
 
 
 def _colour_of(cells: Any) -> Any:
-    """hash_float3_to_float3."""
+    """Cycles' hash_float3_to_float3."""
     x, y, z = (_bits(cells[..., axis]) for axis in range(3))
     one, two = (_bits(np.float32(number)).reshape(()) for number in (1, 2))
     return np.stack([_share(_hash(x, y, z)), _share(_hash(x, y, z, one)), _share(_hash(x, y, z, two))], axis=-1)
 
 
 def white_noise(points: Any) -> Any:
-    """n x 3; the first is the value."""
+    """White noise, n x 3; the first component is the value."""
     return _colour_of(points)
 
 
@@ -71,7 +72,7 @@ def _offset(seed: int) -> Any:
 
 
 class _Lattice:
-    """The cells about some points, and what a function says of each."""
+    """The cells around points, with the values of a function at each cell."""
 
     def __init__(self, points: Any, margin: tuple[int, int]) -> None:
         self.cells = np.floor(points).astype(np.int64)
@@ -84,7 +85,7 @@ class _Lattice:
         return of(places.reshape(-1, 3))
 
     def at(self, offset: Any) -> Any:
-        """Places in values() of the cells at an offset from each point's own."""
+        """Indices into values() of the cells at an offset from each point's own cell."""
         x, y, z = (self.cells + np.asarray(offset) - self._low).T
         return (x * self._size[1] + y) * self._size[2] + z
 
@@ -92,7 +93,7 @@ class _Lattice:
 # ---- noise
 
 def _signed_noise(points: Any) -> Any:
-    """Perlin's, -1 .. 1."""
+    """Perlin's noise, -1 .. 1."""
     lattice = _Lattice(points, (0, 1))
     if not lattice.is_small:
         return np.zeros(len(points), np.float32)
@@ -100,7 +101,7 @@ def _signed_noise(points: Any) -> Any:
     def directions_of(cells: Any) -> Any:
         return _hash(*(cells[:, axis].astype(np.int32).view(np.uint32) for axis in range(3))) & np.uint32(15)
     chosen = lattice.values(directions_of)
-    # The sixteen directions: two of x, y, z, each with a sign.
+    # The sixteen directions have two of x, y, z, each with a sign.
     directions = np.zeros((16, 3), np.float32)
     for one in range(16):
         u, v = (0 if one < 8 else 1), (1 if one < 4 else 0 if one in (12, 14) else 2)
@@ -131,7 +132,7 @@ def _fractal(points: Any, detail: float, roughness: float) -> Any:
 
 
 def noise(points: Any, detail: float, roughness: float, distortion: float, wants_colour: bool) -> Any:
-    """n x 3; without a colour the value three times."""
+    """Fractal noise, n x 3; without a colour the value three times."""
     if distortion != 0:
         points = points + distortion * np.stack([_signed_noise(points + _offset(seed)) for seed in range(3)], axis=-1)
     value = _fractal(points, detail, roughness)
@@ -159,7 +160,7 @@ def _neighbours() -> Iterator[tuple[int, int, int]]:
 
 
 def voronoi(points: Any, randomness: float, metric: str = "EUCLIDEAN", exponent: float = 0.5, wants_second: bool = False) -> tuple[Any, Any, Any]:
-    """The distance to the nearest point, or to the second, the colour of its cell, and where it is."""
+    """The distance to the nearest or second point, the colour of its cell, and its position."""
     lattice = _Lattice(points, (1, 1))
     if not lattice.is_small:
         return np.full(len(points), 0.5, np.float32), np.full((len(points), 3), 0.5, np.float32), points
@@ -202,13 +203,13 @@ def voronoi_edge(points: Any, randomness: float) -> Any:
 def checker(points: Any) -> Any:
     """1 where the first colour is."""
     cells = np.floor((points + 0.000001) * 0.999999).astype(np.int64)
-    return (cells.sum(axis=1) % 2).astype(np.float32)  # the cell at the origin has the second
+    return (cells.sum(axis=1) % 2).astype(np.float32)  # the cell at the origin has the second colour
 
 
 def brick(points: Any, size: tuple[float, float], mortar: tuple[float, float], bias: float, offset: tuple[float, int],
           squash: tuple[float, int]) -> tuple[Any, Any]:
-    """Which colour each brick has, 0 .. 1, and the share of mortar. size: width and height of a brick; mortar: its size and smoothness;
-    offset, squash: by how much, and of each how many rows."""
+    """The colour weight of each brick, 0 .. 1, and the share of mortar. size: width and height of a brick; mortar: its size and
+    smoothness; offset, squash: an amount, and the number of rows after which it applies."""
     row = np.floor(points[:, 1] / size[1]).astype(np.int64)
     width, shift = np.full(len(points), size[0]), np.zeros(len(points))
     if offset[1] and squash[1]:
@@ -248,7 +249,7 @@ def gradient(points: Any, kind: str) -> Any:
 
 
 def wave(points: Any, kind: str, direction: str, profile: str, distortion: tuple[float, float, float, float], phase: float) -> Any:
-    """distortion: how much, its detail, scale and roughness."""
+    """Waves. distortion: amount, detail, scale and roughness."""
     points = (points + 0.000001) * 0.999999
     axes = {"X": (0,), "Y": (1,), "Z": (2,), "DIAGONAL": (0, 1, 2), "SPHERICAL": (0, 1, 2)}[direction]
     if kind == "BANDS":
@@ -266,7 +267,7 @@ def wave(points: Any, kind: str, direction: str, profile: str, distortion: tuple
 
 
 def magic(points: Any, depth: int, distortion: float) -> Any:
-    """n x 3."""
+    """The magic texture, n x 3."""
     px, py, pz = np.fmod(points, 2 * np.pi).T
     x, y, z = np.sin((px + py + pz) * 5), np.cos((-px + py - pz) * 5), -np.cos((-px - py + pz) * 5)
     if depth > 0:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connections to daemons. Blender forbids Python threads of one's own: a connection lives while it is waited for, in
+"""Connections to daemons. Blender forbids Python threads of an add-on, so a connection runs only while it is waited for, in
 slices, between which Blender is asked whether the user has cancelled."""
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from farlight.aio import AsyncClient
 from farlight.frame import Frame
 
 T = TypeVar("T")
-IDLE_S = 5.0  # a daemon waits longer for a sign of life
-SLICE_S = 0.05  # how late Blender's Esc is noticed
+IDLE_S = 5.0  # a daemon allows longer silence
+SLICE_S = 0.05  # delay until Blender's Esc is noticed
 
 
 class Stopped(Exception):
@@ -28,7 +28,8 @@ def _never() -> bool:
 
 
 class Session:
-    """One daemon. Several of Blender's threads may wait at once, for a render and for the viewport: they take turns."""
+    """A connection to a daemon. Several of Blender's threads may wait at once, for a render and for the viewport: they take
+    turns."""
 
     def __init__(self, server: Optional[str], key_file: Optional[str]) -> None:
         self._server, self._key_file = server, key_file
@@ -37,16 +38,16 @@ class Session:
         self._turn = threading.Lock()
 
     def start(self, operation: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
-        """Begins it; it goes on while anybody waits, or in idle()."""
+        """Starts an operation, which continues while any thread waits, or in idle()."""
         return self._loop.create_task(operation)
 
     def slice(self, task: asyncio.Task[Any], seconds: float) -> None:
-        """Lets all operations go on until this one is done, but not for longer."""
+        """Runs all operations until this one is done."""
         with self._turn:
             self._loop.run_until_complete(asyncio.wait({task}, timeout=seconds))
 
     def wait(self, operation: Coroutine[Any, Any, T], is_stopped: Callable[[], bool] = _never) -> T:
-        """Its result. Raises Stopped, and ends it, once is_stopped() says so."""
+        """Waits for an operation's result. Cancels it and raises Stopped once is_stopped() returns true."""
         task = self.start(operation)
         while True:
             self.slice(task, SLICE_S)
@@ -58,26 +59,26 @@ class Session:
                 raise Stopped
 
     def idle(self) -> None:
-        """Answers the daemon between waits: it would take us for dead."""
+        """Answers the daemon's pings between waits, so that it does not disconnect the client."""
         self.wait(asyncio.sleep(0.001))
 
     async def client(self) -> AsyncClient:
-        """The connection, made at its first use; it is made again by itself when it was lost."""
+        """The connection, made at its first use; it reconnects by itself after a loss."""
         if self._client is None:
             self._client = await farlight.aio.connect(self._server, key_file=self._key_file, name="blender")
         return self._client
 
     async def send(self, scene: farlight.Scene) -> None:
-        """Sends what has changed in the scene."""
+        """Sends the scene's changes."""
         await (await self.client()).send(scene)
 
     async def render(self, scene: farlight.Scene, camera: Any, **values: Any) -> Frame:
-        """As Client.render()."""
+        """Renders a picture; see Client.render()."""
         return await (await self.client()).render(scene, camera, **values)
 
     async def forget(self, scene: farlight.Scene) -> None:
         """Releases a scene that will not be rendered again."""
-        with contextlib.suppress(farlight.Error):  # a daemon that is away has none
+        with contextlib.suppress(farlight.Error):  # a lost daemon has no scene to release
             if self._client is not None:
                 await self._client.close_scene(scene)
 
@@ -88,10 +89,10 @@ class Session:
             async for frame in frames:
                 yield frame
         finally:
-            await frames.aclose()  # cancels the job, if it is not over
+            await frames.aclose()  # cancels the job if it is running
 
     def frames(self, scene: farlight.Scene, camera: Any, is_stopped: Callable[[], bool], **values: Any) -> Iterator[Frame]:
-        """As Client.frames(). Raises Stopped; then the job has been cancelled."""
+        """Renders a range of frames; see Client.frames(). Raises Stopped after cancelling the job."""
         frames = self._frames(scene, camera, values)
 
         async def following() -> Optional[Frame]:
@@ -107,7 +108,7 @@ class Session:
             self.wait(end())
 
     def close(self) -> None:
-        """Says goodbye; a daemon of one's own ends."""
+        """Ends the connection; a private daemon ends, too."""
         if self._client is not None:
             self.wait(self._client.close())
         self.wait(self._loop.shutdown_default_executor())
@@ -118,7 +119,7 @@ _sessions: dict[tuple[Optional[str], Optional[str]], Session] = {}
 
 
 def session(server: Optional[str], key_file: Optional[str]) -> Session:
-    """That of a daemon: one for all renders."""
+    """The connection to a daemon, shared by all renders."""
     key = server, key_file
     if key not in _sessions:
         _sessions[key] = Session(server, key_file)
@@ -126,19 +127,19 @@ def session(server: Optional[str], key_file: Optional[str]) -> Session:
 
 
 def release(scene: farlight.Scene) -> None:
-    """Lets the daemons forget a scene, without waiting for it."""
+    """Releases a scene at the daemons, without waiting."""
     for one in _sessions.values():
         one.start(one.forget(scene))
 
 
 def idle() -> float:
-    """Of all; in how many seconds again."""
+    """Runs idle() of all sessions; returns the delay in seconds until the next call."""
     for one in list(_sessions.values()):
         one.idle()
     return IDLE_S
 
 
 def close_all() -> None:
-    """When the add-on is disabled."""
+    """Ends all connections, when the add-on is disabled."""
     while _sessions:
         _sessions.popitem()[1].close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the user chooses: the daemon in the preferences, the job in the scene; and the panels for it."""
+"""User settings: the daemon in the preferences, the job in the scene; and their panels."""
 from __future__ import annotations
 
 from typing import Any, Optional
@@ -18,7 +18,7 @@ def _choices(words: Any) -> list[tuple[str, str, str]]:
 
 
 class FarlightPreferences(bpy.types.AddonPreferences):  # type: ignore[misc]
-    """Of the add-on."""
+    """Preferences of the add-on."""
     bl_idname = __package__
 
     server: bpy.props.StringProperty(  # type: ignore[valid-type]
@@ -27,13 +27,13 @@ class FarlightPreferences(bpy.types.AddonPreferences):  # type: ignore[misc]
         name="Key file", subtype="FILE_PATH", description="The daemon's key: the connection is sealed; empty: FARLIGHT_KEY over TCP")
 
     def draw(self, _: bpy.types.Context) -> None:
-        """The form."""
+        """Draws the form."""
         self.layout.prop(self, "server")
         self.layout.prop(self, "key_file")
 
 
 class FarlightSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
-    """Of a scene."""
+    """Settings of a scene."""
     server: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Daemon", description="unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] for this scene; empty: the preferences' one")
     integrator: bpy.props.EnumProperty(  # type: ignore[valid-type]
@@ -70,7 +70,7 @@ def server_of(scene: bpy.types.Scene) -> tuple[Optional[str], Optional[str]]:
 
 
 def clamp_of(chosen: FarlightSettings) -> float:
-    """Of F12, and of the viewport, which shows how bright that will be."""
+    """The clamp for F12 and for the viewport, which then has the same brightness."""
     return usual_clamp(chosen.samples) if chosen.use_auto_clamp else float(chosen.clamp)
 
 
@@ -79,7 +79,7 @@ class _Panel(bpy.types.Panel):  # type: ignore[misc]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether it is shown."""
+        """True if the panel is shown."""
         return bool(context.engine == ENGINE)
 
     def _rows(self, owner: Any, *names: str, is_active: bool = True) -> None:
@@ -90,11 +90,11 @@ class _Panel(bpy.types.Panel):  # type: ignore[misc]
 
 
 class FARLIGHT_PT_sampling(_Panel):  # pylint: disable=invalid-name
-    """In the render properties."""
+    """Panel in the render properties."""
     bl_label, bl_context = "Farlight", "render"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The form."""
+        """Draws the form."""
         chosen = context.scene.farlight
         self._rows(chosen, "server", "integrator", "tracer", "samples", "step_samples", "view_samples", "depth", "use_auto_clamp")
         self._rows(chosen, "clamp", is_active=not chosen.use_auto_clamp)
@@ -103,15 +103,15 @@ class FARLIGHT_PT_sampling(_Panel):  # pylint: disable=invalid-name
 
 
 class FARLIGHT_PT_motion(_Panel):  # pylint: disable=invalid-name
-    """In the render properties."""
+    """Panel in the render properties."""
     bl_label, bl_context = "Motion Blur", "render"
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        """Its switch."""
+        """Draws the switch."""
         self.layout.prop(context.scene.render, "use_motion_blur", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The form."""
+        """Draws the form."""
         scene = context.scene
         self.layout.active = scene.render.use_motion_blur
         owner = motion.position_owner(scene)
@@ -122,22 +122,22 @@ class FARLIGHT_PT_motion(_Panel):  # pylint: disable=invalid-name
 
 
 class FARLIGHT_PT_passes(_Panel):  # pylint: disable=invalid-name
-    """In the view layer's properties."""
+    """Panel in the view layer's properties."""
     bl_label, bl_context = "Passes", "view_layer"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The form."""
+        """Draws the form."""
         self._rows(context.view_layer, "use_pass_z", "use_pass_normal")
         self._rows(context.view_layer, "use_pass_vector", is_active=not motion.is_wanted(context.scene))
         self._rows(context.scene.farlight, "use_pass_albedo")
 
 
 class FARLIGHT_PT_light_groups(_Panel):  # pylint: disable=invalid-name
-    """In the view layer's properties: the groups that there are."""
+    """Panel in the view layer's properties: the existing groups."""
     bl_label, bl_context = "Light Groups", "view_layer"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The form."""
+        """Draws the form."""
         layer, row = context.view_layer, self.layout.row()
         row.template_list("UI_UL_list", "lightgroups", layer, "lightgroups", layer, "active_lightgroup_index", rows=3)
         buttons = row.column(align=True)
@@ -149,19 +149,19 @@ class _LightGroup(_Panel):
     bl_label = "Light Group"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The form."""
+        """Draws the form."""
         owner = context.object if self.bl_context == "object" else context.world
         if owner is not None:
             self.layout.prop_search(owner, "lightgroup", context.view_layer, "lightgroups", results_are_suggestions=True)
 
 
 class FARLIGHT_PT_group_of_object(_LightGroup):  # pylint: disable=invalid-name
-    """In an object's properties."""
+    """Panel in an object's properties."""
     bl_context = "object"
 
 
 class FARLIGHT_PT_group_of_world(_LightGroup):  # pylint: disable=invalid-name
-    """In the world's properties."""
+    """Panel in the world's properties."""
     bl_context = "world"
 
 
@@ -170,7 +170,7 @@ _CLASSES = (FarlightPreferences, FarlightSettings, FARLIGHT_PT_sampling, FARLIGH
 
 
 def _others() -> Any:
-    """Blender's own panels for lights, materials, cameras and worlds that any engine may have."""
+    """Blender's own panels for lights, materials, cameras and worlds that any engine may use."""
     left_out = {"VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes"}
     for panel in bpy.types.Panel.__subclasses__():
         if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ()) and panel.__name__ not in left_out:
@@ -178,7 +178,7 @@ def _others() -> Any:
 
 
 def register() -> None:
-    """With the add-on."""
+    """Called when the add-on is enabled."""
     for one in _CLASSES:
         bpy.utils.register_class(one)
     bpy.types.Scene.farlight = bpy.props.PointerProperty(type=FarlightSettings)
@@ -187,7 +187,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """With the add-on."""
+    """Called when the add-on is disabled."""
     for panel in _others():
         panel.COMPAT_ENGINES.discard(ENGINE)
     del bpy.types.Scene.farlight

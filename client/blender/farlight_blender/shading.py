@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What Blender's colour and number nodes say at many points of a surface: for what no field of a material can say."""
+"""Values of Blender's colour and number nodes at many points of a surface, where no field of a material can express them."""
 from __future__ import annotations
 
 import math
@@ -17,25 +17,25 @@ RAMP_STEPS = 1024
 
 
 class Unknown(Exception):
-    """A node that is not known, by its name."""
+    """A node of an unknown type, which is the text."""
 
 
 @dataclass
 class Points:
-    """Of a surface. All are n x 3, but `uv`, n x 2 with Blender's v, which counts from below."""
+    """Points of a surface. Arrays are n x 3, except `uv`, n x 2 with Blender's v, counted from below."""
     uv: Optional[Any]
     generated: Any
     place: Any
     normal: Any
-    colours: Callable[[str], Any]  # those of a colour attribute; None: there are none
-    made: dict[Any, Any] = field(default_factory=dict)  # what nodes have said
+    colours: Callable[[str], Any]  # values of a colour attribute; None: there is none
+    made: dict[Any, Any] = field(default_factory=dict)  # results of nodes
 
     def __len__(self) -> int:
         return len(self.place)
 
 
 def value(socket: nodes.Socket, points: Points) -> Any:
-    """Of an input: n numbers, or n x 3 of a colour or a vector."""
+    """Values of an input: n numbers, or n x 3 for a colour or a vector."""
     start = nodes.source(socket)
     if start is None:
         if socket.type == "VALUE":
@@ -101,7 +101,7 @@ def _axis(socket: nodes.Socket, axis: int, points: Points) -> float:
 
 
 def _where(node: nodes.Node, points: Points, scale: bool = True) -> Any:
-    """The place in a texture."""
+    """The coordinates in a texture."""
     socket = node.inputs["Vector"]
     place = value(socket, points) if socket.is_linked or node.type == "TEX_WHITE_NOISE" else points.generated
     dimensions = getattr(node, "noise_dimensions", None) or getattr(node, "voronoi_dimensions", "3D")
@@ -406,7 +406,7 @@ READ: dict[str, Callable[[nodes.Node, nodes.Socket, Points], Any]] = {
 
 
 def is_constant(socket: nodes.Socket, known: Optional[dict[Any, bool]] = None) -> bool:
-    """Whether what feeds an input is the same everywhere: nodes compute it from numbers alone. `known`: what was found of nodes."""
+    """True if an input is the same everywhere, computed from numbers alone. `known`: results for nodes."""
     start = nodes.source(socket)
     if start is None:
         return True
@@ -418,7 +418,7 @@ def is_constant(socket: nodes.Socket, known: Optional[dict[Any, bool]] = None) -
 
 
 def nowhere() -> Points:
-    """One point, for what is the same everywhere."""
+    """A single point, for values that are the same everywhere."""
     zeros = np.zeros((1, 3), np.float32)
     return Points(None, zeros, zeros, zeros, lambda name: None)
 
@@ -429,14 +429,14 @@ PLACES = {"UVMAP", "VERTEX_COLOR", "ATTRIBUTE"}
 # ---- the view
 
 def ior_of(node: nodes.Node) -> float:
-    """Of Fresnel, and of Layer Weight's."""
+    """The index of refraction of a Fresnel or Layer Weight node."""
     if node.type == "FRESNEL":
         return min(max(nodes.number(node.inputs["IOR"]), 1.0), 10.0)
     return min(1 / max(1 - nodes.number(node.inputs["Blend"]), 0.1), 10.0)
 
 
 def mean_of_view(output: nodes.Socket) -> float:
-    """Of Fresnel or Layer Weight, over the directions from which a surface is lit."""
+    """The mean of Fresnel or Layer Weight over the directions from which a surface is lit."""
     cosine = np.sqrt((np.arange(256) + 0.5) / 256)
     if output.name == "Facing":
         blend = min(max(nodes.number(output.node.inputs["Blend"]), 0), 0.99999)

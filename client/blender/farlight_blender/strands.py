@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What has places and radii and no faces: hairs of particle systems, curves and points.
+"""Objects with places and radii but no faces: hairs of particle systems, curves and points.
 
-Hairs and curves become tubes of triangles, points exact spheres. Which hairs there are and how thick they are is as in Cycles."""
+Hairs and curves become tubes of triangles, points exact spheres. The selection of hairs and their thickness are as in Cycles.
+"""
 from __future__ import annotations
 
 import itertools
@@ -22,13 +23,15 @@ from .motion import Motion
 if TYPE_CHECKING:
     from .mirror import Mirror
 
-SIDES = 6  # of a tube: fur is as light as Cycles' round hairs to 1.4 % on average; with 4 to 2.4 %, with 3 to 3.3 %
+# Number of a tube's sides: fur differs from Cycles' round hairs by 1.4 % of its light on average; with 4 by 2.4 %, with 3 by
+# 3.3 %
+SIDES = 6
 # Tubes are on average as wide as round ones: the mean width of a convex outline is a pi-th of its length.
 WIDER = math.pi / (SIDES * math.sin(math.pi / SIDES))
-SMOOTH = 12  # points that curves of few are brought to: Cycles draws them as splines
-CURVE_RADIUS = 0.005  # metres, of curves without radii: Cycles'
+SMOOTH = 12  # curves with fewer points are subdivided up to this number: Cycles draws them as splines
+CURVE_RADIUS = 0.005  # metres, for curves without radii; Cycles' default
 TINY = 1e-12
-ROUNDING = 1e-5  # metres: Blender tells places of hairs in the world, in which rounding differs as their object moves
+ROUNDING = 1e-5  # metres: Blender reports places of hairs in the world, whose rounding varies as their object moves
 
 
 @dataclass
@@ -36,20 +39,20 @@ class Strands:
     """Points by strand, in the space of their object."""
     points: Any  # n x 3
     radii: Any  # n
-    strand: Any  # n, of each point its strand's number, ascending
-    texcoords: Optional[Any] = None  # of each strand, v from below
+    strand: Any  # n, the number of each point's strand, ascending
+    texcoords: Optional[Any] = None  # for each strand, v from below
     bent: Optional[Any] = None  # keys of the shutter x n x 3: the points of strands that bend
 
 
 # ---- particle systems
 
 def hairs_key(thing: bpy.types.Object, system: bpy.types.ParticleSystem) -> Hashable:
-    """Of the mesh of a particle system's hairs."""
+    """The key of the mesh of a particle system's hairs."""
     return "hairs", thing.name_full, system.name
 
 
 def hairy(thing: bpy.types.Object, is_final: bool) -> Iterator[bpy.types.Modifier]:
-    """Of an evaluated object: its particle systems whose hairs are seen."""
+    """The particle systems of an evaluated object whose hairs are visible."""
     for modifier in thing.modifiers:
         if modifier.type == "PARTICLE_SYSTEM" and (modifier.show_render if is_final else modifier.show_viewport):
             settings = modifier.particle_system.settings
@@ -58,7 +61,7 @@ def hairy(thing: bpy.types.Object, is_final: bool) -> Iterator[bpy.types.Modifie
 
 
 def _numbers(system: bpy.types.ParticleSystem, is_final: bool) -> range:
-    """Of the hairs that are seen. Children come after their parents, which they hide."""
+    """Numbers of the visible hairs. Children come after their parents, which they hide."""
     settings, parents, children = system.settings, len(system.particles), len(system.child_particles)
     if not is_final:
         children = children * settings.display_percentage // 100
@@ -76,7 +79,7 @@ def _thickness(settings: bpy.types.ParticleSettings, share: Any, is_last: Any) -
 
 
 def _steps(settings: bpy.types.ParticleSettings, is_final: bool) -> int:
-    """Points of each hair."""
+    """Number of points of each hair."""
     steps: int = (1 << (settings.render_step if is_final else settings.display_step)) + 1
     if settings.kink == "SPIRAL":
         steps += settings.kink_extra_steps
@@ -84,7 +87,7 @@ def _steps(settings: bpy.types.ParticleSettings, is_final: bool) -> int:
 
 
 def places(thing: bpy.types.Object, system: bpy.types.ParticleSystem, is_final: bool) -> Any:
-    """The points of all hairs of one system, the same number for each, in the space of the object."""
+    """The points of all hairs of a system, the same number for each, in the space of the object."""
     numbers, steps = _numbers(system, is_final) if len(system.particles) else range(0), _steps(system.settings, is_final)
     if not numbers:
         return np.empty((0, 3), np.float32)
@@ -100,7 +103,7 @@ def places(thing: bpy.types.Object, system: bpy.types.ParticleSystem, is_final: 
 
 def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final: bool, points: Any,
                  bent: Optional[Any]) -> Optional[Strands]:
-    """The hairs of one system, of whose places() the points are; None: it has none. bent: these at the keys of the shutter."""
+    """The hairs of a system, from the points of places(); None: it has none. bent: the points at the keys of the shutter."""
     if not len(points):
         return None
     system = modifier.particle_system
@@ -109,7 +112,7 @@ def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final
     every = points[None] if bent is None else bent
     lengths = np.pad(np.linalg.norm(np.diff(every, axis=1), axis=2).max(axis=0), (1, 0))
     lengths[::steps] = 0
-    keep = lengths > 0  # of places that are repeated, at all keys
+    keep = lengths > 0  # drops repeated places, equal at all keys
     keep[::steps] = True
     along = lengths.reshape(-1, steps).cumsum(axis=1)
     share = (along / np.maximum(along[:, -1:], TINY)).ravel()[keep]
@@ -128,7 +131,7 @@ def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final
 # ---- curves
 
 def _smooth(strands: Strands) -> Strands:
-    """With a point between each two (N. Dyn, D. Levin, J. Gregory: A 4-point interpolatory subdivision scheme, 1987)."""
+    """Inserts a point between each two (N. Dyn, D. Levin, J. Gregory: A 4-point interpolatory subdivision scheme, 1987)."""
     strand = strands.strand
     start = np.flatnonzero(strand[1:] == strand[:-1])
     before, after = np.maximum(start - 1, 0), np.minimum(start + 2, len(strand) - 1)
@@ -141,7 +144,7 @@ def _smooth(strands: Strands) -> Strands:
 
 
 def of_curves(data: bpy.types.Curves) -> Optional[Strands]:
-    """Those of an object of the type curves (hair); None: there are none."""
+    """The strands of an object of the type curves (hair); None: there are none."""
     counts = read(data.curves, "points_length", 1, np.int32)
     if not counts.any():
         return None
@@ -161,12 +164,12 @@ def _normalised(vectors: Any, otherwise: Any) -> Any:
 
 
 def _across(directions: Any) -> Any:
-    """To each direction one that is at right angles to it."""
+    """For each direction a perpendicular one."""
     return _normalised(np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=1)]), (1.0, 0.0, 0.0))
 
 
 def _frames(points: Any, strand: Any, like: Optional[Any] = None) -> tuple[Any, Any]:
-    """Two directions across each point's strand, which turn no more than it does. like: the first of each before it bent."""
+    """Two directions across each point's strand, with minimal rotation along it. like: the first of each before it bent."""
     first = np.flatnonzero(np.r_[True, strand[1:] != strand[:-1]])
     counts = np.diff(np.r_[first, len(strand)])
     low, high = np.maximum(np.arange(len(strand)) - 1, np.repeat(first, counts)), np.arange(1, len(strand) + 1)
@@ -184,7 +187,7 @@ def _frames(points: Any, strand: Any, like: Optional[Any] = None) -> tuple[Any, 
 
 
 def tubes(strands: Strands) -> Optional[dict[str, Any]]:
-    """What Scene.add_mesh() takes; None: nothing has a length and a thickness."""
+    """Arguments of Scene.add_mesh(); None: no strand has a length and a thickness."""
     strand = strands.strand
     start = np.flatnonzero((strand[1:] == strand[:-1]) & ((strands.radii[1:] > 0) | (strands.radii[:-1] > 0)))
     if not len(start):
@@ -211,7 +214,7 @@ def tubes(strands: Strands) -> Optional[dict[str, Any]]:
 # ---- points
 
 def rows(data: Any) -> Any:
-    """What of curves or a point cloud may move: of each point its place, and for curves its strand's number."""
+    """Movable data of curves or a point cloud: the place of each point, and for curves its strand's number."""
     if isinstance(data, bpy.types.PointCloud):
         return read(data.points, "co", 3)
     made = of_curves(data)
@@ -219,7 +222,7 @@ def rows(data: Any) -> Any:
 
 
 def of_points(data: bpy.types.PointCloud) -> Optional[tuple[Any, Any]]:
-    """Centres and radii; None: nothing is seen."""
+    """Centres and radii; None: there are no visible points."""
     if "radius" not in data.attributes:
         return None
     centres, radii = read(data.points, "co", 3), read(data.points, "radius", 1)
@@ -229,7 +232,7 @@ def of_points(data: bpy.types.PointCloud) -> Optional[tuple[Any, Any]]:
 # ---- an update
 
 class Shared:
-    """What is read in one update: once, however often it is seen."""
+    """Strands read once in an update, for all their users."""
 
     def __init__(self, mirror: Mirror, reader: Reader, moves: Optional[Motion], is_final: bool) -> None:
         self._mirror, self._reader, self._motion, self._is_final = mirror, reader, moves, is_final
@@ -244,7 +247,7 @@ class Shared:
         return made
 
     def _bent(self, thing: bpy.types.Object, key: Hashable, count: int) -> Optional[Any]:
-        """Rows at the keys of the shutter; None: they stay as they are."""
+        """Rows at the keys of the shutter; None: they do not move."""
         bent, has_changed = self._motion.shape(key, count, ROUNDING) if self._motion else (None, False)
         if has_changed or bent is not None and (bent[..., 3:] != bent[0, :, 3:]).any():
             self._mirror.note(f"{thing.name}: {DIFFER}")
@@ -273,7 +276,7 @@ class Shared:
         return self._tubes(thing, number, made, modifier.particle_system.settings.material - 1)
 
     def hairs(self, thing: bpy.types.Object) -> list[tuple[str, Optional[Object], bool]]:
-        """Of an evaluated object: names and meshes of its particle systems' hairs, and whether they bend while the shutter is open."""
+        """Names and meshes of an evaluated object's hairs by particle system, and whether they bend while the shutter is open."""
         found = []
         for modifier in hairy(thing, self._is_final):
             name = modifier.particle_system.name

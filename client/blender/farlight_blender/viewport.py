@@ -21,12 +21,13 @@ from .mirror import WORLD_FROM_BLENDER, Mirror
 if TYPE_CHECKING:
     from .engine import FarlightEngine
 
-LOOK_S = 0.03  # how often it is looked whether a frame has come
-RETRY_S, RETRY_MAX_S = 1.0, 8.0  # before a view is begun again that has failed, and failed again: each try may be an ssh
+LOOK_S = 0.03  # interval of polling for frames
+# Delay before a failed view is started again, and its maximum, since each attempt may start an ssh
+RETRY_S, RETRY_MAX_S = 1.0, 8.0
 
 
 def _camera(region: bpy.types.Region, view: bpy.types.RegionView3D) -> farlight.Camera:
-    """That of the viewport; one without perspective is shown by one from far away."""
+    """The viewport's camera; a view without perspective becomes one from far away."""
     eye_from_world = np.array(view.view_matrix)
     projection = np.array(view.window_matrix)
     world_from_eye = WORLD_FROM_BLENDER @ np.linalg.inv(eye_from_world)
@@ -39,8 +40,8 @@ def _camera(region: bpy.types.Region, view: bpy.types.RegionView3D) -> farlight.
 
 
 class Viewport:
-    """Of one engine: a mirror of its own, and a job that follows its camera. Nothing here waits: the connection goes on in slices
-    of a timer, so that a daemon that is slow or away holds up nothing of Blender's."""
+    """The viewport of an engine: a mirror of its own, and a job that follows its camera. Nothing here waits: the connection
+    runs in slices of a timer, so that a slow or lost daemon does not block Blender."""
 
     def __init__(self, engine: FarlightEngine, scene: bpy.types.Scene) -> None:
         self._engine = engine
@@ -54,20 +55,20 @@ class Viewport:
         self._pause = RETRY_S
         self._working: Optional[asyncio.Task[Any]] = None  # opens a view, or sends the scene
         self._waiting: Optional[asyncio.Task[Frame]] = None
-        self._pixels: Any = None  # that have come and are no texture yet
+        self._pixels: Any = None  # received pixels, not uploaded as a texture yet
         self._texture: Optional[gpu.types.GPUTexture] = None
         bpy.app.timers.register(self._look)
 
     # ---- what Blender calls
 
     def update(self, depsgraph: bpy.types.Depsgraph) -> list[str]:
-        """Something has changed. What the picture lacks."""
+        """Updates the mirror after a change; returns missing features."""
         self._mirror.update(depsgraph)
         self._is_sent = False
         return self._mirror.notes
 
     def draw(self, context: bpy.types.Context, scene: bpy.types.Scene) -> None:
-        """Draws what there is, and asks for what is seen now."""
+        """Draws the newest frame, and requests the current view."""
         camera = _camera(context.region, context.region_data)
         chosen = scene.farlight
         job = {"width": context.region.width, "height": context.region.height, "integrator": chosen.integrator,
@@ -89,7 +90,7 @@ class Viewport:
     # ---- frames
 
     async def _open(self, job: Any, camera: farlight.Camera) -> None:
-        """Another view in place of the one that there is."""
+        """Replaces the view by another one."""
         if self._view is not None:
             view, self._view = self._view, None
             await view.close()
@@ -98,7 +99,7 @@ class Viewport:
         self._asked, self._camera = job, camera
 
     def _stop(self) -> Optional[AsyncView]:
-        """The view that there was, if any."""
+        """Ends the view, if there is one."""
         for task in (self._working, self._waiting):
             if task is not None:
                 task.cancel()
@@ -106,7 +107,7 @@ class Viewport:
         return view
 
     def _look(self) -> Optional[float]:
-        """A timer of Blender's: lets the connection go on, until the viewport shows something else."""
+        """Called by a timer of Blender's: runs the connection, until the viewport shows something else."""
         try:
             self._engine.is_preview  # pylint: disable=pointless-statement  # raises once Blender has freed the engine
             self._go_on()
@@ -125,12 +126,12 @@ class Viewport:
         return LOOK_S
 
     def _begin(self) -> None:
-        """What is to be done next, if nothing is."""
+        """Starts the next task, if none is running."""
         if self._wanted is not None and self._wanted[0] != self._asked:
             if self._waiting is not None:
                 self._waiting.cancel()
                 self._waiting = None
-            self._is_sent = True  # with the view
+            self._is_sent = True  # sent with the view
             self._working = self._session.start(self._open(*self._wanted))
         elif not self._is_sent and self._view is not None:
             self._is_sent = True

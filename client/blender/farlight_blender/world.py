@@ -12,19 +12,20 @@ from . import images, nodes
 if TYPE_CHECKING:
     from .mirror import Mirror
 
-# The middle of Blender's picture is +x, that of the protocol's -z, which is Blender's +y: a quarter turn about the vertical.
+# The middle of Blender's picture is +x, the middle of the protocol's is -z, which is Blender's +y: a quarter turn about the
+# vertical.
 QUARTER_TURN = -math.pi / 2
 
 
 def _turn(mirror: Mirror, node: nodes.Node) -> float:
-    """How far the picture is turned about the vertical by a Mapping node before it."""
+    """The rotation of the picture about the vertical by a Mapping node before it."""
     mapping = nodes.source(node.inputs["Vector"])
     if mapping is None or mapping.node.type == "TEX_COORD":
         return 0.0
     rotation = mapping.node.inputs["Rotation"].default_value if mapping.node.type == "MAPPING" else (0, 0, 0)
     if mapping.node.type != "MAPPING" or abs(rotation[0]) + abs(rotation[1]) > 1e-6:
         mirror.note("the world's picture is turned about the vertical axis alone")
-    # Mapping turns the direction that is looked up: the picture turns the other way.
+    # Mapping rotates the direction of the lookup, so the picture turns the other way.
     return -float(rotation[2])
 
 
