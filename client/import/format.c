@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Recognition of formats. */
 #include "format.h"
 
 #include <ctype.h>
@@ -7,7 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
-#define HEAD_BYTES 65536u /* of a text that are looked at */
+#define HEAD_BYTES 65536u /* limit of text that is examined */
 
 static bool has_ending(const char *path, const char *ending)
 {
@@ -50,14 +51,15 @@ static uint32_t number_at(const unsigned char *bytes)
     return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
 }
 
-/* A header of 80 bytes, the number of facets, 50 bytes each. Many of them begin with "solid", too. */
+/* Detects binary STL: a header of 80 bytes, the number of facets, 50 bytes for each. Many of these begin with
+ * "solid", too. */
 static bool is_binary_stl(const unsigned char *bytes, size_t size_bytes)
 {
     return size_bytes > 84 && number_at(bytes + 80) > 0 && (size_bytes - 84) / 50 == number_at(bytes + 80) &&
            (size_bytes - 84) % 50 == 0;
 }
 
-/* A word at the begin of a line, with a blank or the line's end behind it. */
+/* Finds a word at the beginning of a line, followed by a blank or the line's end. */
 static bool has_statement(const unsigned char *bytes, size_t size_bytes, const char *word)
 {
     const unsigned char *const end = bytes + size_bytes;
@@ -72,7 +74,7 @@ static bool has_statement(const unsigned char *bytes, size_t size_bytes, const c
     return false;
 }
 
-/* The ending of a text's format; NULL: none is known. */
+/* The ending of a text's format; NULL: unknown. */
 static const char *ending_of_text(const unsigned char *bytes, size_t size_bytes)
 {
     if (begins(bytes, size_bytes, "\xef\xbb\xbf")) { /* byte order mark */
@@ -140,7 +142,7 @@ struct format format_of(const char *name, const unsigned char *bytes, size_t siz
 #define AS_GLTF "write it as glTF "
 
 static const struct {
-    const char *ending, *magic; /* "": by the ending alone */
+    const char *ending, *magic; /* "": recognised by the ending alone */
     const char *what, *remedy;
 } unread[] = {
     {".x", "xof ", "DirectX file", AS_GLTF "by 'assimp export IN.x OUT.glb' (package assimp-utils)"},
@@ -168,7 +170,7 @@ static const char *endings_of_all(char out[256])
     return out;
 }
 
-/* "version 3.3, txt": behind "xof " are four digits and the kind. */
+/* Describes DirectX as "version 3.3, txt": after "xof " follow four digits and the kind. */
 static void describe_directx(const unsigned char *bytes, size_t size_bytes, char out[40])
 {
     int major, minor;

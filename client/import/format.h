@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The format of a model file: by the ending of its name, and where that says nothing by its first bytes. */
+/* The format of a model file, recognised by the ending of its name, or else by its first bytes. */
 #ifndef FARLIGHT_IMPORT_FORMAT_H
 #define FARLIGHT_IMPORT_FORMAT_H
 
@@ -21,15 +21,14 @@ enum format_reader {
 
 struct format {
     enum format_reader reader;
-    const struct assimp_format *assimp; /* of FORMAT_ASSIMP */
+    const struct assimp_format *assimp; /* FORMAT_ASSIMP only */
 };
 
-/* By a name's ending alone. */
+/* Recognises a format by a name's ending alone. */
 struct format format_of_name(const char *name);
-/* A GLB file is one under any name. */
+/* Recognises a format by name and bytes; a GLB file may have any name. */
 struct format format_of(const char *name, const unsigned char *bytes, size_t size_bytes);
-/* Why a file of no known format is not read, and what to do about it. `format`: what the user takes it for, or
- * NULL. */
+/* Explains why a file of unknown format is not read, with advice. `format`: the user's choice, or NULL. */
 void format_explain_unknown(const char *name, const char *format, const unsigned char *bytes, size_t size_bytes,
                             char out[FORMAT_REASON_BYTES]);
 

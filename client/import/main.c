@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* farlight-import: turns a model file into the protocol's messages and speaks them over a socket that the program
- * that started it has connected already. A program of its own so that nothing else links the libraries that read
- * hostile files, and so that it can give up its rights before it does. */
+/* farlight-import: turns a model file into the protocol's messages and sends them over a socket that its parent
+ * has connected. It is a program of its own so that nothing else links the libraries that read hostile files,
+ * and so that it can give up its rights beforehand. */
 #include "import/assimp/import.h"
 #include "import/gltf/import.h"
 #include "import/nff/import.h"
@@ -31,7 +31,7 @@
 #define EXIT_USAGE 2
 #define CPU_SECONDS_MAX 300
 
-/* The C library looks for it by name, past our hidden visibility. */
+/* argp finds this variable by name, despite our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-import " FARLIGHT_VERSION;
 
 struct options {
@@ -188,8 +188,8 @@ static const char *file_part(const char *path)
     return slash && slash[1] ? slash + 1 : path;
 }
 
-/* The libraries talk to standard error on their own; what is worth knowing goes over the socket as a note. The
- * sanitizers' reports must stay to be seen. */
+/* Silences the libraries, which write to standard error on their own; anything important is sent as a note.
+ * Reports of sanitizers must stay visible. */
 static void silence_libraries(void)
 {
 #if !defined(__SANITIZE_ADDRESS__)
@@ -209,7 +209,7 @@ static void leave_at_once(int status)
 #endif
 }
 
-/* The sandbox opens the folders of all models, and that of the modules, which are loaded when they are needed. */
+/* Enters the sandbox, which allows the folders of all models and of the modules, which are loaded when needed. */
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
     char *folders[SOURCES_MAX + 1] = {NULL};
@@ -300,7 +300,7 @@ static bool import_environment(struct import_scene *scene, struct files *files, 
     return !scene->failed;
 }
 
-/* Surfaces and lights so far. Cameras and nodes alone show nothing. */
+/* Counts surfaces and lights; cameras and nodes alone show nothing. */
 static uint32_t count_shown(const struct import_scene *scene)
 {
     return scene->last_id[PROTOCOL_OBJECT_MESH] + scene->last_id[PROTOCOL_OBJECT_SPHERES] +
@@ -415,7 +415,7 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
         return false;
     begin_ns += done.read_ns;
     done.parse_ns = parsed_ns > begin_ns ? parsed_ns - begin_ns : 0;
-    /* The edits come after the blobs and alone say which meshes are closed. */
+    /* The edits are sent after the blobs, and only they contain which meshes are closed. */
     marks = pthread_create(&marker, NULL, mark_closed, scene) == 0;
     sent = sender_notes(sender) && sender_progress(sender, 0, scene->blob_bytes, "hashing") && import_hash(scene);
     done.hash_ns = monotonic_now_ns() - parsed_ns;
@@ -441,7 +441,7 @@ int main(int argc, char **argv)
                                      NULL,
                                      NULL,
                                      NULL};
-    static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
+    static struct import_scene scene; /* static, since the table of notes is too large for the stack */
     uint64_t start_ns = monotonic_now_ns();
     static struct source sources[SOURCES_MAX];
     struct options options = {.socket = -1, .scene = 1, .sources = sources};

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The importer's side of the protocol. */
 #include "send.h"
 
 #include "import/model/edits.h"
@@ -45,7 +46,7 @@ static bool peer_gone(struct sender *sender)
 static bool handle_error(struct sender *sender, uint32_t request, const struct message_error *error)
 {
     if (request != 0 && request < sender->first_upload && request != sender->awaited)
-        return true; /* answers something that is over */
+        return true; /* answers an old request */
     return import_fail(sender->scene, NULL, "the server refused it: %s%s%s%s%s", error->field,
                        error->field[0] ? ": " : "", error->text, error->remedy[0] ? "; " : "", error->remedy);
 }
@@ -102,7 +103,7 @@ static bool handle(struct sender *sender, const struct frame *frame)
     case MESSAGE_GOODBYE:
         return peer_gone(sender);
     default:
-        return true; /* nothing that concerns an import */
+        return true; /* irrelevant to an import */
     }
 }
 
@@ -143,8 +144,8 @@ static bool receive(struct sender *sender)
 
 /* ---- what goes out ---- */
 
-/* Waits until bytes could be sent (if there are some) or have been received. Reading while sending keeps two full
- * sockets from waiting for each other. */
+/* Waits until bytes could be sent (if there are some) or have been received. Reading while sending keeps two
+ * full sockets from waiting for each other. */
 static bool exchange(struct sender *sender)
 {
     struct pollfd poller = {.fd = sender->socket, .events = POLLIN};
@@ -302,7 +303,7 @@ void sender_failure(struct sender *sender)
 
     if (!scene->failed || sender->gone)
         return;
-    scene->failed = false; /* or nothing could be sent any more */
+    scene->failed = false; /* allows sending again */
     if (put_note(sender, &scene->failure))
         flush(sender);
     scene->failed = true;
@@ -310,7 +311,7 @@ void sender_failure(struct sender *sender)
 
 /* ---- blobs ---- */
 
-/* Sends from *offset as much as a message and the credit allow, and moves it on. */
+/* Sends from *offset as much as a message and the credit allow, and advances it. */
 static bool put_piece(struct sender *sender, uint32_t request, const struct import_blob *blob, uint64_t *offset)
 {
     uint64_t piece = blob->size_bytes - *offset;
@@ -346,7 +347,7 @@ static bool put_blob(struct sender *sender, const struct import_blob *blob)
     return true;
 }
 
-/* Offers the blobs at `positions` and sends those that are needed. */
+/* Offers the blobs at `positions` and sends the missing ones. */
 static bool send_lot(struct sender *sender, const uint32_t *positions, uint32_t count, uint64_t *done_bytes)
 {
     struct import_scene *scene = sender->scene;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The sky of models without an environment. */
 #include "sky.h"
 
 #include "import/image/half.h"
@@ -11,8 +12,8 @@
 
 #define ROWS 64u
 #define COLUMNS 2u
-#define DEPTH_MAX 1000 /* of nodes below each other; of hostile files */
-/* Rays from a camera: up, and a little upward to each side. Of a room all but one meet a surface. */
+#define DEPTH_MAX 1000 /* nesting of nodes, limited for hostile files */
+/* Rays from a camera: up, and a little upward to each side. In a room all but one hit a surface. */
 #define RAYS 5
 #define RAYS_OF_A_ROOM 4
 #define SLOPE 0.2
@@ -68,7 +69,7 @@ static bool meets(const struct ray *ray, double corners[3][3])
     cross(from, edges[0], other);
     const double determinant = dot(edges[0], across), u = dot(from, across) / determinant,
                  v = dot(ray->direction, other) / determinant;
-    return u >= 0 && v >= 0 && u + v <= 1 && dot(edges[1], other) / determinant > 0; /* not if it is NaN */
+    return u >= 0 && v >= 0 && u + v <= 1 && dot(edges[1], other) / determinant > 0; /* false for NaN */
 }
 
 static void mark_rays(const struct import_scene *scene, const struct import_edit *edit,

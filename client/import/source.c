@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The models of an import. */
 #include "source.h"
 
 #include "import/model/edits.h"
@@ -14,7 +15,7 @@
 
 /* ---- the command line ---- */
 
-/* Three numbers with commas, or one; *text moves behind them and a colon. */
+/* Reads three numbers with commas, or one; *text moves past them and a colon. */
 static bool take_numbers(const char **text, double *numbers, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
@@ -68,7 +69,7 @@ bool source_read(struct source *source, char reason[FILES_REASON_BYTES])
     source->bytes = files_read_descriptor(&source->files, source->files.model, &source->size_bytes, reason);
     if (!source->bytes)
         return false;
-    /* A format that is named and unknown is a mistake, whatever the bytes are. */
+    /* An unknown format that the user names is a mistake, whatever the bytes are. */
     if (!source->format || source->of.reader != FORMAT_UNKNOWN)
         source->of = format_of(source->format ? name : source->path, source->bytes, source->size_bytes);
     return true;
@@ -100,14 +101,14 @@ static void transform(const struct source *source, float parent_from_node[12])
     placement_to_floats(&placed, parent_from_node);
 }
 
-/* "chair" of "rooms/chair.glb"; standard input is "stdin". */
+/* Writes "chair" for "rooms/chair.glb"; standard input is "stdin". */
 static void write_stem(const struct source *source, char stem[IMPORT_PREFIX_MAX + 1])
 {
     const char *name = is_standard_input(source) ? "stdin" : source_name(source), *dot = strrchr(name, '.');
     char cut[IMPORT_PREFIX_MAX + 1];
 
     snprintf(cut, sizeof(cut), "%.*s", dot && dot > name ? (int)(dot - name) : (int)strlen(name), name);
-    import_copy_text(stem, IMPORT_PREFIX_MAX - 4, cut); /* there is room for "-64/" */
+    import_copy_text(stem, IMPORT_PREFIX_MAX - 4, cut); /* leaves space for "-64/" */
 }
 
 static void write_prefix(struct source *sources, size_t index)
@@ -183,7 +184,7 @@ static const char *own_name(const struct source *first, const char *name)
     return strncmp(name, first->prefix, length) == 0 ? name + length : name;
 }
 
-/* The nodes of a model have a run of identifiers: the copies have the same one, further up. */
+/* Copies nodes. The nodes of a model have consecutive identifiers; the copies have them at an offset. */
 static bool copy_nodes(struct import_scene *scene, const struct source *first, uint32_t offset, uint32_t root)
 {
     for (size_t i = first->edit_begin; i < first->edit_end; i++) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is known to make the library loop, ask for all memory or read beyond its lines is refused before it sees
-// it.
+// Checks of files in advance, against faults that make the library loop, exhaust memory or read beyond its lines.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -23,7 +22,7 @@ bool is_type(const char *word)
                        [&](const char *type) { return strcmp(word, type) == 0; });
 }
 
-// A line of a PLY file's head.
+// Checks a line of a PLY file's header.
 void check_ply_line(reader &r, const std::string &line, const std::string &where)
 {
     char words[5][64] = {};
@@ -64,7 +63,7 @@ void check_ply(reader &r, const unsigned char *bytes, size_t size_bytes)
     }
 }
 
-// Lines are cut where the library's own room for them ends, and it reads on behind that.
+// The library cuts lines where its buffer ends, and continues to read behind it.
 void check_off(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
     constexpr size_t line_max = 4000;
@@ -80,7 +79,7 @@ void check_off(reader &r, const unsigned char *bytes, size_t size_bytes)
         at = stop + 1;
     }
 }
-// Elements within elements: the library descends by recursion, until it has no stack.
+// Checks the depth of elements: the library is recursive and would exhaust its stack.
 void check_xml(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
     constexpr size_t depth_max = 2000;

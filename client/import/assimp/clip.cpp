@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Animations: a clip each. The library has straight keys only, with times in ticks.
+// Animations: each becomes a clip. The library has linear keys only, with times in ticks.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -102,7 +102,7 @@ void add_node_channels(builder &b, const aiNodeAnim &from)
     keys scale = read_vectors(b, from.mScalingKeys, from.mNumScalingKeys);
     if ((translation.times.empty() && rotation.times.empty() && scale.times.empty()) || !b.moved.insert(id).second)
         return;
-    // What a clip does not change is sent, too, so that no matrix need be decomposed.
+    // Adds the unchanged parts, too, so that no matrix has to be decomposed.
     aiVector3D scaled, moved;
     aiQuaternion turned;
     node->second.second->mTransformation.Decompose(scaled, turned, moved);
@@ -117,12 +117,12 @@ void add_node_channels(builder &b, const aiNodeAnim &from)
     send(b, PROTOCOL_CHANNEL_NODE_SCALE, id, 3, scale);
 }
 
-// A key holds the weights of some targets, by their numbers; of the others they are 0.
+// A key holds the weights of some targets, by number; the weights of others are 0.
 void add_morph_channel(builder &b, const aiMeshMorphAnim &from)
 {
     std::string name = text(from.mName);
     const auto whole = b.r.morphs.find(name);
-    // In FBX files the mesh's number stands behind the node's name.
+    // FBX files append the mesh's number to the node's name
     const auto found = whole != b.r.morphs.end() ? whole : b.r.morphs.find(name.substr(0, name.rfind('*')));
     keys of;
 
@@ -152,7 +152,7 @@ void add_clip(reader &r, unsigned index)
 {
     const aiAnimation &from = *r.source->mAnimations[index];
     const std::string name = text(from.mName);
-    // Files that do not say it mean frames of the cinema's successor.
+    // Files without a rate mean 25 frames a second.
     builder b = {r, "animations[" + std::to_string(index) + "]",
                  from.mTicksPerSecond > 0 && from.mTicksPerSecond <= 1e12 ? from.mTicksPerSecond : 25};
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// COLLADA files are mended where this version of the library would lose a camera or a mesh. Every search ends with
-// the element that it looks into, so that the time grows with the file and no faster.
+// Mending of COLLADA files, where this version of the library would lose a camera or a mesh. Every search ends
+// with the element that it examines, so that the time is linear in the file's size.
 #include "reader.hpp"
 
 #include <cctype>
@@ -13,14 +13,14 @@ namespace
 using view = std::string_view;
 constexpr size_t none = view::npos;
 
-// From the element's name to its '>'; empty: there is none.
+// The tag from the element's name to its '>'; empty: there is none.
 view tag_at(view all, size_t at)
 {
     const size_t end = all.find('>', at);
     return end == none ? view() : all.substr(at, end - at);
 }
 
-// The value within quotes; empty: the element has none.
+// The value within quotes; empty: the element lacks the attribute.
 view attribute(view tag, view name)
 {
     for (size_t at = tag.find(name); at != none; at = tag.find(name, at + 1)) {
@@ -49,7 +49,7 @@ std::string without_comments(view all)
     return kept.append(all.substr(copied));
 }
 
-// By the reference to a morph controller, "#id": that to the mesh which it moves.
+// References to meshes by references to morph controllers, "#id", that move them.
 using references = std::map<std::string, std::string, std::less<>>;
 
 std::string without_morphs(view all, references &meshes)
@@ -75,7 +75,7 @@ std::string without_morphs(view all, references &meshes)
     return kept.append(all.substr(copied));
 }
 
-// What a skin moves, or a node shows, is the mesh instead of the morph controller.
+// Replaces references of skins and nodes to a morph controller by its mesh.
 std::string with_meshes(view all, const references &meshes)
 {
     constexpr view skin = "<skin ", instance = "<instance_controller ", instance_end = "</instance_controller>";
@@ -108,7 +108,7 @@ std::string with_meshes(view all, const references &meshes)
     return made.append(all.substr(copied));
 }
 
-// This version passes over cameras without a name, which COLLADA does not ask for.
+// Adds names to cameras without one: this version skips them, although COLLADA does not require names.
 std::string with_named_cameras(view all)
 {
     constexpr view opening = "<camera ";

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Import of files through Assimp.
 #include "import.h"
 #include "reader.hpp"
 
@@ -34,7 +35,8 @@ bool begins(const char *words, const char *with)
     return strncmp(words, with, strlen(with)) == 0;
 }
 
-// Of an FBX file, such as 6100 of 6.1: behind 23 bytes of a binary one, else stated in its head. 0: not said.
+// The version of an FBX file, such as 6100 for 6.1: after 23 bytes of a binary file, else stated in the header. 0:
+// unknown.
 unsigned fbx_version(const unsigned char *bytes, size_t size_bytes)
 {
     constexpr size_t version_at = 23;

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
+/* The formats of Assimp, and loading of its module. */
 #include "library.h"
 #include "helper/module.h"
 
 #include <string.h>
 #include <strings.h>
 
-/* Of what the library can read, the formats that its version in Debian 12 reads well. STL files of
- * printers and scanners have their layers along z, and do not say their unit. */
+/* Formats that the library's version in Debian 12 reads well. STL files of printers and scanners have layers
+ * along z, and do not state their unit. */
 static const struct assimp_format formats[] = {
     {.ending = ".3ds", .name = "3DS", .metres = 1, .colours_are_srgb = true},
     {.ending = ".ac", .name = "AC3D", .metres = 1},
@@ -36,7 +37,7 @@ const struct assimp_format *assimp_format_at(size_t number)
 }
 
 #pragma weak assimp_library
-/* NULL, unless the module is linked to the program itself. */
+/* NULL, unless the module is linked into the program itself. */
 static const struct assimp_library *library = &assimp_library;
 
 const struct assimp_library *assimp_load(char reason[ASSIMP_REASON_BYTES])

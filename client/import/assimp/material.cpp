@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Materials, by way of those of OBJ, whose terms are the same: Phong's, and the later ones for physically based
+// Materials, converted to those of OBJ, whose terms are the same: Phong's, and the later ones for physically based
 // shading. Textures lie beside the model or within it.
 #include "reader.hpp"
 #include "import/obj/reader.hpp"
@@ -25,7 +25,7 @@ const aiMaterialProperty *property(const aiMaterial &material, const char *key, 
     return nullptr;
 }
 
-// `count` numbers; false: the material does not have them.
+// Reads `count` numbers; false: the material lacks them.
 bool numbers(const aiMaterial &material, const char *key, unsigned semantic, float *out, size_t count)
 {
     const aiMaterialProperty *p = property(material, key, semantic, aiPTI_Float, count * sizeof(float));
@@ -40,7 +40,7 @@ float number(const aiMaterial &material, const char *key, float otherwise)
     return numbers(material, key, 0, &value, 1) ? value : otherwise;
 }
 
-// Behind a 32-bit length.
+// Reads a string, which follows a 32-bit length.
 std::string words(const aiMaterial &material, const char *key, unsigned semantic)
 {
     const aiMaterialProperty *p = property(material, key, semantic, aiPTI_String, sizeof(uint32_t));
@@ -69,7 +69,7 @@ int32_t whole_number(const aiMaterial &material, const char *key, unsigned seman
     return otherwise;
 }
 
-// Notes that a mesh needs the second set.
+// Returns a texture's set of coordinates, and marks that meshes need the second set.
 uint32_t texcoord_set(reader &r, const aiMaterial &material, aiTextureType kind)
 {
     const int32_t set = whole_number(material, "$tex.uvwsrc", kind, 0);
@@ -82,13 +82,13 @@ uint32_t texcoord_set(reader &r, const aiMaterial &material, aiTextureType kind)
     return 0;
 }
 
-// The first of the kinds that the material has a texture of. Returns its set of texture coordinates.
+// Reads the first of the kinds for which the material has a texture. Returns its set of texture coordinates.
 uint32_t texture(reader &r, const aiMaterial &material, std::initializer_list<aiTextureType> kinds,
                  std::string &name, tinyobj::texture_option_t &option)
 {
     option.scale[0] = option.scale[1] = option.scale[2] = option.bump_multiplier = 1;
     for (aiTextureType kind : kinds) {
-        float transform[5]; // offset, scale, turn
+        float transform[5]; // offset, scale, rotation
         name = words(material, "$tex.file", kind);
         if (name.empty())
             continue;
@@ -120,7 +120,7 @@ obj::texcoord_sets textures(reader &r, const aiMaterial &from, tinyobj::material
     const uint32_t rough =
         texture(r, from, {aiTextureType_DIFFUSE_ROUGHNESS}, m.roughness_texname, m.roughness_texopt);
     sets[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS] = m.roughness_texname.empty() ? metal : rough;
-    // One image for both colour and cutouts is said twice.
+    // An image for both colour and cutouts is listed twice.
     if (m.alpha_texname == m.diffuse_texname)
         m.alpha_texname.clear();
     if (!m.alpha_texname.empty())
@@ -174,7 +174,7 @@ unsigned char *copy_bytes(const void *from, size_t count, size_t *size_bytes)
     return copy;
 }
 
-// Texels as they are, behind the head of a TGA file: B, G, R, A a texel, rows from the top.
+// Stores raw texels behind the header of a TGA file: B, G, R, A a texel, rows from the top.
 unsigned char *as_tga(const aiTexture &image, size_t *size_bytes, char *reason)
 {
     constexpr size_t head_bytes = 18;
@@ -187,19 +187,19 @@ unsigned char *as_tga(const aiTexture &image, size_t *size_bytes, char *reason)
     unsigned char *file = static_cast<unsigned char *>(calloc(head_bytes + texels_bytes, 1));
     if (!file)
         throw std::bad_alloc();
-    file[2] = 2; // colours, not packed
+    file[2] = 2; // uncompressed colours
     file[12] = uint8_t(image.mWidth);
     file[13] = uint8_t(image.mWidth >> 8);
     file[14] = uint8_t(image.mHeight);
     file[15] = uint8_t(image.mHeight >> 8);
-    file[16] = 32;   // bits
+    file[16] = 32;   // bits of a texel
     file[17] = 0x28; // 8 of them alpha, from the top
     memcpy(file + head_bytes, image.pcData, texels_bytes);
     *size_bytes = head_bytes + texels_bytes;
     return file;
 }
 
-// By its number, "*2", or by the name of the file that it was.
+// Finds an embedded texture by its number, "*2", or by the name of its former file.
 const aiTexture *embedded(const reader &r, const std::string &name)
 {
     for (unsigned i = 0; i < r.source->mNumTextures; i++) {
@@ -219,8 +219,8 @@ unsigned char *read_image(const reader &r, const std::string &name, size_t *size
     return files_read_image(r.files, r.scene, name.c_str(), size_bytes, reason);
 }
 
-// Made up by the library for a file without materials: nameless or of the library's own name, and plainly white
-// or, of some of its readers, grey.
+// True for materials that the library invents for a file without any: nameless or with the library's own name, and
+// plain white or, from some of its readers, grey.
 bool is_made_up(const tinyobj::material_t &m)
 {
     const tinyobj::real_t *d = m.diffuse, white = 1, grey = 0.6f;

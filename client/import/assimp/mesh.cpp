@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The library has a mesh for each material. Those of one node that nothing deforms become one again, with a range
-// of triangles for each, so that a body with several materials stays closed.
+// Meshes. The library splits meshes by material; those of a node that nothing deforms are joined again, with a
+// range of triangles for each, so that a body with several materials stays closed.
 #include "reader.hpp"
 #include "import/model/points.hpp"
 
@@ -93,7 +93,7 @@ void read_vectors(const aiVector3D *from, unsigned count, float *to)
     }
 }
 
-// The value of full light: PLY files with floats have 1, or 255.
+// The value of full intensity: PLY files with floats have 1, or 255.
 float full_colour(const reader &r, const aiMesh &from)
 {
     const aiColor4D *colours = from.mColors[0];
@@ -117,7 +117,7 @@ void read_colours(const aiColor4D *from, unsigned count, float full, uint16_t *t
         }
 }
 
-// The library has v upwards, ours runs downwards.
+// The library's v points upwards, ours downwards.
 void read_texcoords(const aiVector3D *from, unsigned count, float *to)
 {
     for (unsigned i = 0; from && i < count; i++) {
@@ -135,7 +135,7 @@ void read_vertices(builder &b, uint64_t count)
     mesh.positions = reading::allocate<float>(b.r, b.where, count * 3);
     if (any(b, [](const aiMesh &from) { return from.mNormals != nullptr; }))
         mesh.normals =
-            reading::allocate<float>(b.r, b.where, count * 3); // zeros are made good when the mesh is added
+            reading::allocate<float>(b.r, b.where, count * 3); // zeros are replaced when the mesh is added
     for (size_t set = 0; set < (b.r.uses_second_texcoords ? 2 : 1); set++)
         if (any(b, [&](const aiMesh &from) { return from.mTextureCoords[set] != nullptr; }))
             mesh.texcoords[set] = reading::allocate<float>(b.r, b.where, count * 2);
@@ -188,7 +188,7 @@ void read_targets(builder &b, const aiMesh &from)
         if (has_normals)
             read_target(from.mNormals, shape.mNormals, from.mNumVertices, b.mesh.target_offsets[1] + first);
         const float weight = shape.mWeight;
-        // FBX in this library begins with every target at its full weight, whatever the file says.
+        // FBX in this library starts with every target at its full weight, whatever the file says.
         b.weights.push_back({std::isfinite(weight) && strcmp(b.r.format->ending, ".fbx") != 0
                                  ? std::min(std::max(weight, -1e6f), 1e6f)
                                  : 0});
@@ -237,7 +237,7 @@ shown_mesh add_points(reader &r, const aiMesh &from, const std::string &where)
 
     if (from.mNumVertices > points::points_max)
         fail(r, where, "%u points; up to %u are allowed", from.mNumVertices, points::points_max);
-    check_room(r, where, from.mNumVertices, 10 * sizeof(float)); // with its sphere
+    check_room(r, where, from.mNumVertices, 10 * sizeof(float)); // each point with its sphere
     const float full = full_colour(r, from);
     for (unsigned i = 0; i < from.mNumVertices; i++) {
         const aiVector3D &place = from.mVertices[i];

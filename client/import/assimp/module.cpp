@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The module that links Assimp. It hands the library the bytes of the model and no other file, and keeps its
-// exceptions.
+// The module that links Assimp. It passes the bytes of the model, and no other file, to the library, and contains
+// its exceptions.
 #include "library.h"
 
 #include <assimp/IOStream.hpp>
@@ -49,7 +49,7 @@ class model_stream : public Assimp::IOStream
     }
     aiReturn Seek(size_t offset, aiOrigin origin) override
     {
-        // Offsets from the place and the end may be negative, as those of fseek().
+        // Offsets from the current position and the end may be negative, as with fseek().
         const size_t from = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at : size_bytes;
         if (from + offset > size_bytes)
             return aiReturn_FAILURE;
@@ -103,8 +103,8 @@ class model_system : public Assimp::IOSystem
     size_t size_bytes;
 };
 
-// After a fault. What a reader leaves behind does not always survive its end, and this process lives for one model
-// only; but a fuzzer's lives for many.
+// Frees a reader after a fault only in fuzzers, which live for many models: destroying it may crash, and this
+// process lives for one model only.
 struct abandon {
     void operator()(Assimp::Importer *importer) const
     {
@@ -116,7 +116,7 @@ struct abandon {
     }
 };
 
-// Some readers of the library take a face's corners as they are, and its next steps read and write there.
+// Some readers of the library do not check a face's corners, and its next steps read and write at them.
 bool has_all_corners(const aiScene &scene, char reason[ASSIMP_REASON_BYTES])
 {
     for (unsigned i = 0; i < scene.mNumMeshes; i++) {
@@ -142,11 +142,12 @@ const aiScene *read(const char *name, const assimp_format *format, const unsigne
                     void **keep, char reason[ASSIMP_REASON_BYTES])
 {
     const char *dot = strrchr(name, '.');
-    const std::string plain = std::string("model") + (dot ? dot : ""); // no path: the library has no folder
+    // No path: the library must not see a folder
+    const std::string plain = std::string("model") + (dot ? dot : "");
     unsigned steps = aiProcess_JoinIdenticalVertices;
     std::unique_ptr<Assimp::Importer, abandon> importer(new Assimp::Importer);
 
-    importer->SetIOHandler(new model_system(plain, bytes, size_bytes)); // which the importer then owns
+    importer->SetIOHandler(new model_system(plain, bytes, size_bytes)); // owned by the importer
     importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
     if (format->has_facets) {
         importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS);
@@ -155,7 +156,7 @@ const aiScene *read(const char *name, const assimp_format *format, const unsigne
     const aiScene *scene = importer->ReadFile(plain.c_str(), 0);
     if (scene && !has_all_corners(*scene, reason))
         return nullptr;
-    // Joining takes no notice of colours: faces would lose theirs to their neighbours.
+    // Joining ignores colours: faces would lose theirs to their neighbours.
     if (scene && has_colours(*scene))
         steps &= ~unsigned(aiProcess_JoinIdenticalVertices);
     if (scene && steps != 0)
@@ -171,7 +172,7 @@ const aiScene *read_guarded(const char *name, const assimp_format *format, const
 {
 #if defined(__SANITIZE_ADDRESS__) || defined(LEAKS_ARE_SOUGHT)
     const __lsan::ScopedDisabler
-        disabled; // it loses memory with broken files; the importer lives for one model only
+        disabled; // the library leaks for broken files; the importer lives for one model only
 #endif
     *keep = nullptr;
     try {

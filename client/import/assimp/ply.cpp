@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PLY files that the library reads wrong are written anew: places far from the origin, of which floats lose the
-// most, strips of triangles, colours of faces, and files that are cut off. Gaussians are read here.
+// PLY files that the library misreads are rewritten: distant positions, which floats round too much, strips of
+// triangles, colours of faces, and truncated files. Gaussians are read here.
 #include "reader.hpp"
 #include "import/model/origin.h"
 #include "import/model/splats.hpp"
@@ -22,7 +22,7 @@ struct element {
     uint64_t count;
     std::vector<property> properties;
 
-    // Its place among the properties; SIZE_MAX: there is none.
+    // Index among the properties; SIZE_MAX: there is none.
     size_t find(const char *wanted) const
     {
         for (size_t i = 0; i < properties.size(); i++)
@@ -41,7 +41,7 @@ struct element {
     }
 };
 
-using row = std::vector<std::vector<double>>; // of each property: one number, or those of a list
+using row = std::vector<std::vector<double>>; // for each property a number, or those of a list
 
 struct head {
     std::string format, comments; // the comments' lines
@@ -57,7 +57,7 @@ struct head {
     }
 };
 
-// check_bytes() has seen each line.
+// check_bytes() has checked each line.
 head read_head(const unsigned char *bytes, size_t size_bytes)
 {
     const char *const begin = reinterpret_cast<const char *>(bytes), *const end = begin + size_bytes;
@@ -109,7 +109,7 @@ template <typename type> void append_as(std::string &out, double value)
     out.append(reinterpret_cast<const char *>(&cut), sizeof(cut));
 }
 
-// The machine is little-endian, as everywhere here.
+// Reads a number of a binary file; the machine is little-endian.
 double number_of(const std::string &type, const unsigned char *bytes)
 {
     const bool is_unsigned = type[0] == 'u';
@@ -156,7 +156,7 @@ class data
           at(bytes + from.size_bytes), end(bytes + size_bytes)
     {
     }
-    // False: the file ends before this one does.
+    // Reads a row. False: the file ends within it.
     bool next(const element &of, row &out)
     {
         out.resize(of.properties.size());
@@ -173,7 +173,7 @@ class data
         }
         return true;
     }
-    // False: the file ends before all of them do. Binary ones of one size are not looked at.
+    // Skips an element. False: the file ends within it. Binary rows of constant size are not read.
     bool skip(const element &of)
     {
         size_t bytes = 0;
@@ -219,7 +219,7 @@ class data
             return false;
         for (; at<end && * at> ' '; at++)
             if (length + 1 < sizeof(word))
-                word[length++] = *at == ',' ? '.' : char(*at); // of countries with a decimal comma
+                word[length++] = *at == ',' ? '.' : char(*at); // some countries write a decimal comma
         word[length] = '\0';
         out = strtod(word, nullptr);
         return true;
@@ -238,11 +238,11 @@ bool holds_places(const element &vertices)
     return vertices.has({"x", "y", "z"}) && !vertices.has_lists();
 }
 
-// Whether floats lose something of the places, and the origin of these. The first one says whether the others are
-// looked at.
+// Finds out whether floats round the positions too much, and their origin. The first position decides whether the
+// others are checked.
 void find_far(const head &from, const unsigned char *bytes, size_t size_bytes, changes &out)
 {
-    constexpr double exact_max = 8192; // from there on floats are a millimetre apart
+    constexpr double exact_max = 8192; // floats are a millimetre apart from there on
     const element &vertices = from.elements[0];
     const size_t axes[3] = {vertices.find("x"), vertices.find("y"), vertices.find("z")};
     double lower[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
@@ -265,7 +265,7 @@ void find_far(const head &from, const unsigned char *bytes, size_t size_bytes, c
     out.is_far = import_find_origin(lower, upper, out.origin);
 }
 
-// Whether the file ends early, of which the library says nothing: it shows zeros. Rows of text have a line each.
+// True if the file is truncated, where the library silently shows zeros. Rows of text have a line each.
 bool is_short(const head &from, const unsigned char *bytes, size_t size_bytes)
 {
     const unsigned char *at = bytes + from.size_bytes, *const end = bytes + size_bytes, *last = at;
@@ -275,7 +275,7 @@ bool is_short(const head &from, const unsigned char *bytes, size_t size_bytes)
     row one;
 
     for (const element &of : from.elements) {
-        if (of.count > size_bytes) // each takes a byte at least
+        if (of.count > size_bytes) // each row takes a byte at least
             return true;
         stated += of.properties.empty() ? 0 : of.count;
         last_element = of.properties.empty() || of.count == 0 ? last_element : &of;
@@ -321,7 +321,7 @@ struct writer {
     std::vector<row> vertices = {};
     std::string vertex_bytes = {}, face_bytes = {};
     uint64_t vertex_count = 0, face_count = 0;
-    bool has_ended = false; // before all was there
+    bool has_ended = false; // before all data were read
 
     bool splits() const
     {
@@ -360,7 +360,7 @@ void write_face(reader &r, writer &w, const std::vector<double> &corners, const 
     w.face_count++;
 }
 
-// A strip ends at -1; every other triangle of one is turned.
+// Writes a strip, which ends at -1; every other triangle of it is reversed.
 void write_strip(reader &r, writer &w, const std::vector<double> &corners)
 {
     size_t begin = 0;
@@ -436,7 +436,7 @@ std::string mend_ply(reader &r, const unsigned char *bytes, size_t size_bytes)
     const changes what = find_changes(from, bytes, size_bytes);
     if (!what.is_far && !what.is_cut && !what.has_strips && !what.has_face_colours)
         return {};
-    check_room(r, "", size_bytes, what.has_face_colours ? 32 : 4); // numbers of text are doubles here
+    check_room(r, "", size_bytes, what.has_face_colours ? 32 : 4); // numbers of text become doubles
     std::copy(what.origin, what.origin + 3, r.origin);
     writer w = {from, what};
     data rows(from, bytes, size_bytes);
@@ -463,8 +463,9 @@ bool add_ply_gaussians(reader &r, const unsigned char *bytes, size_t size_bytes)
     };
     const size_t at[3] = {of.find("x"), of.find("y"), of.find("z")}, opacity = of.find("opacity"),
                  colours[3] = {place("f_dc_", 0), place("f_dc_", 1), place("f_dc_", 2)},
-                 scales[3] = {place("scale_", 0), place("scale_", 1), place("scale_", 2)}, // flat ones have two
-        turns[4] = {place("rot_", 1), place("rot_", 2), place("rot_", 3), place("rot_", 0)};
+                 // Flat Gaussians have two
+        scales[3] = {place("scale_", 0), place("scale_", 1), place("scale_", 2)},
+                 turns[4] = {place("rot_", 1), place("rot_", 2), place("rot_", 3), place("rot_", 0)};
 
     check_room(r, "", std::min<uint64_t>(of.count, size_bytes), sizeof(splats::gaussian));
     for (uint64_t i = 0; i < of.count && rows.next(of, one); i++) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The hierarchy, with cameras and lights, which the library ties to nodes by name. Nothing here is recursive.
+// The hierarchy of nodes, with cameras and lights, which the library assigns to nodes by name. Without recursion.
 #include "reader.hpp"
 #include "import/model/origin.h"
 
@@ -13,14 +13,14 @@ namespace assimp
 namespace
 {
 constexpr double pi = 3.14159265358979323846;
-// Two less than the server's limit: one node stands above all, and what a node shows may hang below it.
+// Two below the server's limit: a node is above all others, and an object may need a node below its own.
 constexpr int depth_max = 254;
 
 struct attachment {
     protocol_node_kind kind;
     uint32_t object;
     uint32_t skin;
-    aiMatrix4x4 placed; // in the node
+    aiMatrix4x4 placed; // transform within the node
     std::string suffix;
 };
 
@@ -31,7 +31,7 @@ struct walk {
 
 // ---- which way is up, and how long a unit is
 
-// The library passes on what an FBX file says of its axes, and leaves it to us.
+// The library passes on an FBX file's axes without applying them.
 int metadata_integer(const aiScene &scene, const char *key, int otherwise)
 {
     const aiMetadata *all = scene.mMetaData;
@@ -50,7 +50,7 @@ double metadata_float(const aiScene &scene, const char *key, float otherwise)
     return double(otherwise);
 }
 
-// To y up and metres.
+// The transform to y up and metres.
 aiMatrix4x4 axes_of(reader &r)
 {
     const float signs[3] = {metadata_integer(*r.source, "CoordAxisSign", 1) < 0 ? -1.0f : 1.0f,
@@ -96,7 +96,7 @@ uint32_t add_node(reader &r, uint32_t parent, const aiMatrix4x4 &placed, const a
 
 // ---- cameras and lights
 
-// Looks along -z, as ours do.
+// The transform of a camera or light along -z, as ours are.
 aiMatrix4x4 looking(const aiVector3D &along, const aiVector3D &up, const aiVector3D &from)
 {
     aiVector3D back = -along;
@@ -122,7 +122,7 @@ float cut(double value, double minimum, double maximum)
 attachment camera_of(reader &r, const aiCamera &from)
 {
     const std::string name = text(from.mName);
-    // What this version makes of 45 degrees where a COLLADA file gives only the height of the view.
+    // The library's value for 45 degrees, if a COLLADA file states only the vertical angle.
     constexpr double lost = pi / 4 * pi / 180;
     const double aspect = from.mAspect > 0 ? double(from.mAspect) : 16.0 / 9;
     double width = double(from.mHorizontalFOV);
@@ -143,7 +143,7 @@ attachment camera_of(reader &r, const aiCamera &from)
             looking(from.mLookAt, from.mUp, from.mPosition), " camera"};
 }
 
-// Whether an FBX file is of a Blender whose lights have watts: 2.80 on.
+// True for FBX files of Blender 2.80 and later, whose lights have watts.
 bool has_watts(const reader &r)
 {
     const aiMetadata *all = r.source->mMetaData;
@@ -161,8 +161,8 @@ bool has_watts(const reader &r)
     return version >= 280;
 }
 
-// What a light of the colour 1 sends. These formats have a white surface show the light's colour: hence the factor
-// pi, as for NFF. An FBX light's fall-off is left to programs, which do without, but for those that mean watts.
+// Strength of a light with the colour 1. In these formats a white surface shows the light's colour, hence the
+// factor pi, as for NFF. An FBX light's falloff is left to programs, which ignore it, except for lights in watts.
 double strength_of(reader &r, const aiLight &from, protocol_light_kind &kind)
 {
     const bool is_fbx = strcmp(r.format->ending, ".fbx") == 0, is_point = kind == PROTOCOL_LIGHT_POINT;
@@ -208,7 +208,7 @@ attachment light_of(reader &r, const aiLight &from)
 
 // ---- nodes
 
-// Those that nothing deforms together, the others each for itself.
+// Groups a node's meshes: all undeformed ones together, others each by itself.
 std::vector<std::vector<unsigned>> sets_of(reader &r, const aiNode &node)
 {
     std::vector<std::vector<unsigned>> sets;
@@ -239,7 +239,7 @@ uint32_t add_one(walk &w, const aiNode &node, uint32_t parent)
     reader &r = w.r;
     const std::string name = text(node.mName);
     std::vector<attachment> found;
-    std::vector<std::pair<uint32_t, std::vector<unsigned>>> morphed; // place in `found`
+    std::vector<std::pair<uint32_t, std::vector<unsigned>>> morphed; // indices in `found`
 
     for (const std::vector<unsigned> &set : sets_of(r, node)) {
         const shown_mesh &shown = meshes_of(r, set);

@@ -10,7 +10,7 @@ namespace gltf
 {
 namespace
 {
-// Without a buffer view an accessor is all zeros and its count is backed by nothing.
+// An accessor without a buffer view is all zeros, so no bytes of the file bound its count.
 constexpr size_t unbacked_max = 1u << 24;
 
 struct elements {
@@ -44,7 +44,7 @@ const tinygltf::Accessor &accessor_at(reader &r, int index, const std::string &w
     return r.model.accessors[size_t(index)];
 }
 
-// `count` elements of `element_bytes`, `stride` apart, from `offset`: within the view?
+// Checks that `count` elements of `element_bytes`, `stride` apart, from `offset`, lie within the view.
 const unsigned char *range_within(reader &r, int view, size_t offset, size_t count, size_t stride,
                                   size_t element_bytes, const std::string &where)
 {
@@ -98,7 +98,7 @@ template <typename type> type load_as(const unsigned char *bytes)
     return value;
 }
 
-// Normalised integers as glTF 2.0, section 3.11 (Animations) and 3.6.2.2 have them.
+// Converts normalised integers as in glTF 2.0, sections 3.11 (Animations) and 3.6.2.2.
 float float_of(const unsigned char *bytes, int component_type, bool normalised)
 {
     switch (component_type) {
@@ -142,7 +142,7 @@ bool is_unsigned(int component_type)
            component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
 }
 
-// Matrices of small components have padded columns; none of what is read here does.
+// Copies a row of floats. Matrices of small components have padded columns, but none of these is read here.
 void copy_floats(const elements &e, size_t element, const unsigned char *bytes, int components, float fill,
                  float *out)
 {
@@ -158,7 +158,7 @@ struct sparse_elements {
     size_t stride = 0;
 };
 
-// The elements that replace some of the accessor's; none if it is not sparse.
+// Reads the elements that replace some of a sparse accessor's; none if it is not sparse.
 sparse_elements sparse_of(reader &r, int index, const elements &e, const std::string &where)
 {
     const tinygltf::Accessor &accessor = r.model.accessors[size_t(index)];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Animations: a clip each, and a channel for each property of a node that it changes. What a channel needs is
-// checked before it is added: one that cannot be played is left out, with a note, and the rest is played.
+// Animations: each becomes a clip, with a channel for each property of a node. A channel is checked before it is
+// added: an unplayable one is left out, with a note, and the rest is played.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ constexpr float value_max = 1e12f;
 struct key_times {
     std::vector<float> times;
     std::vector<uint32_t> kept;
-    uint32_t first = UINT32_MAX; // in the clip's floats, once they are there
+    uint32_t first = UINT32_MAX; // offset in the clip's floats, once they are added
 };
 
 struct builder {
@@ -31,11 +31,11 @@ struct builder {
     double end_s = 0;
     std::vector<float> floats = {};
     std::map<int, key_times> inputs = {}; // by accessor
-    // By input, output, width and what becomes of the numbers: where they begin; UINT32_MAX: they are no good,
-    // which one look is enough for.
+    // Offsets of values by input, output, width and conversion; UINT32_MAX marks invalid values, so that they are
+    // checked only once.
     std::map<std::tuple<int, int, uint32_t, std::array<float, 5>>, uint32_t> values = {};
-    std::set<std::pair<protocol_channel_path, uint32_t>> changed = {}; // of an object
-    std::map<int, unsigned> nodes = {}; // those whose transform changes: bits of enum protocol_channel_path
+    std::set<std::pair<protocol_channel_path, uint32_t>> changed = {}; // paths of each object that have a channel
+    std::map<int, unsigned> nodes = {}; // nodes whose transform changes: bits of enum protocol_channel_path
 };
 
 bool find_interpolation(const std::string &name, protocol_interpolation &found)
@@ -53,8 +53,8 @@ bool find_interpolation(const std::string &name, protocol_interpolation &found)
 
 // ---- keys
 
-// Makes times ascend: the last of equal ones is moved by as little as possible, so that a jump stays one, and
-// those between it and the first are removed, as are times that go back.
+// Makes times ascend: the last of equal times is moved by as little as possible, so that a jump stays one; times
+// between it and the first, and times that decrease, are removed.
 key_times read_times(builder &b, int accessor, const std::string &where)
 {
     key_times result;
@@ -67,7 +67,7 @@ key_times read_times(builder &b, int accessor, const std::string &where)
         float time = times[i];
         if (!first && time == times[result.kept.back()]) {
             mended = true;
-            if (time != result.times.back()) { // moved already
+            if (time != result.times.back()) { // was moved before
                 result.kept.back() = uint32_t(i);
                 continue;
             }
@@ -125,8 +125,8 @@ uint32_t append(builder &b, const std::vector<float> &values)
     return first;
 }
 
-// The values of the kept keys; `parts` is 3 where a key has tangents. False: the file has not as many as it
-// should.
+// Reads the values of the kept keys; `parts` is 3 for keys with tangents. False: the file has another number of
+// values.
 bool read_values(builder &b, int accessor, const channel_target &to, const key_times &keys, size_t key_count,
                  size_t parts, std::vector<float> &out, const std::string &where)
 {
@@ -146,7 +146,7 @@ bool read_values(builder &b, int accessor, const channel_target &to, const key_t
     for (uint32_t key : keys.kept)
         for (size_t part = 0; part < parts; part++) {
             const float *from = all.data() + (key * parts + part) * to.file_width;
-            const float offset = parts == 1 || part == 1 ? to.offset : 0; // a tangent has none
+            const float offset = parts == 1 || part == 1 ? to.offset : 0; // tangents have no offset
             for (size_t i = 0; i < to.width; i++)
                 out.push_back(from[to.file_width < to.width ? 0 : i] * to.scale[std::min<size_t>(i, 3)] + offset);
         }
@@ -244,7 +244,7 @@ void add_channel(builder &b, size_t index)
         b.nodes[to.node] |= 1u << to.path;
 }
 
-// The parts of a node's transform that a clip does not change are sent, too, so that no matrix need be decomposed.
+// Adds the parts of a node's transform that a clip does not change, so that no matrix has to be decomposed.
 void add_constants(builder &b, int node, unsigned seen)
 {
     const unsigned moved = 1u << PROTOCOL_CHANNEL_NODE_TRANSLATION | 1u << PROTOCOL_CHANNEL_NODE_ROTATION |

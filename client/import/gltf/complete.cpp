@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Changes the JSON before tinygltf sees it, which refuses a file in which the indices of a primitive have
-// no buffer view (KHR_draco_mesh_compression lets them), a buffer has no bytes (EXT_meshopt_compression) or a
-// channel no node (KHR_animation_pointer), and one with an accessor of no elements.
+// Completion of the JSON before tinygltf reads it, which refuses a file in which the indices of a primitive have
+// no buffer view (as KHR_draco_mesh_compression allows), a buffer has no bytes (EXT_meshopt_compression) or a
+// channel no node (KHR_animation_pointer), and a file with an accessor of no elements.
 #include "reader.hpp"
 
 #include <jansson.h>
@@ -57,8 +57,8 @@ bool is_fallback(const json_t *buffer)
     return false;
 }
 
-// The bytes that a program without the extension would read get a stand-in of one byte; only the first buffer of
-// a binary file may have its bytes there.
+// Gives fallback buffers, which only programs without the extension read, a stand-in of one byte; only the first
+// buffer of a binary file may have its bytes in the file.
 void complete_buffers(json_t *root, bool binary)
 {
     size_t i;
@@ -96,7 +96,7 @@ bool is_empty(const json_t *accessors, const json_t *index)
     return json_is_integer(count) && json_integer_value(count) == 0;
 }
 
-// The parts of each holder that are empty, with a note.
+// Removes empty parts of each holder, with a note.
 template <typename predicate>
 void leave_out(reader &r, json_t *root, const char *holders, const char *parts, const char *what,
                predicate is_left_out)
@@ -117,7 +117,7 @@ void leave_out(reader &r, json_t *root, const char *holders, const char *parts, 
     }
 }
 
-// Exporters write them for objects without faces, and for actions without keys.
+// Removes empty primitives and channels, which exporters write for objects without faces and actions without keys.
 void leave_out_empty(reader &r, json_t *root)
 {
     const json_t *accessors = json_object_get(root, "accessors");
@@ -140,7 +140,8 @@ void leave_out_empty(reader &r, json_t *root)
               });
 }
 
-// Names that are no URIs: a percent sign without two digits stands for itself, and one with them may.
+// Encodes names that are no valid URIs: a percent sign without two digits stands for itself, and one with digits
+// may do so, too.
 void complete_uris(reader &r, json_t *root)
 {
     size_t i;
@@ -162,7 +163,7 @@ void complete_uris(reader &r, json_t *root)
         }
 }
 
-// "count": 0
+// True for JSON with "count": 0.
 bool counts_nothing(const char *json, size_t size_bytes)
 {
     const char *const end = json + size_bytes, key[] = "\"count\"";
@@ -192,7 +193,7 @@ std::string complete_json(reader &r, const unsigned char *json, size_t size_byte
     const std::unique_ptr<json_t, release_json> root(
         json_loadb(reinterpret_cast<const char *>(json), size_bytes, JSON_ALLOW_NUL, nullptr));
     if (!json_is_object(root.get()))
-        return text; // the parser says what is wrong
+        return text; // the parser reports the error
     complete_meshes(root.get());
     if (counts_none)
         leave_out_empty(r, root.get());
@@ -204,7 +205,7 @@ std::string complete_json(reader &r, const unsigned char *json, size_t size_byte
         try {
             static_cast<std::string *>(out)->append(part, part_bytes);
         } catch (...) {
-            return -1; // must not pass the C library
+            return -1; // an exception must not pass through the C library
         }
         return 0;
     };

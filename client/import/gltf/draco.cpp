@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Primitives compressed with Draco. The library believes the counts in its header; so these are read before it
-// does and held against the accessors', which must be the same (KHR_draco_mesh_compression, "conformance").
+// Primitives compressed with Draco. The library trusts the counts in its header, so they are read in advance and
+// compared with the accessors', which must be equal (KHR_draco_mesh_compression, "conformance").
 #include "reader.hpp"
 
 #include <algorithm>
@@ -22,18 +22,18 @@ namespace gltf
 namespace
 {
 constexpr int attributes_max = 32, components_max = 4;
-// A plane of a million triangles, all deltas zero, takes a byte for 28 of them at the highest compression.
+// A plane of a million triangles, all deltas zero, needs a byte for 28 of them at the highest compression.
 constexpr size_t triangles_per_byte_max = 256;
-// Versions of the bitstream before 2.2 have no use in glTF: its encoders write 2.2.
+// Bitstreams before 2.2 do not occur in glTF: its encoders write 2.2.
 constexpr uint16_t bitstream_version = DRACO_BITSTREAM_VERSION(2, 2);
 
 struct limits {
     uint32_t faces, points;
-    uint64_t bytes; // of all attributes
+    uint64_t bytes; // size of all attributes
     std::string *reason;
 };
 
-// A decoder that stops at counts that are not as wanted, before it allocates for them.
+// A decoder that stops at unexpected counts before it allocates memory for them.
 template <typename base> class bounded : public base
 {
   public:
@@ -64,7 +64,7 @@ template <typename base> class bounded : public base
             *wanted_.reason = "the version of its bitstream is not 2.2";
             return false;
         }
-        // The vertices of edgebreaker are fewer than the points where seams divide them.
+        // Edgebreaker has fewer vertices than points where seams divide them.
         uint32_t &first = edges ? points : faces, &second = edges ? faces : points;
         const bool read = draco::DecodeVarint(&first, &ahead) && draco::DecodeVarint(&second, &ahead);
         if (!read)
@@ -78,7 +78,7 @@ template <typename base> class bounded : public base
         return this->point_cloud()->num_points() == wanted_.points ||
                refuse("vertices", this->point_cloud()->num_points(), wanted_.points);
     }
-    // The attributes are known here, and not yet decoded.
+    // The attributes are known here, but not decoded yet.
     bool DecodeAllAttributes() override
     {
         const draco::PointCloud &cloud = *this->point_cloud();
@@ -103,7 +103,7 @@ struct decoding {
     reader &r;
     std::string where;
     tinygltf::Primitive &primitive;
-    const tinygltf::Value &value; // of the extension
+    const tinygltf::Value &value; // value of the extension
     draco::Mesh mesh = {};
 };
 
@@ -114,7 +114,7 @@ const tinygltf::Accessor &accessor_of(decoding &d, int index)
     return d.r.model.accessors[size_t(index)];
 }
 
-// By attribute of the primitive: its number in the compressed bytes.
+// Numbers of attributes in the compressed bytes, by name.
 std::map<std::string, uint32_t> numbers_of(decoding &d)
 {
     std::map<std::string, uint32_t> result;
@@ -153,7 +153,7 @@ void decode(decoding &d, const std::map<std::string, uint32_t> &attributes)
     if (corners / 3 / triangles_per_byte_max > size)
         fail(d.r, d.where, "%zu triangles in %zu compressed bytes; at most %zu a byte are allowed", corners / 3,
              size, triangles_per_byte_max);
-    // What the library needs besides, for a corner: tables of opposite corners, of vertices and of what was seen.
+    // For each corner, the library also needs tables of opposite corners, of vertices and of visited elements.
     check_room(d.r, d.where, corners, 64);
     const uint64_t room = IMPORT_BYTES_MAX - d.r.scene->blob_bytes;
     const limits wanted = {uint32_t(corners / 3), uint32_t(points), room, &reason};
@@ -178,7 +178,7 @@ void decode(decoding &d, const std::map<std::string, uint32_t> &attributes)
              d.mesh.num_faces(), d.mesh.num_points(), corners / 3, points);
 }
 
-// An accessor like the one at `index`, of these bytes.
+// Adds an accessor like the one at `index` for these bytes.
 int add_accessor(decoding &d, int index, std::vector<unsigned char> bytes)
 {
     tinygltf::Model &model = d.r.model;
@@ -238,7 +238,7 @@ std::vector<unsigned char> attribute_bytes(decoding &d, int component_type, cons
     }
 }
 
-// Values are written in the type of the accessor, which the compressed one need not have.
+// Replaces an attribute; values get the type of the accessor, which may differ from the compressed one.
 void replace_attribute(decoding &d, const std::string &name, uint32_t number)
 {
     const int index = d.primitive.attributes.at(name);
@@ -268,7 +268,7 @@ void replace_indices(decoding &d)
     tinygltf::Accessor &accessor = d.r.model.accessors.back();
     accessor.type = TINYGLTF_TYPE_SCALAR;
     accessor.componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
-    d.primitive.mode = TINYGLTF_MODE_TRIANGLES; // whatever it was: Draco knows nothing else
+    d.primitive.mode = TINYGLTF_MODE_TRIANGLES; // Draco has nothing but triangles
 }
 } // namespace
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which extensions are understood; what becomes of files with others.
+// The supported extensions, and the treatment of files with others.
 #include "reader.hpp"
 #include "import/image/texture.h"
 
@@ -37,10 +37,10 @@ const char *const understood[] = {
     "KHR_node_visibility",
     "KHR_texture_transform",
 };
-// These hold nothing that could be seen.
+// Extensions without visible contents.
 const char *const invisible[] = {"KHR_xmp", "KHR_xmp_json_ld", "EXT_mesh_manifold"};
 
-// What to do about a required extension that is not understood, where it is more than to leave it out.
+// Advice about a required unsupported extension, where more than leaving it out is possible.
 struct remedy {
     const char *extension, *text;
 };
@@ -80,7 +80,7 @@ void note_unknown_extensions(reader &r)
     std::string list;
 
     for (const std::string &name : r.model.extensionsUsed)
-        if (!is_known(name) && name != "KHR_texture_basisu") // the textures that have it say what becomes of them
+        if (!is_known(name) && name != "KHR_texture_basisu") // textures with it have notes of their own
             names.insert(name.substr(0, 80));
     for (const std::string &name : names)
         list += (list.empty() ? "" : ", ") + name;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Conversion of specular and glossiness to metallic and roughness.
 #include "gloss.hpp"
 
 #include "protocol/common/srgb.h"
@@ -17,14 +18,14 @@ double clamped(double value)
     return std::min(std::max(value, 0.0), 1.0);
 }
 
-// Perceived brightness, as the conversion weighs colours.
+// Perceived brightness, with the conversion's weights of colours.
 double brightness(const double colour[3])
 {
     return std::sqrt(0.299 * colour[0] * colour[0] + 0.587 * colour[1] * colour[1] +
                      0.114 * colour[2] * colour[2]);
 }
 
-// The root of the quadratic equation that equal reflection is.
+// Metallic as the root of the quadratic equation for equal reflection.
 double metallic_of(double diffuse, double specular, double rest)
 {
     if (specular < dielectric)
@@ -59,8 +60,7 @@ metal_rough metal_of(const specular_gloss &from)
     metal_rough to = {{0, 0, 0}, from.alpha, metallic, 1 - from.glossiness, {dielectric, dielectric, dielectric}};
 
     if (metallic < 0.5) {
-        // Of the diffuse colour the file's model shows what the strongest channel of the mirror leaves, in all
-        // channels.
+        // In the file's model, the mirror's strongest channel attenuates all channels of the diffuse colour.
         to.metallic = 0;
         for (size_t c = 0; c < 3; c++) {
             to.base[c] = clamped(from.diffuse[c] * rest / std::max(1 - from.specular[c], tiny));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Import of glTF files.
 #include "import.h"
 #include "reader.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// EXT_mesh_gpu_instancing: where a node's mesh is to be seen, once for each element of three accessors. Its other
-// attributes are for shaders of programs that know them.
+// EXT_mesh_gpu_instancing: transforms at which a node's mesh is shown, one for each element of three accessors.
+// Other attributes are for shaders that know them.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -9,9 +9,10 @@ namespace gltf
 {
 namespace
 {
-constexpr size_t instances_max = 1u << 20; // of all nodes; a node of ours takes some hundred bytes
+// Limit for all nodes together; one of our nodes takes some hundred bytes
+constexpr size_t instances_max = 1u << 20;
 
-// Numbers of one attribute, `components` an instance; empty: it is not given.
+// Reads an attribute with `components` numbers an instance; empty: it is missing.
 std::vector<float> read_attribute(reader &r, const tinygltf::Value &attributes, const char *name, int components,
                                   size_t &count, const std::string &where)
 {

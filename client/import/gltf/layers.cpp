@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Extensions of materials that add a layer, or change the mirror or the body.
+// Extensions of materials that add a layer, or change the mirror or the interior.
 #include "material.hpp"
 
 namespace gltf
 {
 namespace
 {
-// One extension of a material.
+// An extension of a material.
 struct part {
     const building &b;
     const tinygltf::Value &object;
 
-    // A number into `value`, which has the default already.
+    // Reads a number into `value`, which holds the default.
     void factor(const char *key, float &value, double minimum, double maximum) const
     {
         value = limited(b.r, b.where, key, number(object, key, double(value)), minimum, maximum);
@@ -120,7 +120,7 @@ void extensions(const building &b)
     for (const auto &one : known)
         if (const tinygltf::Value *object = extension(b.source.extensions, one.name))
             one.read({b, *object});
-    // KHR_materials_volume: a thickness of 0, which is the default, says that there is no body.
+    // KHR_materials_volume: a thickness of 0, the default, means that there is no interior.
     b.set.thin_walled = (b.set.transmission > 0 || b.set.diffuse_transmission > 0) && b.set.thickness <= 0;
 }
 } // namespace gltf

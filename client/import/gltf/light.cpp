@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Lights of KHR_lights_punctual. Candela become watts per steradian and lux watts per square metre number by
-// number: the renderer works in one unit throughout, and files are made to look right at exposure 0.
+// Lights of KHR_lights_punctual. Candela become watts per steradian and lux watts per square metre with the same
+// numbers: the renderer uses one unit throughout, and files are exposed correctly at exposure 0.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -13,8 +13,8 @@ namespace
 {
 constexpr double pi = 3.14159265358979;
 
-// The extension knows only points. A point light whose "extras" have a "radius" (metres) is a sphere that sends as
-// much, intensity being its radiance times the disc that it shows.
+// The extension knows only points. A point light whose "extras" have a "radius" (metres) becomes a sphere with the
+// same intensity, which is its radiance times its visible disc.
 void give_size(reader &r, const tinygltf::Light &light, const std::string &where, message_set_light &set)
 {
     const double radius = number(light.extras, "radius", 0);
@@ -34,7 +34,7 @@ struct light_place {
     std::array<double, 3> at;
 };
 
-// How many times white a white surface in the middle of the scene would be.
+// Brightness of a white surface in the middle of the scene, relative to white.
 double whiteness(const reader &r, const std::vector<light_place> &lights, const world_box &around)
 {
     double extent2 = 0, sum = 0;
@@ -46,13 +46,13 @@ double whiteness(const reader &r, const std::vector<light_place> &lights, const 
         double distance2 = 0;
         for (size_t c = 0; c < 3; c++)
             distance2 += std::pow(one.at[c] - (around.lower[c] + around.upper[c]) / 2, 2);
-        // A light within the scene is a quarter of it away from what it lights.
+        // a light within the scene counts as a quarter of its extent away
         sum += light.type == "directional" ? light.intensity : light.intensity / std::max(distance2, extent2 / 16);
     }
     return sum / pi;
 }
-// From here on intensities are lumens: above models that are lit brightly on purpose (Khronos' LightsPunctualLamp
-// is 61 times white), or, by exporters that write lumens unless they are told otherwise, not far above white.
+// Threshold above which intensities count as lumens: beyond models that are lit brightly on purpose (Khronos'
+// LightsPunctualLamp is 61 times white), or little above white for exporters that write lumens by default.
 double photometric_white(const reader &r)
 {
     int major = 0, minor = 0;
@@ -110,7 +110,7 @@ uint32_t light_id(reader &r, int index, const std::string &where)
 
 void convert_photometric_lights(reader &r, const std::vector<int> &roots)
 {
-    constexpr double lumens_per_watt = 683; // of Blender's exporter
+    constexpr double lumens_per_watt = 683; // the factor of Blender's exporter
     std::vector<light_place> lights;
 
     if (r.model.lights.empty())
@@ -121,7 +121,7 @@ void convert_photometric_lights(reader &r, const std::vector<int> &roots)
         if (light >= 0 && size_t(light) < r.model.lights.size())
             lights.push_back({light, point_of(placed, {0, 0, 0})});
     });
-    const double white = whiteness(r, lights, around); // of a scene without meshes it is 0 or NaN
+    const double white = whiteness(r, lights, around); // 0 or NaN for a scene without meshes
     if (!(white > photometric_white(r) && white < 1e30))
         return;
     for (tinygltf::Light &light : r.model.lights)

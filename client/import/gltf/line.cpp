@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Primitives of points and lines: spheres, as of other formats' points, and thin tubes, which rays can hit.
+// Primitives of points and lines: spheres, as for points of other formats, and thin tubes, which rays can hit.
 #include "reader.hpp"
 #include "import/model/points.hpp"
 #include "protocol/common/srgb.h"
@@ -25,7 +25,7 @@ std::vector<float> places_of(reader &r, const tinygltf::Primitive &primitive, co
     return places;
 }
 
-// Colours of vertices times that of the material, as points::cloud has them; empty: the vertices have none.
+// Multiplies colours of vertices by the material's, in the form of points::cloud; empty: the vertices have none.
 std::vector<float> point_colours(reader &r, const tinygltf::Primitive &primitive, size_t count,
                                  const std::string &where)
 {
@@ -112,7 +112,7 @@ uint32_t add_gaussians(reader &r, const tinygltf::Primitive &primitive, const ti
 
 // ---- lines
 
-// Ends of lines, two each.
+// Lists the ends of lines, two each.
 std::vector<uint32_t> ends_of(reader &r, const tinygltf::Primitive &primitive, size_t vertices,
                               const std::string &where)
 {

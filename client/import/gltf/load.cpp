@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From bytes to tinygltf's structures: input that would harm the parser is rejected before it is called.
+// Loading of files into tinygltf's structures: input that would harm the parser is rejected in advance.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ uint32_t u32_at(const unsigned char *bytes)
     return uint32_t(bytes[0]) | uint32_t(bytes[1]) << 8 | uint32_t(bytes[2]) << 16 | uint32_t(bytes[3]) << 24;
 }
 
-// A recursive parser needs stack for every level: the depth is counted first, without recursion.
+// The parser is recursive and needs stack for every level, so the depth is counted in advance without recursion.
 void check_json_depth(reader &r, const unsigned char *json, size_t size_bytes)
 {
     size_t depth = 0;
@@ -43,7 +43,7 @@ void check_json_depth(reader &r, const unsigned char *json, size_t size_bytes)
     }
 }
 
-// The JSON chunk and the binary one, in place; the rest of the file is skipped.
+// Finds the JSON chunk and the binary chunk, in place; the rest of the file is skipped.
 struct chunks {
     const unsigned char *json = nullptr, *binary = nullptr;
     size_t json_bytes = 0, binary_bytes = 0;
@@ -79,7 +79,7 @@ chunks cut_binary(reader &r, const unsigned char *bytes, size_t size_bytes)
     return result;
 }
 
-// tinygltf wants both chunks behind each other and whole words; most files are just so already.
+// Rebuilds a binary file with two adjacent chunks of whole words, as tinygltf requires; most files have this form.
 std::vector<unsigned char> rebuild_binary(const chunks &parts)
 {
     const size_t json_bytes = (parts.json_bytes + 3) & ~size_t(3),
@@ -109,7 +109,7 @@ std::vector<unsigned char> rebuild_binary(const chunks &parts)
 
 bool file_exists(const std::string &, void *)
 {
-    return true; // reading it will tell
+    return true; // reading the file decides
 }
 
 std::string expand_path(const std::string &path, void *)
@@ -127,7 +127,7 @@ int base64_value(char c)
                                   : -1;
 }
 
-// tinygltf decodes the media types that it knows; what it takes for a file name comes here.
+// Decodes data URIs whose media type tinygltf does not know, and which it therefore takes for file names.
 bool read_data_uri(std::vector<unsigned char> *out, std::string *error, const std::string &uri)
 {
     const size_t comma = uri.find(',');
@@ -140,7 +140,7 @@ bool read_data_uri(std::vector<unsigned char> *out, std::string *error, const st
         return false;
     }
     if (comma < ending.size() || uri.compare(comma - ending.size(), ending.size(), ending) != 0) {
-        out->assign(uri.begin() + std::ptrdiff_t(comma) + 1, uri.end()); // the percent signs are resolved already
+        out->assign(uri.begin() + std::ptrdiff_t(comma) + 1, uri.end()); // percent signs are resolved already
         return true;
     }
     for (size_t i = comma + 1; i < uri.size() && uri[i] != '='; i++) {
@@ -189,7 +189,7 @@ bool read_file(std::vector<unsigned char> *out, std::string *error, const std::s
     return true;
 }
 
-// Keeps the encoded bytes of images that do not lie in a buffer; those that do are found there later.
+// Keeps the encoded bytes of images outside of buffers; images in buffers are found there later.
 bool keep_image(tinygltf::Image *image, const int, std::string *, std::string *, int, int,
                 const unsigned char *bytes, int size, void *)
 {
@@ -204,14 +204,14 @@ std::string one_line(std::string text)
     std::replace(text.begin(), text.end(), '\n', ' ');
     while (!text.empty() && text.back() == ' ')
         text.pop_back();
-    // A data URI is no reading matter.
+    // a data URI is unreadable, so it is cut
     const size_t data = text.find("data:");
     if (data != std::string::npos && text.size() - data > 60)
         text = text.substr(0, data + 40) + "..";
     return text;
 }
 
-// What buffers hold ends in a scene that others may have.
+// Contents of buffers end up in a scene that others may see, so other kinds of files are refused.
 void check_buffers(reader &r)
 {
     for (size_t i = 0; i < r.model.buffers.size(); i++) {
@@ -242,8 +242,8 @@ std::string place(const char *array, size_t index)
 
 namespace
 {
-// A file may be longer than its buffer (section 3.6.1), which tinygltf refuses: its message says by how much, and
-// the next attempt reads so much only. False: that is not what was wrong.
+// A file may be longer than its buffer (section 3.6.1), which tinygltf refuses; its message contains the size, to
+// which the next attempt limits the buffer. False: the error is another one.
 bool learn_buffer_size(reader &r, const std::string &error)
 {
     const std::string begin = "File size mismatch : ", middle = ", requestedBytes ", end = ", but got ";
@@ -304,10 +304,10 @@ void load(reader &r, const unsigned char *bytes, size_t size_bytes)
     bool loaded = load_once(r, bytes, size_bytes, binary, error);
     for (int again = 0; !loaded && again < 16 && learn_buffer_size(r, error); again++)
         loaded = load_once(r, bytes, size_bytes, binary, error);
-    check_required_extensions(r); // an unknown one explains a failure better than the parser
+    check_required_extensions(r); // an unknown extension explains a failure better than the parser's error
     if (!loaded)
         fail(r, "", "%s", error.empty() ? "the file cannot be parsed" : one_line(error).substr(0, 400).c_str());
-    if (!error.empty()) // it went on all the same
+    if (!error.empty()) // the parser continued after an error
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "", "%s", one_line(error).substr(0, 400).c_str());
     check_version(r);
     check_buffers(r);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Materials. Every one is gone through twice by the same code: first to learn which images are wanted and how, so
-// that they can be decoded side by side, then to be added.
+// Materials. The same code visits each material twice: first to collect the required images, so that they can be
+// decoded in parallel, then to add the material.
 #include "material.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ void core(const building &b)
         b.set.base_colour[c] = limited(b.r, b.where, "the base colour", pbr.baseColorFactor[c], 0, 1);
     b.set.metallic = limited(b.r, b.where, "metallicFactor", pbr.metallicFactor, 0, 1);
     b.set.roughness = limited(b.r, b.where, "roughnessFactor", pbr.roughnessFactor, 0, 1);
-    if (!extension(b.source.extensions, "KHR_materials_pbrSpecularGlossiness")) { // which is in their place
+    if (!extension(b.source.extensions, "KHR_materials_pbrSpecularGlossiness")) { // which replaces these fields
         use_texture(b.r, b.all, source_of(pbr.baseColorTexture), true, b.uses[PROTOCOL_MATERIAL_BASE_COLOUR],
                     b.where);
         use_texture(b.r, b.all, source_of(pbr.metallicRoughnessTexture), false,
@@ -57,7 +57,7 @@ void alpha(const building &b)
     else if (mode != "OPAQUE")
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
                     "unknown alpha mode '%.32s' is treated as OPAQUE", mode.c_str());
-    // A cutoff above 1 is allowed and leaves nothing of the surface; 1 leaves what is fully opaque.
+    // A cutoff above 1 is allowed and removes the whole surface; 1 keeps only fully opaque parts.
     b.set.alpha_cutoff = limited(b.r, b.where, "the alpha cutoff", b.source.alphaCutoff, 0, 1);
     b.set.double_sided = b.source.doubleSided;
 }
@@ -77,7 +77,8 @@ void transmission(const building &b)
     b.set.unlit = extension(b.source.extensions, "KHR_materials_unlit") != nullptr;
 }
 
-// Of a panel beside the light that stands for it; Blender writes a property of a material there.
+// Marks a panel that only shows a light, which lights the scene itself; Blender stores this as a property of the
+// material.
 void emission_seen_only(const building &b)
 {
     static const char key[] = "emission_seen_only";
@@ -95,8 +96,8 @@ struct gloss_maps {
     record_texture_use uses[2] = {};
 };
 
-// Both are read as colours: the alpha of either is linear. Maps that lie differently on the surface do not become
-// one: then the first one counts.
+// Both maps are read as colours; their alpha is linear. Maps with different placements on the surface cannot be
+// combined: only the first one counts then.
 gloss_maps maps_of(const building &b, const tinygltf::Value &old)
 {
     static const char *const names[2] = {"diffuseTexture", "specularGlossinessTexture"};
@@ -186,7 +187,8 @@ void specular_glossiness(const building &b)
     const gloss_maps maps = maps_of(b, *old);
     const bool textured = maps.images[0] >= 0 || maps.images[1] >= 0;
     const metal_rough metal =
-        textured ? metal_rough{{1, 1, 1}, 1, 1, 1, {1, 1, 1}} : metal_of(factors); // the textures have all then
+        // The textures contain the factors then
+        textured ? metal_rough{{1, 1, 1}, 1, 1, 1, {1, 1, 1}} : metal_of(factors);
     float *const mirror[] = {&b.set.specular_red, &b.set.specular_green, &b.set.specular_blue};
     for (size_t c = 0; c < 3; c++) {
         b.set.base_colour[c] = float(metal.base[c]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the parts of a material are made from.
+// The parts of a material under construction.
 #ifndef FARLIGHT_IMPORT_GLTF_MATERIAL_HPP
 #define FARLIGHT_IMPORT_GLTF_MATERIAL_HPP
 
@@ -13,10 +13,10 @@ struct building {
     const tinygltf::Material &source;
     std::string where;
     message_set_material &set;
-    record_texture_use *uses; // PROTOCOL_MATERIAL_COUNT of them
+    record_texture_use *uses; // PROTOCOL_MATERIAL_COUNT elements
 };
 
-// What the extensions say that add layers to a material, or change its mirror or its body.
+// Reads the extensions that add layers to a material, or change its mirror or its interior.
 void extensions(const building &b);
 } // namespace gltf
 

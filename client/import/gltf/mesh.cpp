@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// All primitives of a glTF mesh become one mesh of ours: vertices behind each other, one range of triangles per
-// primitive, so that instances and materials stay what they are.
+// Meshes: the primitives of a glTF mesh become a single mesh, with concatenated vertices and a range of triangles
+// for each primitive, so that instances and materials are preserved.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ struct vertex_attributes {
     int texcoord[2] = {-1, -1};
 };
 
-// Vertices of one primitive; several primitives with the same accessors share them.
+// Vertices of a primitive; primitives with the same accessors share them.
 struct vertex_lot {
     const tinygltf::Primitive *primitive;
     vertex_attributes attributes;
@@ -30,7 +30,7 @@ struct builder {
     reader &r;
     std::string where;
     const tinygltf::Mesh &source;
-    bool skinned; // some node wants it moved by a skin
+    bool skinned; // a node moves the mesh by a skin
     shown_mesh shown = {};
     import_mesh mesh = {};
     std::vector<record_morph_weight> weights = {};
@@ -80,7 +80,7 @@ void add_triangle(builder &b, uint32_t first, uint32_t x, uint32_t y, uint32_t z
     b.indices.push_back(first + z);
 }
 
-// Whole triangles. Most meshes are one list of them, and large ones would feel a copy.
+// Adds complete triangles. Most meshes are a single list of them, and copying a large one would take time.
 void add_corners(builder &b, uint32_t first, std::vector<uint32_t> corners)
 {
     if (first > 0)
@@ -111,7 +111,7 @@ void add_triangles(builder &b, const tinygltf::Primitive &primitive, const verte
             add_triangle(b, lot.first, corners[i - 1], corners[i], corners[0]);
         else if (i % 2 == 0)
             add_triangle(b, lot.first, corners[i - 2], corners[i - 1], corners[i]);
-        else // every other triangle of a strip is turned
+        else // every other triangle of a strip is reversed
             add_triangle(b, lot.first, corners[i - 2], corners[i], corners[i - 1]);
     }
 }
@@ -124,7 +124,7 @@ void add_primitive(builder &b, const tinygltf::Primitive &primitive, size_t numb
     if (primitive.mode < TINYGLTF_MODE_POINTS || primitive.mode > TINYGLTF_MODE_TRIANGLE_FAN)
         fail(b.r, where, "mode %d is unknown", primitive.mode);
     if (primitive.mode < TINYGLTF_MODE_TRIANGLES)
-        return; // add_points_and_lines() has them
+        return; // handled by add_points_and_lines()
     if (attribute(primitive.attributes, "POSITION") < 0) {
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
                     "a primitive without positions is left out");
@@ -176,12 +176,12 @@ void read_vertices(builder &b)
     b.mesh.positions = reading::allocate<float>(b.r, b.where, count * 3);
     if (any(b, &vertex_attributes::normal))
         b.mesh.normals =
-            reading::allocate<float>(b.r, b.where, count * 3); // zeros are made good when the mesh is added
+            reading::allocate<float>(b.r, b.where, count * 3); // zeros are replaced when the mesh is added
     if (b.mesh.normals && any(b, &vertex_attributes::tangent))
         b.mesh.tangents = reading::allocate<float>(b.r, b.where, count * 4);
     else
         for (vertex_lot &lot : b.lots)
-            lot.attributes.tangent = -1; // glTF: without normals, tangents are to be ignored
+            lot.attributes.tangent = -1; // glTF ignores tangents without normals
     for (size_t set = 0; set < 2; set++)
         if (std::any_of(b.lots.begin(), b.lots.end(),
                         [&](const vertex_lot &lot) { return lot.attributes.texcoord[set] >= 0; }))
@@ -192,7 +192,7 @@ void read_vertices(builder &b)
         read_lot(b, lot);
 }
 
-// Joints of all vertices; of lots that name none, all vertices follow the first one.
+// Reads the joints of all vertices; vertices without joints follow the first one.
 void read_joints(builder &b)
 {
     std::vector<influences> of_lots;
@@ -322,7 +322,8 @@ void read_colours(reader &r, int accessor, size_t count, uint16_t *out, const st
     const bool has_alpha = accessor_components(r, accessor, where) == 4;
     tinygltf::Accessor &from = r.model.accessors[size_t(accessor)];
 
-    // Exporters forget to say so of integers, which mean nothing else (glTF 2.0, section 3.7.2.1).
+    // Exporters forget to mark integers as normalised, which is their only meaning here (glTF 2.0, section
+    // 3.7.2.1).
     from.normalized = from.normalized || from.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT;
     std::vector<float> colours(count * 4);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Views compressed with meshoptimizer. The format is that of KHR_meshopt_compression, of which that of
-// EXT_meshopt_compression is a part; sections and names are those of its appendices A and B. What the header
-// states is held against the compressed bytes, which limit it, before memory is spent.
+// Views compressed with meshoptimizer, in the format of KHR_meshopt_compression, which includes
+// EXT_meshopt_compression; sections and names are of its appendices A and B. The header's claims are compared with
+// the compressed size, which bounds them, before memory is allocated.
 #include "meshopt.hpp"
 
 #include "reader.hpp"
@@ -15,7 +15,8 @@ namespace gltf
 {
 namespace
 {
-// Of one compressed byte: a block of 256 elements of 4 bytes whose deltas are all zero (attributes, version 1).
+// Maximum expansion of a compressed byte: a block of 256 elements of 4 bytes whose deltas are all zero
+// (attributes, version 1).
 constexpr size_t attribute_bytes_max = 1024;
 
 struct packed_view {
@@ -58,7 +59,7 @@ void check_filter(reader &r, const packed_view &packed, const std::string &where
              packed.stride);
 }
 
-// YCoCg to RGB, of components of 8 or 16 bits: appendix B, filter 4.
+// Converts YCoCg to RGB, for components of 8 or 16 bits: appendix B, filter 4.
 template <typename type, typename signed_type> void decode_colours(std::vector<unsigned char> &out, size_t count)
 {
     const float whole = float(type(~type(0)));
@@ -93,7 +94,7 @@ void apply_filter(const packed_view &packed, std::vector<unsigned char> &out)
         decode_colours<uint16_t, int16_t>(out, packed.count);
 }
 
-// The filters work on groups of elements and are safe for any bytes.
+// The filters process groups of elements and are safe for any bytes.
 bool decode_attributes(reader &r, const packed_view &packed, std::vector<unsigned char> &out,
                        const std::string &where)
 {

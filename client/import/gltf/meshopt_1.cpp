@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Decoder of meshoptimizer's attributes, version 1.
 #include "meshopt.hpp"
 
 #include <algorithm>
@@ -39,7 +40,7 @@ bool decode_group(source &in, unsigned bits, unsigned char *out)
         return false;
     for (unsigned i = 0; i < group_size; i++) {
         const unsigned bit = i * bits, byte = packed[bit / 8];
-        // Single bits begin at the lowest, others at the highest ones.
+        // Single bits start at the lowest bit of a byte, others at the highest ones.
         const unsigned shift = bits == 1 ? bit % 8 : 8 - bits - bit % 8;
         out[i] = static_cast<unsigned char>(byte >> shift & sentinel);
         if (bits == 8 || out[i] != sentinel)
@@ -52,7 +53,7 @@ bool decode_group(source &in, unsigned bits, unsigned char *out)
     return true;
 }
 
-// The deltas of one byte of the elements of a block.
+// Decodes the deltas of one byte of the elements of a block.
 bool decode_plane(source &in, unsigned control, size_t count, unsigned char *out)
 {
     static const unsigned char bits[2][4] = {{0, 1, 2, 4}, {1, 2, 4, 8}};
@@ -82,7 +83,7 @@ uint32_t unzigzag(uint32_t value, uint32_t mask)
     return ((value & 1) != 0 ? ~(value >> 1) : value >> 1) & mask;
 }
 
-// The value that follows `last`, 4 bytes wide, by its deltas. Mode 0: bytes, 1: pairs of bytes, 2: rotated bits.
+// The value after `last`, 4 bytes wide, from its deltas. Mode 0: bytes, 1: pairs of bytes, 2: rotated bits.
 uint32_t next_value(uint32_t last, uint32_t delta, unsigned mode)
 {
     if (mode % 16 == 2) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The hierarchy: transforms, and the objects of nodes. Nothing here is recursive.
+// The hierarchy of nodes: transforms, and the objects that nodes show. Without recursion.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -9,7 +9,7 @@ namespace gltf
 {
 namespace
 {
-// One less than the server's limit, since a node with a mesh and a camera needs one below it.
+// The server's limit minus one, since a node with a mesh and a camera needs a child.
 constexpr int depth_max = 255;
 
 std::string name_of(const reader &r, const tinygltf::Node &node)
@@ -58,7 +58,7 @@ struct attachment {
     protocol_node_kind kind;
     uint32_t object;
     const char *suffix;
-    bool is_of_mesh; // it is shown for each instance of the node's mesh
+    bool is_of_mesh; // shown for each instance of the node's mesh
     uint32_t skin;
     std::vector<record_morph_weight> weights;
 };
@@ -98,7 +98,7 @@ std::vector<attachment> attachments_of(reader &r, size_t index)
     return found;
 }
 
-// `what` may be null: a group.
+// Adds a node; `what` null: a group.
 uint32_t add_node(reader &r, uint32_t parent, const matrix &m, const attachment *what, const std::string &name,
                   bool hidden)
 {
@@ -112,7 +112,7 @@ uint32_t add_node(reader &r, uint32_t parent, const matrix &m, const attachment 
         set.kind = what->kind;
         set.object = what->object;
         set.skin = what->skin;
-        set.weights = const_cast<record_morph_weight *>(what->weights.data()); // copied
+        set.weights = const_cast<record_morph_weight *>(what->weights.data()); // copied by import_add_node()
         set.weights_count = uint32_t(what->weights.size());
     }
     const uint32_t id = import_add_node(r.scene, &set);
@@ -128,8 +128,8 @@ bool is_hidden(const tinygltf::Node &node)
            !visibility->Get("visible").Get<bool>();
 }
 
-// A node may hold a mesh, a camera and a light at once, or a mesh many times; ours hold one thing, so the others
-// hang below it.
+// A glTF node may have a mesh, a camera and a light at once, or many instances of a mesh; our node shows a single
+// object, so the others become children.
 uint32_t add_one(reader &r, size_t index, uint32_t parent)
 {
     const tinygltf::Node &node = r.model.nodes[index];
@@ -240,7 +240,8 @@ void check_hierarchy(reader &r)
             r.parents[size_t(child)] = int(i);
         }
     }
-    // With one parent at most, a cycle is a chain upwards that meets itself: 1 on the way, 2 known to end.
+    // Each node has at most one parent, so a cycle is an upward chain that meets itself. State 1: on the current
+    // chain, 2: known to end.
     std::vector<char> state(nodes.size(), 0);
     for (size_t i = 0; i < nodes.size(); i++) {
         int at = int(i);

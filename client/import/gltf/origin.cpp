@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Models far from the origin, whose nodes have doubles of which floats would lose the most: an origin near them is
-// subtracted before.
+// Models far from the origin: their nodes have doubles, which floats would round too much, so an origin near the
+// model is subtracted in advance.
 #include "reader.hpp"
 #include "import/model/origin.h"
 
@@ -17,7 +17,7 @@ struct displacement {
     std::array<double, 3> by; // in the space of the node's parent
 };
 
-// Bits of what clips do to each node.
+// Effects of clips on a node, as bits.
 enum { TURNS = 1, MOVES = 2 };
 
 std::vector<int> animated_nodes(const reader &r)
@@ -26,7 +26,7 @@ std::vector<int> animated_nodes(const reader &r)
 
     for (const tinygltf::Animation &animation : r.model.animations)
         for (const tinygltf::AnimationChannel &channel : animation.channels) {
-            const bool by_pointer = channel.target_path == "pointer"; // to whichever node
+            const bool by_pointer = channel.target_path == "pointer"; // may change any node
             if (by_pointer)
                 std::fill(found.begin(), found.end(), TURNS | MOVES);
             else if (channel.target_node >= 0 && size_t(channel.target_node) < found.size())
@@ -40,10 +40,10 @@ double length2(const std::array<double, 3> &v)
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-// A move by `by` in the parent's space as one in the node's. False: the node has no extent in some direction.
+// Converts a displacement in the parent's space to the node's. False: the node has no extent in some direction.
 bool into_node(const matrix &m, const std::array<double, 3> &by, std::array<double, 3> &out)
 {
-    const auto minor = [&](size_t i, size_t j) { // of the cofactor
+    const auto minor = [&](size_t i, size_t j) { // minor of the cofactor
         const size_t a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
         return m[c * 4 + a] * m[d * 4 + b] - m[d * 4 + a] * m[c * 4 + b];
     };
@@ -54,7 +54,7 @@ bool into_node(const matrix &m, const std::array<double, 3> &by, std::array<doub
     return std::isfinite(length2(out));
 }
 
-// Finds where along the tree the large numbers are. False: a clip has them.
+// Finds the nodes of the tree that hold the large numbers. False: a clip holds them.
 bool find_displacements(reader &r, const std::vector<int> &roots, const std::array<double, 3> &origin,
                         std::vector<displacement> &found)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Skins, and which of their joints move a vertex. Nothing is moved here: the server does that.
+// Skins, and their influences on vertices. The server moves the vertices, not the importer.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ struct influence {
     float weight;
 };
 
-// One accessor of joints and one of weights: four of each a vertex.
+// An accessor of joints and one of weights, with four of each for a vertex.
 struct influence_set {
     std::vector<uint32_t> joints;
     std::vector<float> weights;
@@ -42,7 +42,7 @@ std::vector<influence_set> read_sets(reader &r, const tinygltf::Primitive &primi
     }
 }
 
-// The influences of a vertex, up to the limit.
+// Collects the influences of a vertex, up to the limit.
 void collect(reader &r, const std::vector<influence_set> &sets, size_t vertex, std::vector<influence> &found,
              const std::string &where)
 {
@@ -59,7 +59,7 @@ void collect(reader &r, const std::vector<influence_set> &sets, size_t vertex, s
                     "of the joints that move a vertex the %d with the largest weights were kept",
                     IMPORT_INFLUENCES_MAX);
     }
-    if (found.empty()) { // held by nothing: as other programs do
+    if (found.empty()) { // vertices without influences follow a joint, as in other programs
         found.push_back({0, 1});
         import_note(r.scene, PROTOCOL_SEVERITY_INFO, where.c_str(),
                     "vertices without weights follow the first joint of the skin");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a channel of an animation changes: a property of a node, or by KHR_animation_pointer one that a path
-// through the file's JSON names.
+// Targets of animation channels: a property of a node, or with KHR_animation_pointer a property at a path through
+// the file's JSON.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -62,7 +62,7 @@ result find_node_property(reader &r, size_t node, const std::string &name, chann
         return result::FOUND;
     if (name != "extensions/KHR_node_visibility/visible")
         return result::UNKNOWN;
-    found.path = PROTOCOL_CHANNEL_NODE_HIDDEN; // what is not visible
+    found.path = PROTOCOL_CHANNEL_NODE_HIDDEN; // the inverse of visibility
     found.objects = {r.node_ids[node]};
     found.width = 1;
     found.file_width = 1;
@@ -102,7 +102,7 @@ result find_material_property(reader &r, size_t index, const std::string &name, 
         found.file_width = row.file_width;
         found.type = row.type;
         if (row.path == PROTOCOL_CHANNEL_MATERIAL_EMISSION) {
-            // Ours is the product of both, of which one is animated.
+            // Our emission is the product of factor and strength, one of which is animated.
             const tinygltf::Material &material = r.model.materials[index];
             const tinygltf::Value *strong = extension(material.extensions, "KHR_materials_emissive_strength");
             for (size_t c = 0; c < 3; c++) {
@@ -117,7 +117,7 @@ result find_material_property(reader &r, size_t index, const std::string &name, 
     return result::UNKNOWN;
 }
 
-// Ours has one colour, the product of the file's colour and intensity, of which one is animated.
+// Our light has one colour, the product of the file's colour and intensity, one of which is animated.
 result find_light_property(reader &r, size_t index, const std::string &name, channel_target &found)
 {
     const bool colour = name == "color";
@@ -143,7 +143,7 @@ result find_light_property(reader &r, size_t index, const std::string &name, cha
     return result::FOUND;
 }
 
-// "/nodes/3/translation" after "/nodes/": 3, and the name of the property. False: there is no index.
+// Splits "/nodes/3/translation" after "/nodes/" into 3 and the name of the property. False: there is no index.
 bool split(const std::string &path, const std::string &begin, size_t &index, std::string &name)
 {
     if (path.compare(0, begin.size(), begin) != 0)
@@ -186,12 +186,12 @@ bool find_target(reader &r, const tinygltf::AnimationChannel &channel, const std
     if (channel.target_path == "pointer")
         return find_pointer(r, channel, where, found);
     if (channel.target_node < 0 || size_t(channel.target_node) >= r.model.nodes.size())
-        return false; // glTF 2.0, 3.11: to be ignored
+        return false; // glTF 2.0, 3.11: ignored
     const size_t node = size_t(channel.target_node);
     if (channel.target_path == "weights")
         return find_weights(r, node, found);
     if (r.node_ids[node] == 0)
-        return false; // not part of what is shown
+        return false; // the node is not shown
     if (find_transform(r, node, channel.target_path, found))
         return true;
     import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(), "a channel of the unknown path '%.40s'",

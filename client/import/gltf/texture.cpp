@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Textures: their images, samplers and placement.
 #include "texture.hpp"
 
 #include <algorithm>
@@ -39,8 +40,8 @@ protocol_wrap wrap_of(int mode)
                                                            : PROTOCOL_WRAP_REPEAT;
 }
 
-// KHR_texture_transform: translation * rotation * scale, where a positive angle turns the coordinates
-// counter-clockwise as seen with v downwards.
+// KHR_texture_transform: translation * rotation * scale; a positive angle turns the coordinates counter-clockwise,
+// seen with v downwards.
 void apply_transform(reader &r, const tinygltf::Value &transform, record_texture_use &use, int &texcoord,
                      const std::string &where)
 {
@@ -79,7 +80,7 @@ int image_of(reader &r, int texture, const std::string &where)
 
 namespace
 {
-// Reads an image that is not where its name says.
+// Reads an image that is missing at its stated place.
 void read_moved(reader &r, tinygltf::Image &source, texture_job &job)
 {
     char reason[FILES_REASON_BYTES] = "";

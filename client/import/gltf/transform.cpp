@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A node's transform: as a matrix, and taken apart.
+// Transforms of nodes: as matrices, and decomposed.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -39,7 +39,7 @@ vector3 column(const matrix &m, size_t index)
     return {m[index * 4], m[index * 4 + 1], m[index * 4 + 2]};
 }
 
-// A unit vector at right angles to a unit vector.
+// A unit vector perpendicular to a unit vector.
 vector3 any_perpendicular(vector3 a)
 {
     const vector3 axis = std::fabs(a.x) < 0.6 ? vector3{1, 0, 0} : vector3{0, 1, 0};
@@ -74,8 +74,8 @@ void quaternion_of(vector3 x, vector3 y, vector3 z, float out[4])
         out[i] = float(q[i]);
 }
 
-// Scales are the lengths of the columns, the first one negative where the matrix mirrors; what is not at right
-// angles is made so (Gram-Schmidt).
+// Decomposes a matrix. Scales are the lengths of the columns, the first one negative if the matrix mirrors;
+// columns that are not perpendicular are made so (Gram-Schmidt).
 parts decompose(reader &r, const matrix &m, const std::string &where)
 {
     parts result = {};
@@ -221,7 +221,7 @@ std::array<double, 3> point_of(const matrix &m, const std::array<double, 3> &p)
 
 namespace
 {
-// Around the positions of a mesh as their accessors state them, where `m` places it.
+// Extends a box by the positions of a mesh, from its accessors, transformed by `m`.
 void grow(const reader &r, int mesh, const matrix &m, world_box &around)
 {
     if (mesh < 0 || size_t(mesh) >= r.model.meshes.size())

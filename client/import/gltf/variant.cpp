@@ -8,7 +8,7 @@ namespace
 {
 const char *const name = "KHR_materials_variants";
 
-// "it has 'a', 'b'"
+// Formats "it has 'a', 'b'".
 std::string listed(const tinygltf::Value &variants)
 {
     std::string list;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Radiance as a half float. */
+/* Conversion of radiance to half floats. */
 #ifndef FARLIGHT_IMPORT_IMAGE_HALF_H
 #define FARLIGHT_IMPORT_IMAGE_HALF_H
 
@@ -7,7 +7,8 @@
 #include <stdint.h>
 #include <string.h>
 
-/* IEEE 754 binary16, rounded to nearest even; 0 of what is negative or no number, and at most the largest one. */
+/* Rounds to IEEE 754 binary16, ties to even; negative numbers and NaN become 0, large ones the largest half
+ * float. */
 static inline uint16_t half_of_radiance(float value)
 {
     const float largest = 65504.0f;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Images through OpenImageIO: the reader is named by the first bytes and not guessed by the library, it reads from
-// memory, and what the header claims is checked before a pixel is asked for. A module of its own, for OpenImageIO
-// takes longer to load than most models to import.
+// Decoding of images with OpenImageIO: the first bytes choose the reader, so that the library does not guess it;
+// it reads from memory, and the header's claims are checked before pixels are decoded. A module of its own, since
+// OpenImageIO takes longer to load than most models to import.
 #include "texture.h"
 #include "half.h"
 #include "protocol/common/srgb.h"
@@ -22,7 +22,7 @@
 namespace
 {
 constexpr size_t texel_bytes = 4;
-// Of all images of a model: many small files can hold large images.
+// Limit of all images of a model, since many small files can hold large images.
 constexpr uint64_t all_images_bytes_max = 4ull << 30;
 std::atomic<uint64_t> all_images_bytes{0};
 
@@ -31,7 +31,7 @@ struct signature {
     size_t offset, length;
     const char *bytes;
 };
-// Targa has no signature: it is what remains, and its header is checked for plausibility.
+// Targa has no signature: it is the last choice, and its header is checked for plausibility.
 const signature signatures[] = {
     {"png", 0, 8, "\x89PNG\r\n\x1a\n"},
     {"jpeg", 0, 3, "\xff\xd8\xff"},
@@ -47,7 +47,7 @@ const signature signatures[] = {
     {"pnm", 0, 2, "P6"},
 };
 
-// Formats that are known and not read.
+// Formats that are recognised but not read.
 struct unread_format {
     size_t offset, length;
     const char *bytes, *reason;
@@ -85,7 +85,7 @@ const char *reader_of(const unsigned char *bytes, size_t size_bytes)
     return looks_like_targa(bytes, size_bytes) ? "targa" : nullptr;
 }
 
-// One opened image whose header has been found reasonable.
+// An opened image with a plausible header.
 struct opened_image {
     OIIO::Filesystem::IOMemReader memory;
     std::unique_ptr<OIIO::ImageInput> input;
@@ -124,7 +124,7 @@ bool opened_image::open(const char *reader, std::string &reason)
         return false;
     }
     OIIO::ImageSpec hints;
-    hints.attribute("oiio:UnassociatedAlpha", 1); // else colours come multiplied by alpha
+    hints.attribute("oiio:UnassociatedAlpha", 1); // otherwise colours are multiplied by alpha
     hints.attribute("oiio:reorient", 0);
     if (!input->open(std::string("image.") + reader, spec, hints)) {
         reason = input->geterror();
@@ -137,10 +137,12 @@ bool opened_image::open(const char *reader, std::string &reason)
 
 uint8_t byte_of(float value)
 {
-    return uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255.0f)); // NaN becomes 0: max(NaN, 0) is 0
+    // NaN becomes 0: max(NaN, 0) is 0
+    return uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255.0f));
 }
 
-// One to four channels to four, in place at the end of the same buffer would save memory; clarity was worth more.
+// Expands one to four channels to four. Working in place at the end of the same buffer would save memory; clarity
+// was worth more.
 void expand(const uint8_t *from, unsigned char *to, size_t texels, int channels)
 {
     for (size_t i = 0; i < texels; i++, from += channels, to += texel_bytes) {
@@ -151,7 +153,7 @@ void expand(const uint8_t *from, unsigned char *to, size_t texels, int channels)
     }
 }
 
-// Its size in the job, and room in what all images may take. False: the job or the reason says why.
+// Sets the job's size, and reserves a part of the limit of all images. False: the job or `reason` has the fault.
 bool settle_size(const opened_image &image, texture_job &job, std::string &reason)
 {
     job.reduced = texture_reduction(&job, uint64_t(image.spec.width), uint64_t(image.spec.height));
@@ -173,7 +175,7 @@ bool settle_size(const opened_image &image, texture_job &job, std::string &reaso
     return true;
 }
 
-// The first channels, each texel the mean of those that it stands for.
+// Reads the first channels; each texel is the mean of those that it replaces.
 bool read_floats(opened_image &image, const texture_job &job, int channels, std::vector<float> &pixels,
                  std::string &reason)
 {
@@ -221,7 +223,7 @@ bool decode_bytes(opened_image &image, texture_job &job, size_t texels, std::str
     return true;
 }
 
-// `linear`: the values are light, not encoded as the texels are.
+// Decodes floats; `linear`: the values stay linear light instead of being sRGB-encoded.
 bool decode_floats(opened_image &image, texture_job &job, size_t texels, bool linear, std::string &reason)
 {
     const int channels = std::min(image.spec.nchannels, 4);
@@ -330,12 +332,12 @@ static void decode_all(struct texture_job *jobs, size_t count)
     std::atomic<size_t> next{0};
     std::thread helper;
 
-    OIIO::attribute("threads", 1); // ours are enough
+    OIIO::attribute("threads", 1); // our own threads suffice
     if (count > 1) {
         try {
             helper = std::thread(decode_next, jobs, count, std::ref(next));
         } catch (...) {
-            // No thread to be had: this one does it all.
+            // Without a second thread, this one decodes everything.
         }
     }
     decode_next(jobs, count, next);

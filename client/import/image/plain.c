@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Decoding of PNG, JPEG and HDR images without OpenImageIO. */
 #include "plain.h"
 
 #include "half.h"
@@ -13,7 +14,7 @@
 #include <string.h>
 #include <turbojpeg.h>
 
-/* As in module.cpp. */
+/* The limits of module.cpp. */
 #define ALL_TEXELS_MAX (UINT64_C(1) << 30)
 #define TEXEL_BYTES 4
 
@@ -34,7 +35,7 @@ static bool is_plain(const struct texture_job *job)
     return job->bytes && (is_png(job) || is_jpeg(job));
 }
 
-/* Checks what the header claims before memory is taken for it. */
+/* Checks the header's claims and allocates the texels. */
 static bool take_texels(struct texture_job *job, uint64_t width, uint64_t height)
 {
     char *reason = job->reason;
@@ -61,8 +62,8 @@ struct png_bytes {
     struct texture_job *job;
     size_t at;
     png_bytep *rows;
-    unsigned char *row; /* of an image that is reduced .. */
-    uint32_t *sums;     /* .. and those of a row of the result */
+    unsigned char *row; /* row of an image that is reduced .. */
+    uint32_t *sums;     /* .. and sums for a row of the result */
 };
 
 static void read_png(png_structp png, png_bytep to, size_t count)
@@ -86,7 +87,7 @@ static void ignore_warning(png_structp png, png_const_charp text)
     (void)png, (void)text;
 }
 
-/* Whatever it holds becomes four bytes a texel. */
+/* Converts any PNG to four bytes a texel. */
 static void ask_for_bytes(png_structp png, png_infop info, struct texture_job *job)
 {
     const png_byte type = png_get_color_type(png, info);
@@ -102,7 +103,7 @@ static void ask_for_bytes(png_structp png, png_infop info, struct texture_job *j
     png_read_update_info(png, info);
 }
 
-/* Means of bytes as they are encoded: at such sizes neighbours are alike. */
+/* Averages encoded bytes: in images of this size neighbours are similar. */
 static void read_reduced(png_structp png, png_infop info, struct png_bytes *bytes)
 {
     struct texture_job *job = bytes->job;
@@ -132,14 +133,14 @@ static void read_reduced(png_structp png, png_infop info, struct png_bytes *byte
     }
 }
 
-/* An error of libpng ends it by a jump: it keeps nothing in variables that the caller must free. */
+/* An error of libpng ends this function by a jump, so it keeps nothing in variables that the caller must free. */
 static bool read_png_texels(png_structp png, png_infop info, struct png_bytes *bytes)
 {
     struct texture_job *job = bytes->job;
     if (setjmp(png_jmpbuf(png)))
         return false;
     png_set_read_fn(png, bytes, read_png);
-    png_set_user_limits(png, 0x7fffffff, 0x7fffffff); /* ours have their own words */
+    png_set_user_limits(png, 0x7fffffff, 0x7fffffff); /* our own limits have better messages */
     png_read_info(png, info);
     if (!take_texels(job, png_get_image_width(png, info), png_get_image_height(png, info)))
         return false;
@@ -176,7 +177,7 @@ static bool decode_png(struct texture_job *job)
 
 /* ---- JPEG ---- */
 
-/* JPEGs hold 255 minus the ink of each colour. In place. */
+/* Converts in place: JPEGs hold 255 minus the ink of each colour. */
 static void rgb_from_cmyk(unsigned char *texels, size_t count)
 {
     for (unsigned char *at = texels; at < texels + count * TEXEL_BYTES; at += TEXEL_BYTES) {
@@ -196,7 +197,7 @@ static bool decode_jpeg_with(tjhandle handle, struct texture_job *job)
     if (!take_texels(job, (uint64_t)width, (uint64_t)height))
         return false;
     const bool inks = space == TJCS_CMYK || space == TJCS_YCCK;
-    /* What is cut off stays grey, as with a warning. */
+    /* A truncated image stays grey at its end and causes a warning only. */
     if (job->reduced > 8)
         return snprintf(job->reason, sizeof(job->reason), "is too large"), false;
     if (tjDecompress2(handle, job->bytes, size, job->texels, (int)job->width, 0, (int)job->height,
@@ -224,11 +225,11 @@ static bool decode_jpeg(struct texture_job *job)
 struct hdr_bytes {
     const unsigned char *at;
     size_t left_bytes;
-    bool exhausted; /* more were read than there are */
+    bool exhausted; /* more was read than there is */
 };
 
-/* Behind the end stb 2.27 reads zeros and takes them for runs of no texel, without end. Ends of lines end its
- * header, and are runs of ten. */
+/* Reads bytes, and newlines after the end: stb 2.27 would take zeros there for runs of no texel, endlessly.
+ * Newlines end its header, and are runs of ten. */
 static int read_hdr(void *context, char *to, int count)
 {
     struct hdr_bytes *bytes = context;
@@ -259,9 +260,9 @@ static int is_at_end_of_hdr(void *context)
     return bytes->left_bytes == 0;
 }
 
-/* A row has four bytes a texel or, if it has eight texels or more, a head of four bytes and then, for each of four
- * channels, two bytes a run of at most 127. A header that claims more than the file can hold is refused before
- * memory is taken for it. */
+/* Checks that the file can hold its rows: a row has four bytes a texel or, with eight texels or more, a header
+ * of four bytes and then, for each of four channels, two bytes a run of at most 127. A header that claims more
+ * is refused before memory is allocated. */
 static bool holds_rows_of_hdr(const struct texture_job *job, int width, int height)
 {
     const uint64_t texels = (uint64_t)width, rows = (uint64_t)height;
@@ -330,7 +331,7 @@ static void *decode_next(void *context)
     return NULL;
 }
 
-/* Larger ones first: else one thread may decode the largest while the other has no more to do. */
+/* Sorts larger images first; otherwise one thread may end up decoding the largest while the other is idle. */
 static int compare_jobs(const void *a, const void *b)
 {
     const size_t left = (*(struct texture_job *const *)a)->size_bytes;

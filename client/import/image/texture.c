@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Decoding of images, with the module if necessary. */
 #include "texture.h"
 #include "helper/module.h"
 #include "plain.h"
@@ -8,10 +9,10 @@
 #include <string.h>
 
 #pragma weak texture_reader
-/* NULL, unless the module is linked to the program itself. */
+/* NULL, unless the module is linked into the program itself. */
 static const struct texture_reader *reader = &texture_reader;
 
-/* False: the job says why. */
+/* Loads the module; false: the job has the reason. */
 static bool load_for(struct texture_job *job)
 {
     char reason[160];

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Detection of closed meshes by sums of hashes. */
 #include "closed.h"
 
 #include <pthread.h>
@@ -22,7 +23,7 @@ static uint64_t mix_two(uint64_t first, uint64_t second)
 }
 
 /* The 64-bit hash of a position. Two positions may collide, at 10 million vertices once in some 100,000 meshes;
- * that cannot open a closed mesh, and hardly close an open one. */
+ * a collision cannot open a closed mesh, and hardly closes an open one. */
 static uint64_t place_of(const float *position)
 {
     uint32_t bits[3];
@@ -35,9 +36,9 @@ static uint64_t place_of(const float *position)
     return mix_two(bits[0] | (uint64_t)bits[1] << 32, bits[2]);
 }
 
-/* A hash of the edge, and its negative for the reversed edge; 0 for one without length. Which end is the lesser is
- * unpredictable, so nothing branches on it. Places are hashes already: their sum, one end times an odd number, is
- * as good as one. */
+/* A hash of the edge, and its negative for the reversed edge; 0 for an edge without length. The order of the
+ * ends is unpredictable, so nothing branches on it. Positions are hashes already: their sum, with one end times
+ * an odd number, is as good a hash. */
 static uint64_t edge_of(uint64_t from, uint64_t to)
 {
     const uint64_t lesser = from < to ? from : to, greater = from < to ? to : from;
@@ -46,7 +47,7 @@ static uint64_t edge_of(uint64_t from, uint64_t to)
     return ((hash ^ reversed) - reversed) & has_length;
 }
 
-/* Triangles, and the place of each vertex: a vertex is hashed once, not at each of its triangles. */
+/* Triangles, and the hash of each vertex, which is computed once instead of at each triangle. */
 struct places {
     const uint64_t *of_vertex;
     const uint32_t *indices;
@@ -64,8 +65,9 @@ static bool degenerate(const uint64_t corners[3])
     return corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
 }
 
-/* The edges' hashes add up to 0 if each edge occurs equally often in both directions, and otherwise, but for one
- * chance in 2^64, they do not. So no edge need be stored. (The edges of a degenerate triangle add up to 0.) */
+/* The hashes of all edges add up to 0 if each edge occurs equally often in both directions, and otherwise to
+ * another value except with probability 2^-64, so no edge has to be stored. (The edges of a degenerate triangle
+ * add up to 0.) */
 static bool edges_paired(const struct places *places)
 {
     uint64_t sum = 0;
@@ -79,8 +81,8 @@ static bool edges_paired(const struct places *places)
     return sum == 0;
 }
 
-/* An empty slot. Not 0: memory that is 0 from the kernel and is read before it is written is mapped twice, and the
- * other thread's processor is told each time, which took longer than all else. */
+/* An empty slot. The value is not 0: the kernel maps zeroed memory that is read before it is written twice, and
+ * notifies the other thread's processor each time, which took longer than everything else. */
 #define EMPTY UINT64_MAX
 
 /* A hash independent of the first corner, as a sum of hashes; the lowest bit is the orientation. Never EMPTY. */
@@ -91,9 +93,8 @@ static uint64_t triangle_of(const uint64_t corners[3])
     return ((corners[0] + corners[1] + corners[2]) & ~(uint64_t)3) | turned;
 }
 
-/* False: it is in the table with the other orientation. The table's size is a power of two and greater than the
- * number of triangles.
- */
+/* Inserts a triangle. False: the table has it with the other orientation. The table's size is a power of two
+ * and greater than the number of triangles. */
 static bool put(uint64_t *table, uint64_t mask, uint64_t triangle)
 {
     uint64_t at = triangle >> 2 & mask;
@@ -105,10 +106,10 @@ static bool put(uint64_t *table, uint64_t mask, uint64_t triangle)
     return true;
 }
 
-/* So many triangles are hashed before the first is looked up, as each lies elsewhere in memory. */
+/* Number of triangles that are hashed before the first lookup, as each lookup is a cache miss. */
 #define LOOKED_UP_TOGETHER 32u
 
-/* There are triangles, and none with both orientations. */
+/* True if there are triangles, and none in both orientations. */
 static bool no_sheets(const struct places *places, const atomic_bool *stop)
 {
     const size_t triangle_count = places->triangle_count;
@@ -142,7 +143,7 @@ static bool no_sheets(const struct places *places, const atomic_bool *stop)
     return any && single;
 }
 
-/* Fewer are looked at before a thread has started. */
+/* Minimum number of triangles for which a thread is worth its start. */
 #define TRIANGLES_SHARED 20000u
 
 struct sheets {

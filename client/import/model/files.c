@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Reading of the model file and the files that it refers to. */
 #include "files.h"
 
 #include "scene.h"
@@ -18,7 +19,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#define OPEN_FLAGS (O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY) /* nonblocking: a FIFO must not hold us */
+#define OPEN_FLAGS (O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY) /* O_NONBLOCK: opening a FIFO must not block */
 
 static bool is_regular(int descriptor, char reason[FILES_REASON_BYTES])
 {
@@ -102,7 +103,7 @@ void files_finish(struct files *files)
     files->named_count = 0;
 }
 
-/* Reads until the end; the size that the file system states is only where the buffer begins. */
+/* Reads until the end; the size that the file system reports is only the buffer's first size. */
 static unsigned char *read_all(int descriptor, uint64_t room_bytes, size_t *size_bytes,
                                char reason[FILES_REASON_BYTES])
 {
@@ -165,9 +166,9 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 
 /* ---- names beneath the folder ---- */
 
-#define LINKS_MAX 40 /* of one name, as the kernel's own limit */
+#define LINKS_MAX 40 /* limit for one name, the kernel's own */
 
-/* Puts what a link holds in the place of `rest`, before what stands behind the link. */
+/* Replaces `rest` by a link's target, followed by the path behind the link. */
 static bool put_before(char rest[PATH_MAX], const char *target, const char *behind)
 {
     char joined[PATH_MAX];
@@ -181,8 +182,8 @@ static bool put_before(char rest[PATH_MAX], const char *target, const char *behi
     return true;
 }
 
-/* Resolves a name beneath the folder to one without "..", "." and links, in `path`, which is empty for the folder
- * itself. */
+/* Resolves a name beneath the folder to one without "..", "." and links, in `path`, which is empty for the
+ * folder itself. */
 static bool resolve_beneath(int folder, const char *name, char path[PATH_MAX])
 {
     char rest[PATH_MAX], target[PATH_MAX];
@@ -221,7 +222,7 @@ static bool resolve_beneath(int folder, const char *name, char path[PATH_MAX])
             memcpy(path + used, rest, length + 1);
             used += length;
             linked = readlinkat(folder, path, target, sizeof(target) - 1);
-            if (linked < 0 && errno != EINVAL) /* EINVAL: no link */
+            if (linked < 0 && errno != EINVAL) /* EINVAL: not a link */
                 return false;
         }
         if (linked < 0) {
@@ -240,7 +241,7 @@ static bool resolve_beneath(int folder, const char *name, char path[PATH_MAX])
     return true;
 }
 
-/* What is hidden in a folder (keys, tokens, histories) is no part of a model. */
+/* Hidden files (keys, tokens, histories) are no part of a model. */
 static bool is_hidden(const char *path)
 {
     return path[0] == '.' || strstr(path, "/.");
@@ -259,8 +260,8 @@ static int open_beneath(int folder, const char *name, char reason[FILES_REASON_B
             return -1;
         }
         descriptor = (int)syscall(SYS_openat2, folder, path[0] != '\0' ? path : ".", &how, sizeof(how));
-        /* Kernels and containers without openat2: the path was found to have no links, and only
-         * who may write in the folder could put one there since. */
+        /* On kernels and in containers without openat2, the path was found to have no links, and only somebody
+         * who may write in the folder could have added one since. */
         if (descriptor < 0 && (errno == ENOSYS || errno == EPERM))
             descriptor = openat(folder, path[0] != '\0' ? path : ".", OPEN_FLAGS | O_NOFOLLOW);
     }
@@ -270,7 +271,7 @@ static int open_beneath(int folder, const char *name, char reason[FILES_REASON_B
     return descriptor;
 }
 
-/* A key file of farlight looks like any other bytes, but for its size and mode (protocol/sealed/key.h). */
+/* True for a file that may be a key of farlight, which only its size and mode show (protocol/sealed/key.h). */
 static bool may_be_key(int descriptor)
 {
     struct stat status;
@@ -278,7 +279,7 @@ static bool may_be_key(int descriptor)
     return fstat(descriptor, &status) == 0 && status.st_size == 32 && (status.st_mode & (S_IRWXG | S_IRWXO)) == 0;
 }
 
-/* A file that is missing is remembered, too, as --watch waits for it. Without memory it is left out. */
+/* Records a name, also of a missing file, as --watch waits for it. Without memory it is left out. */
 static void remember(struct files *files, const char *name)
 {
     char **grown = files->named_count < FILES_NAMED_MAX
@@ -326,8 +327,8 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
     return bytes;
 }
 
-/* The last part of a path of any system, without blanks and quotes around it. False: it has none, or is too long.
- */
+/* Extracts the last part of a path of any system, without blanks and quotes around it. False: it has none, or
+ * is too long. */
 static bool last_part(const char *path, char name[FILES_NAME_BYTES])
 {
     static const char around[] = " \t\"'";
@@ -347,7 +348,7 @@ static bool last_part(const char *path, char name[FILES_NAME_BYTES])
     return true;
 }
 
-/* Replaces the name by that of a file beside the model that differs in case alone; the first one in the order of
+/* Replaces the name by a file's beside the model that differs in case only; the first one in the order of
  * bytes, so that the same folder gives the same picture. */
 static bool find_in_any_case(const struct files *files, char name[FILES_NAME_BYTES])
 {
@@ -389,7 +390,8 @@ unsigned char *files_read_image(struct files *files, struct import_scene *scene,
 
 /* ---- kinds of content ---- */
 
-/* Text, maybe cut within its last character. Vertices and indices hold zeros or other bytes that no text has. */
+/* True for text, maybe cut within its last character. Vertices and indices contain zeros or other bytes that no
+ * text has. */
 static bool is_text(const unsigned char *bytes, size_t size_bytes)
 {
     size_t at = 0;
@@ -437,7 +439,7 @@ bool files_is_buffer(const unsigned char *bytes, size_t size_bytes, const char *
         if (size_bytes >= kinds[i].bytes && memcmp(bytes, kinds[i].magic, kinds[i].bytes) == 0)
             return false;
     }
-    /* DER: a sequence with two bytes of length that begins with the integer of a version, as private keys do. */
+    /* DER: a sequence with two bytes of length that starts with the integer of a version, as private keys do. */
     *kind = "a key";
     if (size_bytes >= 7 && bytes[0] == 0x30 && bytes[1] == 0x82 && bytes[4] == 0x02 && bytes[5] == 0x01)
         return false;
@@ -457,7 +459,7 @@ bool files_is_material_library(const unsigned char *bytes, size_t size_bytes)
         while (before > text && (before[-1] == ' ' || before[-1] == '\t'))
             before--;
         if (before == text || before[-1] == '\n' || before[-1] == '\r' ||
-            before[-1] == '\xbf') /* of a byte order mark */
+            before[-1] == '\xbf') /* end of a byte order mark */
             return true;
     }
     return false;

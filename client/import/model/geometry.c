@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes and sphere sets of the scene under construction, checked as the server will check them. */
+/* Meshes and sphere sets of the scene under construction, with the server's checks. */
 #include "closed.h"
 #include "edits.h"
 #include "ranges.h"
@@ -26,11 +26,11 @@ void import_mesh_finish(struct import_mesh *mesh)
     memset(mesh, 0, sizeof(*mesh));
 }
 
-#define SIDE_BY_SIDE 8u /* that the processor may add at a time */
+#define SIDE_BY_SIDE 8u /* additions that the processor may run in parallel */
 
 static bool all_finite(const float *values, size_t count)
 {
-    /* x * 0 is 0 for finite x and NaN for the others; a sum of zeros stays 0. */
+    /* x * 0 is 0 for finite x and NaN for others; a sum of zeros stays 0. */
     float sums[SIDE_BY_SIDE] = {0}, sum = 0;
     size_t i = 0;
 
@@ -80,7 +80,7 @@ static bool triangle_whole(const struct import_mesh *mesh, uint32_t triangle)
     return whole;
 }
 
-/* Moves the whole triangles of from .. to - 1 forwards, to number `kept` and on; returns what follows them. */
+/* Moves the whole triangles of from .. to - 1 forwards, to number `kept` and on; returns the number after them. */
 static uint32_t keep_whole(struct import_mesh *mesh, uint32_t from, uint32_t to, uint32_t kept)
 {
     for (uint32_t t = from; t < to; t++)
@@ -89,8 +89,8 @@ static uint32_t keep_whole(struct import_mesh *mesh, uint32_t from, uint32_t to,
     return kept;
 }
 
-/* Removes triangles with a corner that is NaN or infinite; such corners become 0, so that later code can rely on
- * finite ones. */
+/* Removes triangles with a corner that is NaN or infinite; such corners become 0, so that later code can rely
+ * on finite ones. */
 static void drop_broken(struct import_scene *scene, const char *where, struct import_mesh *mesh)
 {
     uint32_t at = 0, kept = 0;
@@ -140,7 +140,7 @@ static bool normal_usable(const float *normal)
     return all_finite(normal, 3) && normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2] > 1e-12f;
 }
 
-/* Normals that are missing, zero or not finite are made from the triangles around the vertex. */
+/* Replaces normals that are missing, zero or not finite by ones from the triangles around the vertex. */
 static bool mend_normals(struct import_scene *scene, const char *where, struct import_mesh *mesh)
 {
     size_t count = mesh->vertex_count, broken = 0;
@@ -211,7 +211,7 @@ static uint32_t add_array(struct import_scene *scene, void *bytes, uint64_t coun
     return import_add_blob(scene, bytes, count * element_bytes);
 }
 
-/* Of points with `stride` floats each, the fourth of which, if there is one, is a radius. */
+/* Records the bounds of points with `stride` floats each; a fourth float is a radius. */
 static void add_bounds(struct import_scene *scene, const struct import_bounds *object, const float *points,
                        size_t count, size_t stride)
 {
@@ -227,12 +227,12 @@ static void add_bounds(struct import_scene *scene, const struct import_bounds *o
         const float *point = points + i * stride, radius = stride > 3 ? point[3] : 0;
         for (unsigned axis = 0; axis < 3; axis++) {
             const float lower = point[axis] - radius, upper = point[axis] + radius;
-            /* They are numbers: fminf() and fmaxf() would be calls. */
+            /* The values are finite, and fminf() and fmaxf() would be calls. */
             box.lower[axis] = lower < box.lower[axis] ? lower : box.lower[axis];
             box.upper[axis] = upper > box.upper[axis] ? upper : box.upper[axis];
         }
     }
-    for (unsigned axis = 0; axis < 3; axis++) { /* in the message's range */
+    for (unsigned axis = 0; axis < 3; axis++) { /* clamped to the message's range */
         box.lower[axis] = fmaxf(box.lower[axis], -3e38f);
         box.upper[axis] = fminf(box.upper[axis], 3e38f);
     }
@@ -240,7 +240,8 @@ static void add_bounds(struct import_scene *scene, const struct import_bounds *o
     scene->bounds[scene->bounds_count++] = box;
 }
 
-/* Colours of which bytes hold all, as most of glTF and plain ones, are sent as bytes. Returns the bytes of one. */
+/* Converts colours to bytes if that loses nothing, as with most colours of glTF and constant ones. Returns the
+ * bytes of a colour. */
 static uint64_t narrow_colours(uint16_t *colours, uint64_t vertices)
 {
     uint8_t *bytes = (uint8_t *)(void *)colours;
@@ -270,7 +271,7 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     mend(scene, where, mesh->texcoords[1], (size_t)vertices * 2, "texture coordinates");
     for (int i = 0; i < 3; i++)
         mend(scene, where, mesh->target_offsets[i], (size_t)(vertices * mesh->target_count) * 3, "morph targets");
-    /* Colours of vertices multiply the material's: theirs are shown as they are. */
+    /* Colours of vertices multiply the material's, so a mesh with colours keeps the protocol's white default. */
     if (mesh->colours || import_ranges_fill(scene, &mesh->ranges, &mesh->range_count, mesh->triangle_count))
         edit = import_append(scene, MESSAGE_SET_MESH);
     if (!edit) {
@@ -346,15 +347,15 @@ static void add_tetrahedra(struct body *body, const float *positions, const uint
     }
 }
 
-/* Shadow rays go through a body and are tinted by its material's thickness, which files have for programs that
- * trace none, often as the greatest of an image. A closed mesh has one of its own: the mean length of lines
- * through it, four volumes over its area (Cauchy). */
+/* Sets the thickness of bodies, by which shadow rays are tinted. Files have it for programs that trace no rays,
+ * often as the maximum of an image. A closed mesh has a thickness of its own: the mean length of lines through
+ * it, four times its volume over its area (Cauchy). */
 void import_measure_bodies(struct import_scene *scene)
 {
     struct body *bodies = calloc((size_t)scene->last_id[PROTOCOL_OBJECT_MATERIAL] + 1, sizeof(*bodies));
 
     if (!bodies)
-        return; /* the files' numbers stay */
+        return; /* the files' values stay */
     for (size_t i = 0; i < scene->edit_count; i++) {
         const struct import_edit *edit = &scene->edits[i];
         const struct message_set_mesh *mesh = &scene->edits[i].message.set_mesh;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Meshes and spheres grouped by material. */
 #include "grouping.h"
 
 #include <stdlib.h>
@@ -17,7 +18,7 @@ static int compare_keyed(const void *a, const void *b)
     return left->position < right->position ? -1 : left->position > right->position;
 }
 
-/* Primitives in the order of their materials; NULL: out of memory. */
+/* Sorts primitives by material; NULL: out of memory. */
 static struct keyed *sort_by_material(const uint32_t *materials, uint32_t count)
 {
     struct keyed *order = malloc(((size_t)count + 1) * sizeof(*order));
@@ -34,7 +35,8 @@ static struct keyed *sort_by_material(const uint32_t *materials, uint32_t count)
     return order;
 }
 
-/* Ranges of the primitives from `first` on, at most IMPORT_RANGES_MAX; *end is where they stop. */
+/* Makes ranges of the primitives from `first` on, at most IMPORT_RANGES_MAX; *end is the first primitive after
+ * them. */
 static struct record_material_range *make_ranges(const struct keyed *order, uint32_t first, uint32_t count,
                                                  uint32_t *range_count, uint32_t *end)
 {
@@ -74,7 +76,7 @@ static void *copy_array(const void *from, size_t bytes)
     return copy;
 }
 
-/* The mesh with other triangles. The vertices are the same bytes, so they are sent once. */
+/* Copies a mesh with other triangles. The vertices are the same bytes, so they are sent once. */
 static void copy_vertices(struct import_mesh *to, const struct import_mesh *from)
 {
     size_t count = from->vertex_count;

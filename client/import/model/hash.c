@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* All chunks of all blobs are one list of work that two threads share. */
+/* Hashing of blobs: all chunks of all blobs form one list of work, which two threads share. */
 #include "scene.h"
 
 #include "protocol/common/blob_hash.h"
@@ -16,7 +16,7 @@ struct chunk {
 
 struct hash_work {
     struct chunk *chunks;
-    uint8_t *hashes; /* of the chunks */
+    uint8_t *hashes; /* hashes of the chunks */
     size_t count;
     atomic_size_t next;
 };

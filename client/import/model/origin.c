@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The origin of a model far from the world's origin. */
 #include "origin.h"
 
 #include "edits.h"
@@ -9,8 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rays leave a surface by the position's 65536th part (shaders/shared/path.h): from here on that is a 256th of the
- * scene's radius, or more than 6 cm. */
+/* Distance from which an origin is used, relative to the scene's radius. Rays leave a surface by the position's
+ * 65536th part (shaders/shared/path.h), which at this distance is a 256th of the scene's radius, or more than 6
+ * cm. */
 #define RADII_MAX 256.0
 #define DISTANCE_MAX 4096.0
 
@@ -85,7 +87,7 @@ static bool tree_init(struct tree *tree, struct import_scene *scene)
     return true;
 }
 
-/* NULL: the node shows nothing, or what its joints place. */
+/* NULL: the node shows nothing, or joints place it. */
 static const struct import_bounds *bounds_of(const struct tree *tree, const struct message_set_node *node)
 {
     if (node->kind == PROTOCOL_NODE_MESH && node->object < tree->mesh_count && node->skin == 0)
@@ -124,7 +126,7 @@ static bool world_box(const struct tree *tree, double lower[3], double upper[3])
     return any;
 }
 
-/* Whether a clip places a root, which then cannot be moved by its transform. */
+/* True if a clip places a root, so that its transform cannot move it. */
 static bool has_moving_root(const struct import_scene *scene, const struct tree *tree)
 {
     for (size_t i = 0; i < scene->edit_count; i++) {
@@ -138,7 +140,7 @@ static bool has_moving_root(const struct import_scene *scene, const struct tree 
     return false;
 }
 
-/* By one node above all. */
+/* Moves the whole scene by a new node above all others. */
 static bool move_below(struct import_scene *scene, const double origin[3])
 {
     const double back[3] = {-origin[0], -origin[1], -origin[2]};

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Transforms in doubles. */
 #include "placement.h"
 
 #include <math.h>

@@ -14,7 +14,7 @@ namespace points
 {
 namespace
 {
-// Colours of spheres are those of materials: with 16 steps of each component there are never more of them than
+// Spheres have their colours from materials: with 16 steps for each component there are never more of them than
 // ranges in one set.
 constexpr int steps = 16;
 static_assert(steps * steps * steps <= IMPORT_RANGES_MAX, "one set has room for the ranges of all colours");
@@ -24,10 +24,10 @@ bool usable(const float *p)
     return std::fabs(p[0]) <= 1e12f && std::fabs(p[1]) <= 1e12f && std::fabs(p[2]) <= 1e12f;
 }
 
-// Median distance of some points to the nearest other one that is not at the same place; 0: there is none.
+// Median distance of some points to their nearest neighbour at another position; 0: there is none.
 double spacing(const std::vector<float> &places)
 {
-    constexpr uint64_t budget = 200000000; // distances: a fraction of a second
+    constexpr uint64_t budget = 200000000; // number of distances: a fraction of a second
     const size_t count = places.size() / 3;
     const size_t samples =
         std::min<size_t>(count, size_t(std::min<uint64_t>(std::max<uint64_t>(budget / count, 8), 256)));
@@ -66,7 +66,7 @@ unsigned cell_of(const float *colour)
     return at;
 }
 
-// A material for each colour that there is, the mean of those that are nearly the same.
+// Adds a material for each existing colour, which is the mean of nearly equal ones.
 std::vector<uint32_t> add_palette(reading::base &r, const std::vector<float> &colours, uint32_t otherwise)
 {
     std::vector<cell> cells(steps * steps * steps);
@@ -92,7 +92,7 @@ std::vector<uint32_t> add_palette(reading::base &r, const std::vector<float> &co
     return ids;
 }
 
-// Counting sort by material, so that each has one range.
+// Counting sort by material, so that each material has one range.
 uint32_t add_set(reading::base &r, const std::vector<float> &places, const std::vector<unsigned> &cells,
                  const std::vector<uint32_t> &materials, double radius, const char *name)
 {

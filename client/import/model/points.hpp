@@ -15,10 +15,10 @@ struct cloud {
     std::vector<float> places;  // 3 a point
     std::vector<float> colours; // 3 a point, sRGB; empty: all have `material`
     uint32_t material = 0;
-    double metres = 1; // of a unit
+    double metres = 1; // length of a unit
 };
 
-// Returns the identifier of a set of spheres; 0: none of the points can be shown. Their size is the scene's
+// Adds a set of spheres and returns its identifier; 0: no point can be shown. The spheres' size is the scene's
 // point_size.
 uint32_t add(reading::base &r, const cloud &from, const std::string &name, const std::string &where);
 } // namespace points

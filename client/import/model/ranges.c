@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
+/* Ranges of materials. */
 #include "ranges.h"
 
 #include <stdlib.h>
 
-/* Diffuse reflectance of what no file gives a material. Bodies that reflect all light are white wherever the sky
- * shines on them, and show no shape; of this grey even what faces the sun stays below white at the default
- * exposure.
- */
+/* Diffuse reflectance of surfaces without a material. Bodies that reflect all light are white wherever the sky
+ * lights them, and show no shape; with this grey even sunlit surfaces stay below white at the default exposure. */
 #define DEFAULT_ALBEDO 0.6f
 
 bool import_ranges_valid(const struct record_material_range *ranges, uint32_t count, uint32_t primitives)
@@ -55,7 +54,7 @@ static uint32_t default_material(struct import_scene *scene)
     return scene->default_material;
 }
 
-/* The ranges, and between them those of material 0, up to the end. */
+/* Fills gaps between the ranges, and the end, with ranges of material 0. */
 static uint32_t with_gaps(struct record_material_range *out, const struct record_material_range *ranges,
                           uint32_t count, uint32_t primitives)
 {
@@ -80,7 +79,7 @@ bool import_ranges_fill(struct import_scene *scene, struct record_material_range
     if (!all)
         return import_fail(scene, NULL, "out of memory");
     const uint32_t all_count = with_gaps(all, *ranges, *count, primitives);
-    if (all_count > IMPORT_RANGES_MAX) { /* then what has none keeps the protocol's default */
+    if (all_count > IMPORT_RANGES_MAX) { /* primitives without a material keep the protocol's default then */
         free(all);
         return true;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What readers in C++ share: how they end where a file is wrong.
+// Shared parts of the readers in C++: errors as exceptions, arrays, colours.
 #ifndef FARLIGHT_IMPORT_MODEL_READING_HPP
 #define FARLIGHT_IMPORT_MODEL_READING_HPP
 
@@ -18,17 +18,17 @@
 
 namespace reading
 {
-// Thrown after import_fail(); caught where the format's C function begins, and at the edges of libraries in C.
+// Thrown after import_fail(); caught in the format's C function, and at the edges of libraries in C.
 struct failed {
 };
 
-// Where a format's C function begins: exceptions end here. Whether the scene was read.
+// Runs the body of a format's C function and ends exceptions. Returns whether the scene was read.
 template <typename work> bool run(import_scene *scene, const char *too_large, work read)
 {
     try {
         read();
     } catch (const failed &) {
-        // said already
+        // reported already
     } catch (const std::bad_alloc &) {
         import_fail(scene, nullptr, "%s", too_large);
     } catch (const std::exception &exception) {
@@ -39,12 +39,12 @@ template <typename work> bool run(import_scene *scene, const char *too_large, wo
     return !scene->failed;
 }
 
-// What every reader begins with. The functions below are found by it, so that a reader calls them by their names.
+// Base of every reader. The functions below are found through it, so that a reader calls them without a namespace.
 struct base {
     import_scene *scene;
 };
 
-// The scene keeps 480 bytes of it.
+// Fails with a message, of which the scene keeps 480 bytes.
 [[noreturn]] inline void fail(base &r, const std::string &where, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 inline void fail(base &r, const std::string &where, const char *format, ...)
@@ -58,14 +58,14 @@ inline void fail(base &r, const std::string &where, const char *format, ...)
     throw failed();
 }
 
-// Ends the work where the scene has failed.
+// Ends the work if the scene has failed.
 inline void check(base &r)
 {
     if (r.scene->failed)
         throw failed();
 }
 
-// Fails if the scene would not have room for so many bytes more, before they are allocated.
+// Fails if the scene has no space for this number of bytes, before they are allocated.
 inline void check_room(base &r, const std::string &where, uint64_t count, uint64_t element_bytes)
 {
     if (count > (IMPORT_BYTES_MAX - r.scene->blob_bytes) / element_bytes)
@@ -73,7 +73,7 @@ inline void check_room(base &r, const std::string &where, uint64_t count, uint64
              static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
 }
 
-// Zeros for the C interface, which takes them over.
+// Allocates zeroed memory for the C interface, which takes it over.
 template <typename type> type *allocate(base &r, const std::string &where, uint64_t count)
 {
     check_room(r, where, count, sizeof(type));
@@ -83,7 +83,7 @@ template <typename type> type *allocate(base &r, const std::string &where, uint6
     return static_cast<type *>(memory);
 }
 
-// Likewise; NULL of nothing.
+// Copies an array for the C interface; NULL for an empty one.
 template <typename type> type *copy_of(const std::vector<type> &from)
 {
     type *copy = from.empty() ? nullptr : static_cast<type *>(malloc(from.size() * sizeof(type)));
@@ -94,7 +94,7 @@ template <typename type> type *copy_of(const std::vector<type> &from)
     return copy;
 }
 
-// A mesh as readers gather it; what is empty is not there.
+// A mesh under construction; empty arrays are missing.
 struct mesh_parts {
     std::vector<float> positions = {}, normals = {};
     std::vector<uint16_t> colours = {};
@@ -102,7 +102,7 @@ struct mesh_parts {
     std::vector<record_material_range> ranges = {};
 };
 
-// Returns its identifier.
+// Adds the mesh; returns its identifier.
 inline uint32_t add_mesh(base &r, const mesh_parts &from, const std::string &name, const std::string &where)
 {
     import_mesh mesh = {};
@@ -127,13 +127,13 @@ inline uint32_t add_mesh(base &r, const mesh_parts &from, const std::string &nam
     return id;
 }
 
-// A colour of vertices, as a share of white in linear light, in 16 bits. NaN becomes 0.
+// Converts a colour of a vertex, as a share of white in linear light, to 16 bits. NaN becomes 0.
 inline uint16_t wide(float value)
 {
     return uint16_t(std::lround(std::min(std::max(0.0f, value), 1.0f) * 65535));
 }
 
-// -1: it is none.
+// The value of a hexadecimal digit; -1: it is not one.
 inline int hex_value(char c)
 {
     return c >= '0' && c <= '9'   ? c - '0'
@@ -142,13 +142,13 @@ inline int hex_value(char c)
                                   : -1;
 }
 
-// A percent sign with its two digits.
+// True for a percent sign with two digits.
 inline bool is_escape(const std::string &uri, size_t at)
 {
     return at + 2 < uri.size() && uri[at] == '%' && hex_value(uri[at + 1]) >= 0 && hex_value(uri[at + 2]) >= 0;
 }
 
-// With the percent signs resolved.
+// Resolves the percent signs of a URI.
 inline std::string decoded_uri(const std::string &uri)
 {
     std::string name;

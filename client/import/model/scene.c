@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The scene under construction: edits, notes and blobs. */
 #include "scene.h"
 #include "edits.h"
 
@@ -14,7 +15,7 @@
 
 /* ---- text ---- */
 
-/* Copies as much as fits in whole characters; bytes that are no UTF-8 and control characters become '?'. */
+/* Copies as many whole characters as fit; bytes that are not UTF-8 and control characters become '?'. */
 void import_copy_text(char *out, size_t out_bytes, const char *text)
 {
     size_t used = 0;
@@ -98,7 +99,7 @@ static void edit_finish(struct import_edit *edit)
         free((char *)(uintptr_t)edit->message.set_clip.name);
         break;
     default:
-        break; /* nothing owned */
+        break; /* owns nothing */
     }
 }
 
@@ -258,7 +259,7 @@ static bool within(const float *values, size_t count, float minimum, float maxim
     return true;
 }
 
-/* What the table of messages says of the real numbers of a struct. */
+/* Checks the real numbers of a struct against the table of messages. */
 static bool within_fields(const struct struct_desc *desc, const void *body)
 {
     bool ok = true;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Neutral File Format: E. Haines. A Proposal for Standard Graphics Environments. IEEE CG&A 7(11), 1987, and the
- * text that comes with the databases. Beyond it: colours of lights (SPD 3), fewer numbers after `f`, and the
- * solids and the `tess` of a widespread dialect. */
+/* Neutral File Format (E. Haines. A Proposal for Standard Graphics Environments. IEEE CG&A 7(11), 1987, and the
+ * text that comes with the databases), and beyond it: colours of lights (SPD 3), fewer numbers after `f`, and
+ * the solids and the `tess` of a widespread dialect. */
 #include "import.h"
 
 #include "import/model/edits.h"
@@ -13,7 +13,7 @@
 
 #define LIGHTS_MAX 4096
 
-/* Before any `f`, and what an `f` leaves out. */
+/* The fill before any `f`, and for numbers that an `f` omits. */
 static const struct nff_fill default_fill = {.numbers = {1, 1, 1, 1, 0, 0, 0, 1}};
 
 static bool read_fill(struct nff *nff)
@@ -128,7 +128,7 @@ static bool read_cone(struct nff *nff)
 
     if (!word_reader_numbers(&nff->reader, ends, 8, "c"))
         return false;
-    ends[3] = fabsf(ends[3]); /* negative: to be seen from inside; ours show both sides */
+    ends[3] = fabsf(ends[3]); /* negative: visible from inside; ours show both sides */
     ends[7] = fabsf(ends[7]);
     return shapes_add_cone(nff->shapes, ends, word_reader_where(&nff->reader));
 }
@@ -207,7 +207,7 @@ static bool read_statement(struct nff *nff, struct word word)
         return read_solid(nff, 8);
     if (word_is(word, "dod"))
         return read_solid(nff, 12);
-    if (word_is(word, "tess")) /* how finely round things are cut: spheres are exact here */
+    if (word_is(word, "tess")) /* subdivision of round shapes; spheres are exact here */
         return word_reader_some(&nff->reader, nothing, 1) <= 1;
     return import_fail(nff->scene, word_reader_where(&nff->reader), "'%.*s' is not a statement of NFF",
                        word_shown(word), word.text);

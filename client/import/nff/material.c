@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Materials of NFF. */
 #include "reader.h"
 
 #include "import/model/edits.h"
@@ -27,16 +28,15 @@ float nff_colour(const struct nff *nff, float shown)
 /* The protocol's limit of a mirror's colour. */
 #define SPECULAR_MAX 1000.0f
 
-/* A mirror of NFF shows the same share at every angle, and the surface below it scatters what the mirror leaves.
- * Fresnel's curve begins at `share` of the light from straight on and would rise to all of it: as it is scaled to
- * begin at all of it, it stays there, and then it is as much weaker. Reflections are sharp, as Shine only shapes
- * highlights. */
+/* A mirror of NFF reflects the same share at every angle, and the surface below it scatters the rest. Fresnel's
+ * curve starts at `share` for perpendicular light and would rise to 1: scaled to start at 1, it stays there,
+ * and is attenuated by `share`. Reflections are sharp, as Shine only shapes highlights. */
 static void mirror(struct message_set_material *material, float share)
 {
     const float root = (material->ior - 1) / (material->ior + 1);
 
     if (share == 0 && material->transmission == 0) {
-        material->ior = 1; /* nothing is mirrored */
+        material->ior = 1; /* reflects nothing */
         return;
     }
     material->roughness = 0;
@@ -45,7 +45,7 @@ static void mirror(struct message_set_material *material, float share)
     material->specular_green = material->specular_blue = material->specular_red;
 }
 
-/* Where the index of refraction says nothing, light goes straight on, and what is met is a pane. */
+/* Sets transmission. Without an index of refraction above 1, light passes straight through a thin pane. */
 static void transmit(struct message_set_material *material, float through, float ior)
 {
     material->transmission = through;
@@ -55,15 +55,15 @@ static void transmit(struct message_set_material *material, float through, float
         material->ior = fminf(ior, 10);
 }
 
-/* The colour below a mirror of that share with which as much is sent back as without it. */
+/* The colour below a mirror of this share that reflects as much in total as without it. */
 static float below(float sent, float share)
 {
     return share < 1 ? unit(sent / (1 - share)) : 0;
 }
 
-/* NFF's numbers are a display's: where one of the parts is all that is seen, a display shows it times the colour,
- * and the mirror times what it mirrors, which has a hue of its own. What passes is not scattered, as in pictures
- * of the Standard Procedural Databases that POV-Ray makes of their author's output. */
+/* NFF's numbers are display values: a single visible component is displayed times the colour, and the mirror
+ * times its reflection, which has a hue of its own. Transmitted light is not scattered, as in pictures of the
+ * Standard Procedural Databases that POV-Ray makes from their author's output. */
 static void from_fill(const struct nff *nff, const float n[8], struct message_set_material *material)
 {
     const float share = nff_colour(nff, n[4]);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The parts of the NFF reader: import.c parses statements, material.c makes materials of fills, world.c adds
+/* The parts of the NFF reader: import.c parses statements, material.c converts fills to materials, world.c adds
  * the camera, lights and background. */
 #ifndef FARLIGHT_IMPORT_NFF_READER_H
 #define FARLIGHT_IMPORT_NFF_READER_H
@@ -24,8 +24,8 @@ struct nff_material {
 struct nff {
     struct import_scene *scene;
     struct word_reader reader;
-    struct shapes *shapes; /* take what is read */
-    struct nff_fill fill;  /* of what comes next */
+    struct shapes *shapes; /* collect the parsed shapes */
+    struct nff_fill fill;  /* fill of the following shapes */
     struct nff_light *lights;
     size_t light_count, light_capacity;
     struct nff_material *materials; /* number 1 first */
@@ -39,13 +39,13 @@ struct nff {
     float background[3];
 };
 
-/* Gives what comes next the material of the fill. */
+/* Sets the material of the following shapes from the fill. */
 bool nff_use_fill(struct nff *nff);
-/* Adds the materials that were in use. */
+/* Adds the used materials. */
 bool nff_add_materials(struct nff *nff);
 
-/* NFF's colours are a display's, 0 to 1, as were those that renderers of its time computed with and showed. They
- * stay so in a scene of their own that has lights, and are made linear in any other. */
+/* NFF's colours are display values, 0 to 1, as in renderers of its time. They stay unchanged in a scene with
+ * only this model and with lights, and are converted to linear values in any other. */
 bool nff_keeps_values(const struct nff *nff);
 float nff_colour(const struct nff *nff, float shown);
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Collecting of triangles and spheres. */
 #include "shapes.h"
 
 #include <math.h>
@@ -24,7 +25,7 @@ void shapes_free(struct shapes *shapes)
     free(shapes->sphere_materials);
 }
 
-/* Arrays of floats or numbers that grow together, with `width` elements for each. */
+/* Arrays of floats or numbers that grow together, with `width` elements for each item. */
 struct growing {
     void **array;
     size_t width;
@@ -77,7 +78,7 @@ static void include(struct shapes *shapes, const float point[3], float radius)
     }
 }
 
-/* False, and v stays as it is, if it has no direction. */
+/* Normalises v; false, with v unchanged, if it has no direction. */
 static bool normalise(float v[3])
 {
     double length = sqrt((double)v[0] * (double)v[0] + (double)v[1] * (double)v[1] + (double)v[2] * (double)v[2]);
@@ -143,7 +144,7 @@ static void newell(const struct shape_vertex *corners, uint32_t count, float nor
             sum[c] += ((double)a[u] - (double)b[u]) * ((double)a[v] + (double)b[v]);
         }
     }
-    /* Scaled before it is narrowed, or small polygons would have no normal. */
+    /* Scaled before the conversion to float, as small polygons would have no normal. */
     length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
     for (int c = 0; c < 3; c++)
         normal[c] = length > 0 ? (float)(sum[c] / length) : 0;

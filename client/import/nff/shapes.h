@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Triangles and spheres that a reader collects, to hand them over as one mesh and one set: for a format that
- * states its shapes one by one (NFF). */
+/* Triangles and spheres that a reader collects and then adds as one mesh and one set, for a format with single
+ * shapes (NFF). */
 #ifndef FARLIGHT_IMPORT_NFF_SHAPES_H
 #define FARLIGHT_IMPORT_NFF_SHAPES_H
 
@@ -23,30 +23,31 @@ struct shapes {
     float *spheres;
     uint32_t *sphere_materials;
     size_t sphere_count, sphere_capacity;
-    uint64_t *polygon_budget; /* the file's */
-    uint32_t material;        /* of what comes next */
+    uint64_t *polygon_budget; /* shared by the whole file */
+    uint32_t material;        /* material of the following shapes */
     float lower[3], upper[3];
 };
 
 void shapes_init(struct shapes *shapes, struct import_scene *scene, uint64_t *polygon_budget);
 void shapes_free(struct shapes *shapes);
 
-/* Each false: the scene has failed. `where` names the line. */
+/* Reserves space for shapes. False from this function and those below: the scene has failed. `where` names the
+ * line. */
 bool shapes_reserve(struct shapes *shapes, size_t more_vertices, size_t more_triangles);
-/* Each after a reservation. A normal need not have unit length. */
+/* Add a vertex or a triangle, after a reservation. A normal need not have unit length. */
 uint32_t shapes_add_vertex(struct shapes *shapes, const struct shape_vertex *vertex);
 void shapes_add_triangle(struct shapes *shapes, uint32_t a, uint32_t b, uint32_t c);
 bool shapes_add_sphere(struct shapes *shapes, const float centre[3], float radius);
-/* With the same normal for all corners where `flat`. */
+/* Adds a polygon; `flat`: all corners share a normal. */
 bool shapes_add_polygon(struct shapes *shapes, const struct shape_vertex *corners, uint32_t count, bool flat,
                         const char *where);
-/* Open at both ends; `ends` are base x y z radius, apex x y z radius. */
+/* Adds a cone, open at both ends; `ends` are base x y z radius, apex x y z radius. */
 bool shapes_add_cone(struct shapes *shapes, const float ends[8], const char *where);
-/* A platonic solid of 4, 6, 8 or 12 faces around a centre. */
+/* Adds a platonic solid of 4, 6, 8 or 12 faces around a centre. */
 bool shapes_add_solid(struct shapes *shapes, int faces, const float centre[3], float radius, const char *where);
 
-/* Hands all over to the scene, below the root. Materials are numbered from 1 on; materials[i] is the identifier of
- * number i, 0: none. */
+/* Adds everything to the scene, below the root. Materials are numbered from 1 on; materials[i] is the
+ * identifier of number i, 0: none. */
 bool shapes_finish(struct shapes *shapes, const uint32_t *materials);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Words and numbers of an NFF file. */
 #include "words.h"
 
 #include <math.h>
@@ -118,7 +119,7 @@ uint32_t word_reader_some(struct word_reader *reader, float *out, uint32_t maxim
     return count;
 }
 
-/* A number takes two bytes at least, but for the last one. */
+/* Every number takes at least two bytes, except the last one. */
 bool word_reader_can_hold(struct word_reader *reader, uint64_t numbers, const char *of)
 {
     uint64_t left = (uint64_t)(reader->end - reader->at);

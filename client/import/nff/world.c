@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Camera, lights and background of NFF. */
 #include "reader.h"
 
 #include <math.h>
@@ -43,11 +44,11 @@ bool nff_add_camera(struct nff *nff)
     return show(nff, PROTOCOL_NODE_CAMERA, import_add_camera(nff->scene, &camera), matrix, "view");
 }
 
-/* A surface that scatters all light sends out what NFF's formula says, Kd times N.L times the light; hence the
- * factor pi. */
+/* Adds the lights. A surface that scatters all light has the radiance of NFF's formula, Kd times N.L times the
+ * light; hence the factor pi. */
 bool nff_add_lights(struct nff *nff)
 {
-    /* NFF: lights without colour share what one would give, less steeply than evenly. */
+    /* NFF: each of n lights without colour has the intensity 1 / sqrt(n). */
     float share = (float)(sqrt((double)nff->light_count) / (double)nff->light_count);
 
     for (size_t i = 0; i < nff->light_count; i++) {
@@ -75,7 +76,7 @@ void nff_add_background(struct nff *nff)
 
     if (!nff->has_background && !nff_keeps_values(nff))
         return;
-    /* What a ray sees that leaves; without a light it is the only one. */
+    /* The backdrop for rays that hit nothing; without lights it is also the only light. */
     environment.backdrop = nff->light_count > 0;
     environment.display_values = nff_keeps_values(nff);
     for (int c = 0; c < 3; c++)

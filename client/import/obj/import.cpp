@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Wavefront OBJ through tinyobjloader's callbacks: it cuts lines into numbers, everything that is done with them
-// is done here. One mesh for the whole file; triangles sorted by material.
+// Wavefront OBJ through tinyobjloader's callbacks: the library splits lines into numbers, everything else happens
+// here. One mesh for the whole file; triangles sorted by material.
 #include "import.h"
 #include "reader.hpp"
 
@@ -27,7 +27,7 @@ struct triple {
     uint32_t v, vt, vn;
 };
 
-// Open addressing over the vertices made so far: file's (v, vt, vn) to the vertex's number.
+// Hash table with open addressing: the file's (v, vt, vn) to the vertex's number.
 class vertex_table
 {
   public:
@@ -77,12 +77,12 @@ struct state {
     memory_stream &stream;
     std::vector<float> positions, texcoords, normals;
     vertex_table vertices;
-    std::vector<uint32_t> indices, names; // of a triangle: position in material_names
+    std::vector<uint32_t> indices, names; // for each triangle: index in material_names
     std::vector<std::string> material_names;
     std::map<std::string, uint32_t> name_numbers;
     uint32_t name = none;
     uint64_t budget = POLYGON_BUDGET;
-    bool failed = false; // exceptions would pass through the library's frames
+    bool failed = false; // instead of exceptions, which would pass through the library's frames
     std::vector<uint32_t> corners, triangles;
     std::vector<float> corner_positions;
 };
@@ -107,7 +107,7 @@ void fail_at_line(state &s, const char *what, int64_t index, size_t count)
     s.failed = true;
 }
 
-// From 1 on, or backwards from -1; 0 is 'none' where that is allowed.
+// Resolves an index from 1 on, or backwards from -1; 0 is 'none' where that is allowed.
 bool resolve(state &s, int index, size_t count, const char *what, uint32_t &out)
 {
     const int64_t at = index > 0 ? int64_t(index) - 1 : int64_t(count) + index;
@@ -130,7 +130,7 @@ bool add_corner(state &s, const tinyobj::index_t &index)
         return false;
     if (index.normal_index != 0 && !resolve(s, index.normal_index, s.normals.size() / 3, "normal", key.vn))
         return false;
-    // A corner without a normal in a file with normals is flat: its vertex is its own.
+    // A corner without a normal in a file with normals is flat and gets its own vertex.
     s.corners.push_back(s.vertices.find_or_add(key, key.vn != none || s.normals.empty()));
     const float *position = &s.positions[size_t(key.v) * 3];
     s.corner_positions.insert(s.corner_positions.end(), position, position + 3);
@@ -218,7 +218,7 @@ uint16_t linear(float srgb)
     return reading::wide(linear_from_srgb_f(std::min(std::max(0.0f, srgb), 1.0f))); // NaN becomes 0
 }
 
-// Arrays of the mesh, a vertex for each triple. OBJ's v runs upwards, ours downwards.
+// Fills the arrays of the mesh, with a vertex for each triple. OBJ's v points upwards, ours downwards.
 void fill_mesh(const state &s, const std::vector<float> &colours, import_mesh &mesh)
 {
     const std::vector<triple> &triples = s.vertices.triples;
@@ -249,7 +249,7 @@ void fill_mesh(const state &s, const std::vector<float> &colours, import_mesh &m
     }
 }
 
-// Of the materials that faces name; 0 for those that no file defines.
+// Identifiers of the materials that faces use; 0 for undefined ones.
 std::vector<uint32_t> material_ids(state &s, const std::vector<std::string> &libraries)
 {
     const std::vector<tinyobj::material_t> materials = read_libraries(s.r, libraries);
@@ -271,7 +271,7 @@ std::vector<uint32_t> material_ids(state &s, const std::vector<std::string> &lib
     return add_materials(s.r.scene, read_image, wanted);
 }
 
-// The node from which the positions are.
+// The node at the origin of the positions.
 uint32_t parent_of(const state &s)
 {
     return s.text.places.empty() ? 0 : import_add_origin_node(s.r.scene, s.text.origin, 0);
@@ -300,7 +300,7 @@ void add_lines(state &s, const std::vector<uint32_t> &ids, const std::vector<flo
 
     for (const line_run &run : s.text.lines)
         for (uint32_t end : run.ends) {
-            if (end >= s.positions.size() / 3) // the library may see fewer vertices than our own look at the text
+            if (end >= s.positions.size() / 3) // the library may see fewer vertices than our own scan of the text
                 reading::fail(r, "", "a line has the vertex %u, but there are %zu", end + 1,
                               s.positions.size() / 3);
             used.insert(used.end(), &s.positions[size_t(end) * 3], &s.positions[size_t(end) * 3] + 3);

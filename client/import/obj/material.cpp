@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// MTL: Phong's terms of 1995, and the later ones for physically based shading, to metallic-roughness.
+// Materials of MTL: Phong's terms of 1995, and the later ones for physically based shading, converted to
+// metallic-roughness.
 #include "texture.hpp"
 
 #include <algorithm>
@@ -15,7 +16,7 @@ namespace
 {
 // MTL's bump maps have no unit; a height of 1 cm for white suits models in metres.
 constexpr double bump_height_m = 0.01;
-// Of the fibres of sheen, of which MTL does not speak: the default of Blender's shader, whose exporter writes Ps.
+// Roughness of sheen's fibres, which MTL lacks: the default of Blender's shader, whose exporter writes Ps.
 constexpr float sheen_roughness = 0.5f;
 
 float unit(float value)
@@ -28,25 +29,25 @@ float max_component(const float colour[3])
     return unit(std::max({colour[0], colour[1], colour[2]}));
 }
 
-// Kd is what scatters and Ks what mirrors: their sum is reflected, Ks' share of it like a metal.
+// Kd scatters and Ks mirrors: their sum is reflected, Ks' share of it like a metal.
 void reflection(const tinyobj::material_t &m, message_set_material &set)
 {
     const bool mirrors = m.illum >= 3 && m.illum <= 7;
     const float diffuse = max_component(m.diffuse), specular = max_component(m.specular);
 
-    // Exporters leave Kd black where a texture takes its place.
+    // Exporters write a black Kd if a texture replaces it.
     const bool is_textured = diffuse <= 0 && !m.diffuse_texname.empty();
 
     for (size_t c = 0; c < 3; c++)
         set.base_colour[c] = is_textured ? 1 : unit(m.diffuse[c]);
-    // Equal width of Blinn's and GGX's highlights (Walter et al. 2007), perceptual roughness being the root.
+    // Equal width of Blinn's and GGX's highlights (Walter et al. 2007), where perceptual roughness is the root.
     set.roughness = unit(std::sqrt(2 / (std::max(m.shininess, 0.0f) + 2)));
     set.metallic = unit(m.metallic);
     if (mirrors && specular > 0 && m.metallic <= 0) {
         for (size_t c = 0; c < 3; c++)
             set.base_colour[c] = unit(m.diffuse[c] + m.specular[c]);
         set.metallic = specular / (diffuse + specular);
-        if (m.shininess >= 100) // illumination 3 and up asks for sharp reflections
+        if (m.shininess >= 100) // illumination 3 and up means sharp reflections
             set.roughness = 0;
     }
     if (m.roughness > 0 || !m.roughness_texname.empty())
@@ -61,7 +62,7 @@ void anisotropy(const tinyobj::material_t &m, message_set_material &set)
     constexpr float turn = 6.28318531f;
 
     set.anisotropy = unit(m.anisotropy);
-    if (std::fabs(m.anisotropy_rotation) <= 100) // NaN is not
+    if (std::fabs(m.anisotropy_rotation) <= 100) // false for NaN
         set.anisotropy_rotation = m.anisotropy_rotation * turn;
 }
 
@@ -76,7 +77,7 @@ void transparency(const tinyobj::material_t &m, message_set_material &set)
         set.transmission = through > 0 ? through : filter;
         set.metallic = 0;
         set.roughness = m.shininess >= 100 || refracts ? 0 : set.roughness;
-        for (size_t c = 0; c < 3; c++) // black glass would let nothing through: colours are for the filter
+        for (size_t c = 0; c < 3; c++) // black glass would be opaque: colours apply to the filter
             set.base_colour[c] = filter > 0                     ? unit(m.transmittance[c])
                                  : max_component(m.diffuse) > 0 ? unit(m.diffuse[c])
                                                                 : 1;
@@ -86,7 +87,7 @@ void transparency(const tinyobj::material_t &m, message_set_material &set)
     }
 }
 
-// Pc, Pcr and Ps.
+// Reads Pc, Pcr and Ps.
 void layers(const tinyobj::material_t &m, message_set_material &set)
 {
     set.clearcoat = unit(m.clearcoat_thickness);
@@ -193,7 +194,7 @@ const char *const statements[] = {
     "anisor",   "map_Ka",   "map_Kd", "map_Ks", "map_Ns", "map_Bump", "map_bump", "bump",   "map_d",
     "map_disp", "map_Disp", "disp",   "refl",   "map_Pr", "map_Pm",   "map_Ps",   "map_Ke", "norm"};
 
-// A statement's word as tinyobjloader knows it, in whichever case the file has it.
+// The statement's word as tinyobjloader expects it, whatever its case.
 std::string statement_of(const std::string &word)
 {
     const char *const *end = std::end(statements);
@@ -205,8 +206,8 @@ std::string statement_of(const std::string &word)
     return found != end ? *found : word;
 }
 
-// A material without Kd has the whole of its texture; tinyobjloader takes 0.6 of it, or nothing behind a material
-// that has one.
+// Adds Kd to materials without it, whose texture counts fully; tinyobjloader would use 0.6, or nothing after a
+// material with Kd.
 std::string mend_library(const char *bytes, size_t size_bytes)
 {
     const char *const end = bytes + size_bytes;
@@ -237,7 +238,7 @@ std::string mend_library(const char *bytes, size_t size_bytes)
     return out;
 }
 
-// False: the file cannot be used, `reason` says why.
+// Reads a library. False: the file is unusable, and `reason` is set.
 bool read_library(reader &r, const std::string &name, std::vector<tinyobj::material_t> &materials, char *reason)
 {
     size_t size_bytes = 0;

@@ -23,7 +23,7 @@ struct reader {
     struct files *files;
 };
 
-// Bytes as a stream that knows where it is.
+// A stream over bytes that knows its position.
 class memory_stream : public std::streambuf
 {
   public:
@@ -32,12 +32,12 @@ class memory_stream : public std::streambuf
         char *from = const_cast<char *>(begin);
         setg(from, from, from + size_bytes);
     }
-    // "line 17": the line that was read last.
+    // The last line that was read, as "line 17".
     std::string place() const;
 };
 
-// ---- text.cpp: what is done to the text before tinyobjloader sees it
-// Lines of one material, which the library does not tell of.
+// ---- text.cpp: mending of the text for tinyobjloader
+// Lines of one material, which the library does not report.
 struct line_run {
     std::string material;       // empty: none
     std::vector<uint32_t> ends; // two vertices each
@@ -45,7 +45,7 @@ struct line_run {
 struct prepared {
     const char *original;
     size_t original_bytes;
-    std::string mended; // not empty: to be read instead
+    std::string mended; // read instead of the original, if not empty
     const char *begin() const
     {
         return mended.empty() ? original : mended.data();
@@ -54,26 +54,26 @@ struct prepared {
     {
         return mended.empty() ? original_bytes : mended.size();
     }
-    std::vector<double> places;         // 3 a vertex, where floats would lose something of them; else empty
-    double origin[3];                   // to be subtracted from these
-    std::vector<float> colours;         // 3 a vertex, sRGB, as the file has them; empty: it has none
+    std::vector<double> places;         // 3 a vertex, if floats round them too much; else empty
+    double origin[3];                   // subtracted from `places`
+    std::vector<float> colours;         // 3 a vertex, sRGB, as in the file; empty: it has none
     std::vector<std::string> libraries; // whole arguments of mtllib: several names, or one with spaces
     bool has_points;
-    std::vector<line_run> lines; // of l statements
+    std::vector<line_run> lines; // from l statements
 };
-// UTF-16 becomes UTF-8, continued lines become one, decimal commas become points, and corners lose the slashes at
-// their end; numbers that are none are reported with their line.
+// Mends a text: UTF-16 becomes UTF-8, continued lines become one, decimal commas become points, and corners lose
+// trailing slashes; invalid numbers are reported with their line.
 prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes);
 
 // ---- material.cpp
-// What the libraries define, in their order; a note says which cannot be used.
+// The materials of the libraries, in order; a note lists unusable libraries.
 std::vector<tinyobj::material_t> read_libraries(reader &r, const std::vector<std::string> &libraries);
-// Reads an image by the name that a material has for it, as files_read() does.
+// Reads an image by its name in a material, as files_read() does.
 using image_source = std::function<unsigned char *(const std::string &name, size_t *size_bytes, char *reason)>;
-// Which texture coordinates each map of a material uses.
+// The set of texture coordinates of each map of a material.
 using texcoord_sets = std::array<uint32_t, PROTOCOL_MATERIAL_COUNT>;
-// Also for readers that fill such materials from other formats. `sets`, by position, may be empty: MTL has one
-// set. Identifiers by position; 0 where there is none.
+// Adds materials, also for readers that convert other formats to them. `sets`, in parallel, may be empty: MTL has
+// one set. Returns identifiers in parallel; 0: none.
 std::vector<uint32_t> add_materials(import_scene *scene, const image_source &read_image,
                                     const std::vector<const tinyobj::material_t *> &materials,
                                     const std::vector<texcoord_sets> &sets = {});

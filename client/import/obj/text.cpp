@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Mending of OBJ text, and scanning of statements that tinyobjloader does not report.
 #include "reader.hpp"
 #include "import/model/origin.h"
 
@@ -24,9 +25,8 @@ void append_utf8(std::string &out, uint32_t code)
         out += char(0xc0 | (code >> 6));
         out += char(0x80 | (code & 0x3f));
     } else {
-        out +=
-            char(0xe0 | (code >> 12)); // those beyond 0xffff come as two surrogates and make two odd characters:
-        out += char(0x80 | ((code >> 6) & 0x3f)); // they can only stand in names
+        out += char(0xe0 | (code >> 12));         // code points beyond 0xffff are two surrogates and become
+        out += char(0x80 | ((code >> 6) & 0x3f)); // two odd characters; they can only occur in names
         out += char(0x80 | (code & 0x3f));
     }
 }
@@ -41,7 +41,7 @@ std::string from_utf16(const unsigned char *bytes, size_t size_bytes, bool big_e
     return out;
 }
 
-// A backslash at the end of a line continues it.
+// Joins lines that end with a backslash.
 void join_lines(std::string &text)
 {
     for (size_t at = text.find('\\'); at != std::string::npos; at = text.find('\\', at + 1)) {
@@ -69,14 +69,14 @@ bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-// Finds 1.#IND, 1.#QNAN and 1.#INF of older Windows programs by their '#': tinyobjloader reads 1.
+// Finds 1.#IND, 1.#QNAN and 1.#INF of older Windows programs by their '#'; tinyobjloader reads 1.
 bool is_windows_nan(const char *begin, const char *at, const char *end)
 {
     return *at == '#' && at - begin >= 2 && memcmp(at - 2, "1.", 2) == 0 && at + 1 < end && strchr("IQS", at[1]);
 }
 
-// Corners such as 1/2/ lose what is for nothing: tinyobjloader takes the next corner's number for their normal's.
-// Numbers with a decimal comma, as some countries write them, get a point.
+// Mends a line. Corners such as 1/2/ lose the useless slash: tinyobjloader takes the next corner's number for
+// their normal's. Numbers with a decimal comma, as some countries write them, get a point.
 void mend_line(char *at, char *end)
 {
     while (at < end && is_blank(*at))
@@ -101,7 +101,7 @@ void mend_lines(std::string &text)
     }
 }
 
-// A slash before the end of a corner, a comma between digits, or a NaN of Windows.
+// True for a slash at the end of a corner, a comma between digits, or a NaN of Windows.
 bool has_odd_numbers(const char *begin, const char *end)
 {
     for (const char *at = begin; at + 1 < end; at++)
@@ -122,7 +122,7 @@ struct scan {
 // Floats are a millimetre apart from here on.
 constexpr double exact_max = 8192;
 
-// The first vertex says whether places are kept as doubles.
+// Stores a position in doubles, if the first vertex needs them.
 void keep_place(scan &s, const char *const *starts, size_t count)
 {
     double place[3] = {0, 0, 0};
@@ -135,7 +135,7 @@ void keep_place(scan &s, const char *const *starts, size_t count)
         s.out.places.insert(s.out.places.end(), place, place + 3);
 }
 
-// Places that floats hold well enough, or around the origin, are left to the library.
+// Drops positions that floats hold well enough, or that surround the origin; the library's are used then.
 void settle_places(prepared &out)
 {
     double lower[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
@@ -148,7 +148,8 @@ void settle_places(prepared &out)
         out.places.clear();
 }
 
-// Up to six numbers of a `v` line. tinyobjloader takes what is no number for 0, which is not for us to show.
+// Reads up to six numbers of a `v` line. tinyobjloader would read 0 for an invalid number, which must not be
+// shown.
 bool scan_vertex(scan &s, const char *at, const char *end)
 {
     double values[6] = {0, 0, 0, 1, 1, 1};
@@ -166,7 +167,7 @@ bool scan_vertex(scan &s, const char *at, const char *end)
             if (is_digit(c))
                 continue;
             if (c != '.' && c != '-' && c != '+' && c != 'e' && c != 'E') {
-                // The file has a NUL behind its last byte, so strtod() ends.
+                // The file is followed by a NUL, so strtod() ends.
                 const double value = strtod(starts[count], nullptr);
                 const std::string place = "line " + std::to_string(s.line),
                                   token(starts[count], std::find_if(at, end, is_blank));
@@ -185,19 +186,19 @@ bool scan_vertex(scan &s, const char *at, const char *end)
         return true;
     for (size_t i = 3; i < count && count == 6; i++)
         values[i] = strtod(starts[i], nullptr);
-    s.out.colours.resize((s.vertices - 1) * 3, 1); // of vertices before the first coloured one
+    s.out.colours.resize((s.vertices - 1) * 3, 1); // colours of the vertices before the first coloured one
     for (size_t i = 3; i < 6; i++)
         s.out.colours.push_back(float(values[i]));
     return true;
 }
 
-// The library would keep them all before we hear of the face.
+// Checks a face; the library would store all corners before it reports the face.
 bool scan_face(scan &s, const char *at, const char *end)
 {
     size_t corners = 0;
 
     if (size_t(end - at) < 2 * size_t(POLYGON_CORNERS_MAX))
-        return true; // each takes a digit and a blank
+        return true; // each corner takes a digit and a blank
     for (bool in_corner = false; at < end; at++) {
         corners += !in_corner && !is_blank(*at);
         in_corner = !is_blank(*at);
@@ -207,7 +208,7 @@ bool scan_face(scan &s, const char *at, const char *end)
                        "a polygon of %zu corners; 3 to %u are allowed", corners, POLYGON_CORNERS_MAX);
 }
 
-// Vertices, each with or without texture coordinates behind a slash: 1 2 3, 1/1 2/2, -2 -1.
+// Reads vertices, each with or without texture coordinates after a slash: 1 2 3, 1/1 2/2, -2 -1.
 bool scan_polyline(scan &s, const char *at, const char *end)
 {
     std::vector<line_run> &lines = s.out.lines;
@@ -266,7 +267,7 @@ bool scan_lines(scan &s, const char *at, const char *end)
         if (!stop)
             stop = end;
         s.line++;
-        // A lone carriage return ends a line, too.
+        // a lone carriage return ends a line, too
         for (const char *part = at; part < stop;) {
             const char *part_end = static_cast<const char *>(memchr(part, '\r', size_t(stop - part)));
             if (!part_end)

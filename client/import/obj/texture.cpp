@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Textures of MTL, and combinations of several images.
 #include "texture.hpp"
 
 #include "import/image/texture.h"
@@ -27,7 +28,7 @@ std::set<std::string> image_names(const std::vector<const tinyobj::material_t *>
     return names;
 }
 
-// What a texel of one image is at the place of a texel of another size.
+// The texel of an image at the place of a texel of another size.
 const unsigned char *texel_at(const image &i, uint32_t x, uint32_t y, uint32_t width, uint32_t height)
 {
     const size_t column = size_t(uint64_t(x) * i.width / width), row = size_t(uint64_t(y) * i.height / height);

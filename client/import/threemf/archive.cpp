@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The models of a 3MF archive, whose bytes are in memory already.
+// The models of a 3MF archive in memory.
 #include "reader.hpp"
 
 #include <algorithm>
@@ -79,7 +79,7 @@ struct close_archive {
     }
 };
 
-// Of the file where the archive stands.
+// The name of the archive's current file.
 std::string current_name(unzFile zip)
 {
     char name[1024] = "";
@@ -116,7 +116,7 @@ void inflate_current(reader &r, unzFile zip, const std::string &name, uint64_t &
 }
 
 struct relations {
-    std::string model; // of the archive; empty: they do not say
+    std::string model; // the archive's main model; empty: not stated
 };
 
 void XMLCALL on_relation(void *user, const char *, const char **attributes)
@@ -136,7 +136,7 @@ void XMLCALL on_relation(void *user, const char *, const char **attributes)
         model = part_name(target);
 }
 
-// By the archive's relations; else the usual place, or the only model that there is.
+// Finds the main model: by the archive's relations, else at the usual place, or the only model.
 std::string main_model(reader &r, unzFile zip, const std::vector<std::string> &models, uint64_t &left)
 {
     relations found;
@@ -149,7 +149,7 @@ std::string main_model(reader &r, unzFile zip, const std::vector<std::string> &m
     XML_SetStartElementHandler(parser.get(), on_relation);
     if (unzLocateFile(zip, "_rels/.rels", 2) == UNZ_OK)
         inflate_current(r, zip, "_rels/.rels", left, [&](const char *bytes, size_t size_bytes, bool is_last) {
-            XML_Parse(parser.get(), bytes, int(size_bytes), is_last); // what is broken says nothing
+            XML_Parse(parser.get(), bytes, int(size_bytes), is_last); // a broken file states nothing
         });
     for (const std::string &wanted : {found.model, std::string("3d/3dmodel.model")})
         if (std::find(models.begin(), models.end(), wanted) != models.end())
@@ -161,7 +161,7 @@ std::string main_model(reader &r, unzFile zip, const std::vector<std::string> &m
     return models[0];
 }
 
-// Calls `visit` with the name of each file, where the archive then stands.
+// Calls `visit` with the name of each file, with the archive positioned at it.
 template <typename Visit> void each_file(unzFile zip, Visit visit)
 {
     size_t count = 0;

@@ -17,14 +17,14 @@ namespace threemf
 {
 namespace
 {
-// Behind the prefix of its namespace.
+// The name without the prefix of its namespace.
 const char *local(const char *name)
 {
     const char *colon = strrchr(name, ':');
     return colon ? colon + 1 : name;
 }
 
-// One file of the archive.
+// A file of the archive.
 class model_file
 {
   public:
@@ -57,8 +57,8 @@ class model_file
     const std::string name;
     const bool is_main;
     const std::unique_ptr<XML_ParserStruct, free_parser> parser;
-    std::exception_ptr fault = nullptr; // of a handler, kept from the parser, which is C
-    const char **attributes = nullptr;  // of the element that begins
+    std::exception_ptr fault = nullptr; // exception of a handler, kept from the parser, which is C
+    const char **attributes = nullptr;  // attributes of the current element
     std::map<uint32_t, group> groups = {};
     group *open_group = nullptr;
     object building = {};
@@ -101,7 +101,7 @@ class model_file
         text = end;
         return value;
     }
-    // Of rows times the matrix, as the format has it.
+    // Reads a transform, which multiplies row vectors from the right.
     instance read_instance() const
     {
         const char *path = attribute("path"), *text = attribute("transform");

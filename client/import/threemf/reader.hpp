@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The parts of the reader of 3MF: an archive with models in XML (3MF Core Specification 1.3; of its extensions the
-// colour groups of materials, and parts in other files of the archive).
+// The reader of 3MF: an archive with models in XML (3MF Core Specification 1.3, and from its extensions the colour
+// groups of materials, and parts in other files of the archive).
 #ifndef FARLIGHT_IMPORT_THREEMF_READER_HPP
 #define FARLIGHT_IMPORT_THREEMF_READER_HPP
 
@@ -16,7 +16,7 @@
 
 namespace threemf
 {
-// A property of a corner that is none.
+// A missing property of a corner.
 constexpr uint32_t none = UINT32_MAX;
 
 // Base materials, or colours.
@@ -24,7 +24,7 @@ struct group {
     bool has_materials = false;
     std::vector<std::array<uint8_t, 4>> colours; // sRGB
     std::vector<std::string> names;
-    std::vector<uint32_t> materials; // once they are added
+    std::vector<uint32_t> materials; // identifiers, once they are added
 };
 
 struct triangle {
@@ -33,9 +33,9 @@ struct triangle {
     std::array<uint32_t, 3> properties;
 };
 
-using object_key = std::pair<std::string, uint32_t>; // a file of the archive, and the identifier there
+using object_key = std::pair<std::string, uint32_t>; // a file of the archive, and an identifier in it
 
-// An object where it stands.
+// A placed object.
 struct instance {
     object_key key;
     float parent_from_object[12];
@@ -48,19 +48,19 @@ struct object {
 };
 
 struct reader : reading::base {
-    double metres = 0.001; // of a unit
+    double metres = 0.001; // length of a unit
     std::map<object_key, object> objects = {};
     std::vector<instance> items = {};
-    uint32_t colours_material = 0; // white, beneath colours
+    uint32_t colours_material = 0; // white, multiplied by colours
 };
 
 // ---- archive.cpp
-// A part's name as it is compared: without the first slash, with slashes for the backslashes of some programs,
-// small letters (Open Packaging Conventions, 6.2.2.3) and its percent signs resolved.
+// Normalises a part's name for comparison: without the first slash, with slashes for the backslashes of some
+// programs, small letters (Open Packaging Conventions, 6.2.2.3) and its percent signs resolved.
 std::string part_name(const std::string &name);
 using taker = std::function<void(const char *bytes, size_t size_bytes, bool is_last)>;
-// Calls `begin` with the name of each model in the archive, the main one last, and what that returns with its
-// bytes, a part at a time.
+// Calls `begin` with the name of each model in the archive, the main one last, and the function that it returns
+// with the model's bytes, a part at a time.
 void each_model(reader &r, const unsigned char *bytes, size_t size_bytes,
                 const std::function<taker(const std::string &name, bool is_main)> &begin);
 
@@ -69,9 +69,9 @@ struct geometry {
     std::vector<float> positions;
     std::vector<triangle> triangles;
 };
-// Returns the mesh's identifier.
+// Adds a mesh; returns its identifier.
 uint32_t add_mesh(reader &r, const std::string &name, const geometry &from, std::map<uint32_t, group> &groups);
-// The nodes of all items, with the objects that they are made of.
+// Adds the nodes of all items, with the objects that they consist of.
 void add_items(reader &r);
 } // namespace threemf
 

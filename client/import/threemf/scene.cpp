@@ -38,10 +38,10 @@ uint32_t add_material(reader &r, const std::string &name, const colour &of)
     import_material_default(&set);
     set.name = name.c_str();
     set.double_sided = 1;
-    set.roughness = 1; // as of what other formats call plain colours
+    set.roughness = 1; // matches plain colours of other formats
     for (size_t c = 0; c < 3; c++)
         set.base_colour[c] = linear(of[c]);
-    if (of[3] > 0 && of[3] < 255) { // 0 is what exporters write that know no alpha
+    if (of[3] > 0 && of[3] < 255) { // exporters without alpha write 0
         set.base_colour[3] = float(of[3]) / 255;
         set.alpha_mode = PROTOCOL_ALPHA_BLEND;
     }
@@ -50,14 +50,14 @@ uint32_t add_material(reader &r, const std::string &name, const colour &of)
     return id;
 }
 
-// What the properties of triangles mean, by the groups that the file has.
+// The meaning of triangles' properties, from the file's groups.
 class meaning
 {
   public:
     meaning(reader &from, std::map<uint32_t, group> &known) : r(from), groups(known)
     {
     }
-    // Of a triangle; 0: none.
+    // The material of a triangle; 0: none.
     uint32_t material(const triangle &t)
     {
         group *g = group_of(t);
@@ -84,7 +84,7 @@ class meaning
     reader &r;
     std::map<uint32_t, group> &groups;
 
-    // NULL: it has no properties, or some that are not read.
+    // The group of a triangle; NULL: it has no properties, or unsupported ones.
     group *group_of(const triangle &t) const
     {
         const auto found = groups.find(t.group_id);
@@ -97,7 +97,7 @@ class meaning
     }
 };
 
-// Corners at one place of one colour are one vertex.
+// Merges corners with equal positions and colours into vertices.
 void split_by_colour(const geometry &from, const std::vector<const triangle *> &order, const meaning &means,
                      reading::mesh_parts &out)
 {
@@ -188,7 +188,7 @@ uint32_t add_mesh(reader &r, const std::string &name, const geometry &from, std:
     return reading::add_mesh(r, make_parts(r, from, groups), name, "");
 }
 
-// The scene has y up, and metres.
+// Adds the items; the scene has y up, and metres.
 void add_items(reader &r)
 {
     const float s = float(r.metres), upright[12] = {s, 0, 0, 0, 0, 0, s, 0, 0, -s, 0, 0};
