@@ -66,12 +66,12 @@ enum key {
     KEY_METADATA,
     KEY_PARENTS,
     KEY_AT,
-    KEY_VIEWS, /* cli_views_set() has those that follow */
+    KEY_VIEWS, /* cli_views_set() has the options that follow */
     KEY_VIEWS_END = KEY_VIEWS + 6,
-    KEY_FIELD = 0x200 /* and its index */
+    KEY_FIELD = 0x200 /* plus the index of the field */
 };
 
-/* What is more than a field of `render`. */
+/* Options that are more than a field of `render`. */
 static const struct argp_option special[] = {
     {"output", KEY_OUTPUT, "IMAGE", 0, "Image file; its ending is its format. '-' is standard output",
      CLI_GROUP_OUTPUT},
@@ -206,7 +206,7 @@ static const struct argp_option special[] = {
     {"quiet", KEY_QUIET, NULL, 0, "No progress, no notes about the model", CLI_GROUP_OUTPUT},
     {0}};
 
-/* An error of lib/text.h gets the option's name. */
+/* Adds the option's name to an error of lib/text.h. */
 static error_t name_field(struct cli_job *job, const char *field)
 {
     snprintf(job->error.field, sizeof(job->error.field), "%s", field);
@@ -233,7 +233,7 @@ static error_t set_vector(struct cli_job *job, const char *field, const char *va
     return fl_text_vector(value, vector, &job->error) ? 0 : name_field(job, field);
 }
 
-/* With what a float loses of it: models may be far from the origin. */
+/* Reads a position in doubles and stores the rest that a float loses, as models may be far from the origin. */
 static error_t set_place(struct cli_job *job, const char *field, const char *value, float place[3], double rest[3],
                          bool *is_set)
 {
@@ -248,7 +248,7 @@ static error_t set_place(struct cli_job *job, const char *field, const char *val
     return 0;
 }
 
-/* "z" and "-z" as vectors. */
+/* Converts "z" and "-z" to vectors. */
 static const char *axis_of(const char *value)
 {
     static const char *const axes[][2] = {{"x", "1,0,0"},   {"y", "0,1,0"},   {"z", "0,0,1"},
@@ -264,7 +264,7 @@ static error_t set_format(struct cli_job *job, const char *value)
 {
     const enum cli_image image = cli_image_by_name(value);
     if (image == CLI_IMAGE_UNKNOWN)
-        job->input.format = value; /* cli_job_complete() knows whether there can be one */
+        job->input.format = value; /* cli_job_complete() checks it */
     else
         job->output.image = image;
     return 0;
@@ -276,7 +276,7 @@ static error_t set_real(struct cli_job *job, const char *field, const char *valu
     return fl_text_real(value, minimum, maximum, number, &job->error) ? 0 : name_field(job, field);
 }
 
-/* Read here, so that what is wrong is known early; meant by the scene, which is not there yet. */
+/* Parses an edit, so that a wrong syntax is reported early; its names are looked up in the scene later. */
 static error_t add_edit(struct cli_job *job, const char *field, const char *value)
 {
     if (job->input.edit_count == CLI_EDITS_MAX)
@@ -284,8 +284,8 @@ static error_t add_edit(struct cli_job *job, const char *field, const char *valu
     return fl_assignment_parse(value, &job->input.edits[job->input.edit_count++], &job->error) ? 0 : EINVAL;
 }
 
-/* The number of the group whose name `value` begins with; a new name gets a new number. 0: there are too many. The
- * caller has checked that `length` is that of a name. */
+/* The number of the group whose name is the first `length` bytes of `value`; a new name gets a new number. 0:
+ * there are too many groups. */
 static unsigned light_group_of(struct cli_job *job, const char *value, size_t length)
 {
     char name[CLI_LIGHT_GROUP_NAME] = "";
@@ -316,7 +316,7 @@ static error_t add_to_group(struct cli_job *job, const char *field, unsigned gro
     return 0;
 }
 
-/* Nodes are edited to be in the group once the scene is there; its name is for the file alone. */
+/* Records edits that add nodes to a group, for the scene; the group's name appears in the file only. */
 static error_t set_light_group(struct cli_job *job, const char *field, const char *value)
 {
     static const char allowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
@@ -370,7 +370,7 @@ static error_t set_view(struct cli_job *job, const char *field, const char *valu
         const char *name;
         float azimuth, elevation;
     } views[] = {{"front", 0, 0}, {"back", 180, 0},   {"left", -90, 0},      {"right", 90, 0},
-                 {"top", 0, 90},  {"bottom", 0, -90}, {"iso", 45, 35.26439f}}; /* the diagonal of a cube */
+                 {"top", 0, 90},  {"bottom", 0, -90}, {"iso", 45, 35.26439f}}; /* diagonal of a cube */
     for (size_t i = 0; i < sizeof(views) / sizeof(views[0]); i++) {
         if (strcmp(value, views[i].name) != 0)
             continue;
@@ -405,10 +405,10 @@ error_t cli_set_environment_rotation(struct cli_job *job, const char *field, con
     return set_real(job, field, value, -360, 360, &job->input.environment_degrees);
 }
 
-/* The layers that add up to the beauty. */
+/* The layers whose sum is the beauty. */
 #define LIGHT_LAYERS ((1u << (PROTOCOL_LAYER_BACKGROUND + 1)) - (1u << PROTOCOL_LAYER_DIFFUSE_DIRECT))
 
-/* "beauty,depth". The picture alone is 0, as without the option. */
+/* Reads "beauty,depth". The picture alone is 0, as without the option. */
 static error_t set_layers(struct cli_job *job, const char *field, const char *value)
 {
     unsigned layers = 0;
@@ -602,7 +602,7 @@ static void add_option(const struct argp_option *option)
         options[count] = *option;
 }
 
-/* "Tracer ldc, layered depth cubes: .." above the settings of each. */
+/* Adds a heading "Tracer ldc, layered depth cubes: .." above each tracer's settings. */
 static void add_tracer_headers(void)
 {
     static char titles[PROTOCOL_TRACER_COUNT][200];
@@ -670,7 +670,7 @@ static bool is_among(const struct argp_option *option, const char *const *names)
     return false;
 }
 
-/* Without those that are left out, and those of image files that people keep. */
+/* Copies all options except `left_out`, and except those of image files. */
 static void keep(struct argp_option *kept, const char *const *left_out)
 {
     static const char *const of_files[] = {"half", "float", "exr-compression", "colour-space", "display-view",
@@ -751,7 +751,7 @@ const struct argp *cli_web_argp(void)
     return &argp;
 }
 
-/* FARLIGHT_SIZE for --size, and so on. */
+/* Reads FARLIGHT_SIZE for --size, and so on. */
 static bool read_variable(struct cli_job *job, const struct argp_option *option)
 {
     char field[64] = "FARLIGHT_";

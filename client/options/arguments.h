@@ -5,24 +5,25 @@
 
 #include "options/job.h"
 
-/* A child parser; its input is a struct cli_job. */
+/* Parsers of the options of a job, for use as child parsers; their input is a struct cli_job. The first one has
+ * all options. */
 const struct argp *cli_job_argp(void);
-/* Likewise, without the options of output, tracer and first hits. */
+/* No options of output, tracer and first hits. */
 const struct argp *cli_picture_argp(void);
-/* Likewise, without the options of output. */
+/* No options of output. */
 const struct argp *cli_views_argp(void);
-/* Likewise, of pictures of many models. */
+/* Pictures of many models. */
 const struct argp *cli_thumbnail_argp(void);
-/* Likewise for a window, without the options of files; samples, integrator and encoding have other defaults
- * there. */
+/* A window: no options of files; samples, integrator and encoding have other defaults. */
 const struct argp *cli_view_argp(void);
-/* Likewise for a page in a browser, whose window has its size, and which chooses clips itself. */
+/* A page in a browser, which chooses size and clips itself. */
 const struct argp *cli_web_argp(void);
-/* The defaults, then FARLIGHT_*; before the command line is read. */
+/* Sets the defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job, struct message_render defaults);
-/* As if "--OPTION VALUE" had been typed; NULL for an option without a value. ARGP_ERR_UNKNOWN: there is none. */
+/* Sets an option as the command line "--OPTION VALUE" does; NULL for an option without a value.
+ * ARGP_ERR_UNKNOWN: there is none. */
 error_t cli_job_set(struct cli_job *job, const char *option, const char *value);
-/* "environment", "transparent" or a colour: "#rrggbb". */
+/* Reads "environment", "transparent" or a colour: "#rrggbb". */
 error_t cli_set_background(struct cli_job *job, const char *field, const char *value);
 error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value);
 

@@ -11,15 +11,16 @@
 #include <string.h>
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
-#define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
-#define AUTO_SAMPLES 256u                      /* of --samples auto: the most that a pixel gets */
-#define AUTO_NOISE 0.03f                       /* likewise: hardly to be seen */
-#define PATH_SAMPLES 64u                       /* where nothing is said */
-#define CLAMP 10.0f                            /* likewise; times white, as Cycles has it for indirect light */
-#define CLAMP_SAMPLES 64.0f /* with so many samples or more; with fewer by as much less, as each shows more, */
-#define CLAMP_MIN 1.25f     /* down to this */
-#define NOISE_SAMPLES 4096u /* likewise with --noise: most pixels need far fewer */
-#define AO_SAMPLES 16u      /* of 8 rays: 128 a pixel, as in the paper */
+#define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* the daemon's limit */
+#define AUTO_SAMPLES 256u                      /* --samples auto: maximum for a pixel */
+#define AUTO_NOISE 0.03f                       /* --samples auto: hardly visible noise */
+#define PATH_SAMPLES 64u                       /* default of the integrator path */
+#define CLAMP 10.0f                            /* default clamp of indirect light, times white, as in Cycles */
+/* Samples for the full clamp; with fewer it decreases in proportion, as each is more visible, .. */
+#define CLAMP_SAMPLES 64.0f
+#define CLAMP_MIN 1.25f     /* .. down to this */
+#define NOISE_SAMPLES 4096u /* maximum with --noise: most pixels need far fewer */
+#define AO_SAMPLES 16u      /* 8 rays each: 128 a pixel, as in the paper */
 
 /* ---- where pictures go ---- */
 
@@ -80,7 +81,7 @@ static bool is_linear(enum cli_image image)
     return image == CLI_IMAGE_EXR || image == CLI_IMAGE_HDR;
 }
 
-/* Beside the layers of --layers, which are the picture where it is not given. */
+/* Adds the layers of light groups to those of --layers, which default to the picture. */
 static void add_light_groups(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
@@ -90,7 +91,7 @@ static void add_light_groups(struct cli_job *job)
     wanted->layers |= ((2u << job->light_groups.count) - 1) << PROTOCOL_LAYER_LIGHT_REST;
 }
 
-/* Of all formats only EXR has named channels; half floats are not precise enough for their contents. */
+/* Checks layers: only EXR has named channels, and half floats are too imprecise for their contents. */
 static bool complete_layers(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
@@ -120,7 +121,7 @@ static bool complete_layers(struct cli_job *job)
     return true;
 }
 
-/* A picture of 8 bits is made of linear light by the program that writes it. */
+/* Checks colour options. The program that writes a picture of 8 bits derives it from linear light. */
 static bool complete_colours(struct cli_job *job)
 {
     const char *option = job->output.colour_space ? "--colour-space" : "--display-view",
@@ -148,7 +149,7 @@ static bool complete_colours(struct cli_job *job)
     return true;
 }
 
-/* All outputs are made of the same frames. */
+/* Chooses the pixel format, since all outputs come from the same frames. */
 static bool complete_pixels(struct cli_job *job)
 {
     bool has[CLI_IMAGE_COUNT] = {false};
@@ -176,7 +177,7 @@ static bool complete_pixels(struct cli_job *job)
     return complete_colours(job) && complete_layers(job);
 }
 
-/* One that is none of a picture is that of a model, which files do not need. */
+/* Checks a format that is not a picture's: it is a model's, which only standard input needs. */
 static bool complete_format(struct cli_job *job)
 {
     const char *letters = "abcdefghijklmnopqrstuvwxyz0123456789";
@@ -192,7 +193,7 @@ static bool complete_format(struct cli_job *job)
 static bool complete_outputs(struct cli_job *job, bool is_series)
 {
     if (job->output.path) {
-        /* It has no folder in which a finished file could replace it. */
+        /* standard output has no folder in which a finished file could replace it */
         const char *path = strcmp(job->output.path, "/dev/stdout") == 0 ? "-" : job->output.path;
         job->output.list[0] = (struct cli_output){.path = path, .image = job->output.image};
         job->output.count = 1;
@@ -227,7 +228,7 @@ static bool complete_encoding(struct cli_job *job)
             return cli_usage(job, "--quality", "a video has 1 (best) to 51") == 0;
         job->output.quality = quality;
         if (job->options.encoding != PROTOCOL_ENCODING_JPEG)
-            job->options.quality = 0; /* the number is meant for the file */
+            job->options.quality = 0; /* the quality applies to the file */
     }
     if (job->options.encoding == PROTOCOL_ENCODING_ZSTD && job->options.quality > 19)
         return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
@@ -241,7 +242,7 @@ static bool is_zero(const float vector[3])
     return vector[0] == 0 && vector[1] == 0 && vector[2] == 0;
 }
 
-/* Whether `up` and the view direction leave the picture's upright undefined. */
+/* True if `up` and the view direction leave the picture's upright undefined. */
 static bool is_degenerate(const struct cli_job *job)
 {
     const struct record_camera_key *key = &job->camera.key;
@@ -304,13 +305,13 @@ static void move_place(float place[3], const double rest[3], const double by[3])
         place[i] = (float)((double)place[i] + rest[i] - by[i]);
 }
 
-/* The script's camera; tangents of splines are no places. */
+/* Moves the script's camera; tangents of splines are not positions. */
 static void move_channel(const struct fl_channel *channel, const double by[3])
 {
     static const double nothing[3];
     const bool has_tangents = channel->interpolation == PROTOCOL_INTERPOLATION_CUBIC_SPLINE;
     const uint32_t parts = has_tangents || channel->interpolation == PROTOCOL_INTERPOLATION_BEZIER ? 3 : 1;
-    float *values = (float *)(uintptr_t)channel->values; /* the script's own */
+    float *values = (float *)(uintptr_t)channel->values; /* owned by the script */
     for (uint32_t i = 0; i < channel->key_count * parts; i++)
         if (!has_tangents || i % 3 == 1)
             move_place(values + (size_t)i * 3, nothing, by);
@@ -361,7 +362,7 @@ bool cli_find_camera(struct message_render *render, const char *camera, const ch
     return true;
 }
 
-/* Whether its pictures are for eyes, and not linear light for programs. */
+/* True if the pictures are for display, not linear light for programs. */
 static bool is_shown(const struct cli_job *job)
 {
     return job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8 || job->output.display_view;
@@ -378,8 +379,8 @@ void cli_choose_ground(const struct cli_job *job, struct message_render *render,
         render->ground = 1;
 }
 
-/* Lenses, shutters and several samples need the integrator distributed; one sharp sample needs no random choices,
- * and whitted makes no noise. */
+/* Chooses the integrator: lenses, shutters and several samples need distributed; a single sharp sample needs no
+ * random choices, so whitted gives no noise. */
 static void complete_integrator(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
@@ -395,8 +396,8 @@ static float usual_clamp(uint32_t samples)
     return fmaxf(clamp, CLAMP_MIN);
 }
 
-/* Random choices show as noise in one sample. Pictures that are refined without an end have no number of
- * samples. */
+/* Chooses the number of samples: random choices show as noise in a single sample. Endlessly refined pictures
+ * have no number. */
 static void complete_samples(struct cli_job *job, bool is_series)
 {
     struct message_render *wanted = &job->options;
@@ -453,7 +454,7 @@ static bool complete_clips(struct cli_job *job)
     return true;
 }
 
-/* A shared scene cannot be given another environment, and only a daemon with an address has one. */
+/* Checks options of a shared scene, which keeps its environment and needs a daemon with an address. */
 static bool complete_scene(struct cli_job *job)
 {
     if (!job->input.scene)
@@ -478,7 +479,7 @@ static bool complete_scene(struct cli_job *job)
     return fl_error_remedy(&job->error, "add --server ADDRESS");
 }
 
-/* Depth layers are rendered with a number of samples. */
+/* Checks --noise: depth layers have a fixed number of samples. */
 static bool complete_noise(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
@@ -490,7 +491,7 @@ static bool complete_noise(struct cli_job *job)
     return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
 }
 
-/* They are made from what an eye sees, and nothing is there to be seen of a ground. */
+/* Checks ground and layers: layers hold only visible surfaces, and a ground is invisible. */
 static bool complete_ground(struct cli_job *job)
 {
     if (job->options.ground == 0 || job->options.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
@@ -522,7 +523,7 @@ static bool complete_crop(struct cli_job *job)
     return fl_error_remedy(&job->error, "leave out one of them");
 }
 
-/* Files in linear light are for programs that have filters of their own. */
+/* Chooses the filter: files in linear light are for programs with filters of their own. */
 static void complete_denoise(struct cli_job *job)
 {
     if (!job->sampling.has_denoise && job->sampling.filters && is_shown(job) && job->options.crop_width == 0)

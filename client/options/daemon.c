@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which daemon is asked, and the way to it. */
+/* The daemon of a command: its address, its key, and connecting. */
 #include "daemon.h"
 #include "interrupt.h"
 #include "talk.h"
@@ -46,7 +46,7 @@ const char *cli_key_file(const char *server, const char *given)
     return !given && is_tcp && usual && usual[0] != '\0' ? usual : given;
 }
 
-/* NULL: neither; an empty one is none. */
+/* The option, or the variable if it is missing; empty counts as missing. NULL: neither. */
 static const char *typed_or_usual(const char *typed, const char *variable)
 {
     const char *value = typed ? typed : getenv(variable);

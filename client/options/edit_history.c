@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Stacks for undo and redo. */
 #include "edit_history.h"
 
 #include <stdlib.h>

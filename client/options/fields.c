@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The list of options that are fields of `render`. */
 #include "fields.h"
 
 #include "lib/text.h"
@@ -12,7 +13,8 @@
 #define FIELDS_MAX 96
 #define GIVEN(member) offsetof(struct cli_job, member)
 
-/* Options that are no tracer's. A doc that does not end in a bracket gets the allowed values and the default. */
+/* Options that belong to no tracer. A doc that does not end with a bracket gets the allowed values and the
+ * default. */
 static const struct row {
     const char *option, *field, *argument, *doc;
     int group;
@@ -95,8 +97,8 @@ static size_t field_count;
 
 /* ---- the list ---- */
 
-/* "Bounding volume of a node: auto (default), box, sphere". Where `doc` ends in its own default, the names come
- * before it; where it lists names itself, as not every encoding is one of a batch, nothing is added. */
+/* Writes "Bounding volume of a node: auto (default), box, sphere". If `doc` ends with its default, the names
+ * come before it; if it lists names itself, because not every encoding suits a batch, nothing is added. */
 static void write_choices(char *out, size_t out_bytes, const struct enum_desc *choices)
 {
     const char *found = strstr(out, " (default");
@@ -217,15 +219,15 @@ error_t cli_unknown_value(struct cli_job *job, const char *name, const char *enu
     return EINVAL;
 }
 
-/* An error of lib/text.h gets the option's name. */
+/* Adds the option's name to an error of lib/text.h. */
 static error_t name_error(struct cli_job *job, const char *name)
 {
     snprintf(job->error.field, sizeof(job->error.field), "%s", name);
     return EINVAL;
 }
 
-/* The source of an option. The command line overrides a script, and that the environment; within one source the
- * two names of one setting must agree. */
+/* True if both names come from one source. The command line overrides a script, and a script the environment;
+ * within one source the two names of a setting must agree. */
 static bool is_same_place(const char *name, const char *other)
 {
     static const char environment[] = "FARLIGHT_";

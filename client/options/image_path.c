@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Checks of output paths, and writing of files. */
 #include "image_path.h"
 #include "lib/text.h"
 
@@ -60,8 +61,8 @@ const char *cli_base_name(const char *path)
     return slash ? slash + 1 : path;
 }
 
-/* A file without a name: nothing stays in the folder if this process is killed now. Where the file system needs a
- * name, it has one for a moment. -1: errno says why. */
+/* Opens a file without a name, which leaves nothing in the folder if this process is killed. Where the file
+ * system needs a name, the file has one for a moment. -1: errno has the reason. */
 static int open_probe(const char *folder)
 {
     const int fd = open(folder, O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
@@ -78,7 +79,7 @@ static int open_probe(const char *folder)
     return named;
 }
 
-/* Rights, read-only file systems, quotas: only an attempt shows them. */
+/* Tests a folder by an attempt, since only that shows rights, read-only file systems and quotas. */
 static bool try_folder(const char *path, const char *folder, struct fl_error *error)
 {
     const int fd = open_probe(folder);
@@ -88,7 +89,7 @@ static bool try_folder(const char *path, const char *folder, struct fl_error *er
     return true;
 }
 
-/* "a/b" becomes "a", "a" becomes ".", "/a" becomes "/". */
+/* Shortens "a/b" to "a", "a" to ".", "/a" to "/". */
 static void outer_folder(char *path)
 {
     char *slash = strrchr(path, '/');
@@ -149,7 +150,8 @@ bool cli_make_folder(const char *folder, struct fl_error *error)
     return true;
 }
 
-/* A name for the unfinished file beside it, then the rename: a reader sees the old text or the whole new one. */
+/* Writes an unfinished file beside the path, then renames it, so that a reader sees the old text or the whole
+ * new one. */
 bool cli_write_text(const char *path, const char *text, mode_t rights, struct fl_error *error)
 {
     char unfinished[4200];

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Signals that end a command in order. */
 #include "interrupt.h"
 #include "protocol/common/standard.h"
 
@@ -16,7 +17,7 @@ static void handle(int number)
     const int saved = errno;
     const uint64_t one = 1;
     received = number;
-    /* Fails only when it is readable already. */
+    /* The write fails only if the descriptor is readable already. */
     if (write(event_fd, &one, sizeof(one)) < 0)
         errno = saved;
     errno = saved;
@@ -28,7 +29,7 @@ bool cli_interrupt_begin(struct fl_error *error)
     event_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (event_fd < 0)
         return fl_error_set(error, FL_ERROR_SYSTEM, "", "eventfd: %s", strerror(errno));
-    /* Once only: the second signal finds the default action. */
+    /* SA_RESETHAND: a second signal gets the default action. */
     struct sigaction action = {.sa_handler = handle, .sa_flags = (int)SA_RESETHAND};
     sigemptyset(&action.sa_mask);
     for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)

@@ -5,9 +5,10 @@
 
 #include "lib/farlight.h"
 
-/* Ctrl-C, SIGTERM and SIGHUP make the descriptor readable instead of ending the program; a second one ends it. */
+/* Makes Ctrl-C, SIGTERM and SIGHUP set the descriptor readable instead of ending the program; a second signal
+ * ends it. */
 bool cli_interrupt_begin(struct fl_error *error);
 int cli_interrupt_fd(void);
-int cli_interrupt_signal(void); /* which one came; 0: none */
+int cli_interrupt_signal(void); /* the received signal; 0: none */
 
 #endif

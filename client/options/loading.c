@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Loads the command line's scene into a daemon. */
+/* Loading of the command line's scene into a daemon. */
 #include "loading.h"
 #include "complete.h"
 #include "daemon.h"
@@ -48,8 +48,7 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
     return loading->connection != NULL;
 }
 
-/* Whether what the import says of the scene is remembered: it is compared, or the digest of a part depends on it.
- */
+/* True if the import is recorded: it is compared later, or the digest of a part depends on it. */
 static bool remembers_import(const struct cli_job *job)
 {
     return job->part.count > 0 ||
@@ -92,7 +91,7 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
     return (loading->job->input.scene || start_import(loading, error)) && connect_to(loading, error);
 }
 
-/* An edit that --light-group has made is named by that option. */
+/* Replaces the field of an error in an edit that --light-group has made by that option. */
 static bool blame_light_group(const struct cli_job *job, struct fl_error *error)
 {
     char text[sizeof(error->field)];
@@ -107,7 +106,7 @@ static bool blame_light_group(const struct cli_job *job, struct fl_error *error)
     return false;
 }
 
-/* Makes the job's edits in a scene that has just been loaded. */
+/* Applies the job's edits to a scene that has just been loaded. */
 static bool apply_edits(const struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
     return job->input.edit_count == 0 ||
@@ -115,7 +114,7 @@ static bool apply_edits(const struct cli_job *job, struct fl_scene *scene, struc
            blame_light_group(job, error);
 }
 
-static void tell_warnings(struct cli_loading *loading)
+static void print_warnings(struct cli_loading *loading)
 {
     if (loading->warnings <= NOTES_SHOWN)
         return;
@@ -123,7 +122,7 @@ static void tell_warnings(struct cli_loading *loading)
     fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n", loading->warnings - NOTES_SHOWN);
 }
 
-/* Of a shared scene, which has its name before the model that is loaded into it is there. */
+/* Refuses a shared scene whose name exists but whose model is not loaded yet. */
 static bool check_loaded(const struct fl_scene *scene, struct fl_error *error)
 {
     if (fl_scene_revision(scene) > 0)
@@ -141,7 +140,7 @@ bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
     }
     loading->scene = fl_scene_load(loading->connection, &loading->load, error);
     loading->load.started = NULL; /* the load took it over */
-    tell_warnings(loading);
+    print_warnings(loading);
     return loading->scene && apply_edits(loading->job, loading->scene, error);
 }
 
@@ -152,7 +151,7 @@ bool cli_loading_again(struct cli_loading *loading, struct fl_error *error)
         return false;
     fill_options(loading);
     struct fl_scene *scene = fl_scene_reload(loading->scene, &loading->load, error);
-    tell_warnings(loading);
+    print_warnings(loading);
     if (!scene)
         return false;
     loading->scene = scene;

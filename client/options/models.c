@@ -16,7 +16,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#define INPUT_BYTES_MAX (UINT64_C(2) << 30) /* as of any file of a model, in the importer */
+#define INPUT_BYTES_MAX (UINT64_C(2) << 30) /* the importer's limit for any file of a model */
 #define SCALE_MIN 1e-6
 #define SCALE_MAX 1e6
 
@@ -32,7 +32,7 @@ error_t cli_set_model(struct cli_job *job, const char *path)
     return 0;
 }
 
-/* "X,Y,Z", "X,Y,Z:RX,RY,RZ", "X,Y,Z:RX,RY,RZ:SCALE" or "X,Y,Z::SCALE". */
+/* Reads "X,Y,Z", "X,Y,Z:RX,RY,RZ", "X,Y,Z:RX,RY,RZ:SCALE" or "X,Y,Z::SCALE". */
 static bool read_place(const char *value, struct fl_model *model, struct fl_error *error)
 {
     char text[200], *rest = text;
@@ -67,7 +67,7 @@ error_t cli_set_place(struct cli_job *job, const char *field, const char *value)
     }
     struct fl_model *last = &job->input.models[job->input.count - 1];
     placed.path = last->path;
-    /* One more of the same. */
+    /* A further place adds another instance of the model. */
     if (last->is_placed && job->input.count == FL_MODELS_MAX)
         return cli_usage(job, field, "more than %d models cannot be shown at once", FL_MODELS_MAX);
     if (last->is_placed)

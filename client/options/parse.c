@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Command lines: argp's parser, and the option that was probably meant by one that does not exist. */
+/* Parsing of command lines with argp, and suggestions for misspelt options. */
 #include "parse.h"
 #include "talk.h"
 #include "lib/text.h"
@@ -10,10 +10,10 @@
 
 #define NAME_BYTES 64
 
-/* What a word of the command line has in an argp and its children. */
+/* A search for an option in an argp and its children. */
 struct search {
-    const char *name; /* of a long option, perhaps abbreviated; or .. */
-    char letter;      /* .. that of a short one */
+    const char *name; /* name of a long option, perhaps abbreviated; or .. */
+    char letter;      /* .. the letter of a short one */
     const struct argp_option *found;
     bool is_exact;
     struct fl_nearest nearest;
@@ -45,13 +45,14 @@ static void search_argp(struct search *search, const struct argp *argp)
     search_options(search, always);
 }
 
-/* Whether the option takes the next word, too. */
+/* True if the option takes the next word. */
 static bool wants_word(const struct argp_option *option)
 {
     return option && option->arg && !(option->flags & OPTION_ARG_OPTIONAL);
 }
 
-/* "-qo": the last letter's option may take the next word; an earlier one takes the rest of this one. */
+/* True if the next word belongs to "-qo": the last letter's option may take it; an earlier one takes the rest
+ * of this word. */
 static bool letters_want_word(const struct argp *argp, const char *letters)
 {
     for (; *letters != '\0'; letters++) {
@@ -63,7 +64,7 @@ static bool letters_want_word(const struct argp *argp, const char *letters)
     return false;
 }
 
-/* The option that does not exist and is near to one that does; argp tells of all others. */
+/* Finds an unknown option that resembles a known one; argp reports all others. */
 static bool check_options(const struct argp *argp, int argc, char **argv, struct fl_error *error)
 {
     for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
@@ -90,7 +91,7 @@ error_t cli_parse(const struct argp *argp, int argc, char **argv, unsigned flags
     struct fl_error error = {0};
     if (!check_options(argp, argc, argv, &error)) {
         cli_report(&error);
-        exit(argp_err_exit_status); /* as argp does */
+        exit(argp_err_exit_status); /* argp's status */
     }
     return argp_parse(argp, argc, argv, flags, NULL, input);
 }

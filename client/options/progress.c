@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Progress bars and lines. */
 #include "progress.h"
 #include "talk.h"
 #include "protocol/common/clock.h"
@@ -47,7 +48,7 @@ void cli_progress_end(struct cli_progress *progress, bool done)
     progress->drawn = false;
 }
 
-/* Whether enough time has passed since the last output. */
+/* True if enough time has passed since the last output. */
 static bool is_due(struct cli_progress *progress, bool always)
 {
     const uint64_t now = monotonic_now_ns();
@@ -57,8 +58,8 @@ static bool is_due(struct cli_progress *progress, bool always)
     return true;
 }
 
-/* A bar, if `total` is not 0 and there is space for it, and the text, on one line: one that is longer than the
- * terminal would stay when it is drawn again. */
+/* Draws a bar, if `total` is not 0 and there is space for it, and the text, on one line: a line longer than the
+ * terminal could not be redrawn in place. */
 static void draw(struct cli_progress *progress, uint32_t done, uint32_t total, const char *text)
 {
     const unsigned wide = columns(), length = (unsigned)strlen(text);
@@ -75,7 +76,7 @@ static void draw(struct cli_progress *progress, uint32_t done, uint32_t total, c
     progress->drawn = true;
 }
 
-/* `total` 0: no share of the work is known. */
+/* Shows a text, or a line; `total` 0: the share of the work is unknown. */
 static void show(struct cli_progress *progress, uint32_t done, uint32_t total, const char *text)
 {
     switch (progress->form) {
@@ -85,7 +86,7 @@ static void show(struct cli_progress *progress, uint32_t done, uint32_t total, c
     case CLI_PROGRESS_LINES:
         fprintf(stderr, "%s\n", text);
         return;
-    case CLI_PROGRESS_OPENJD: /* at once: who reads it waits for it */
+    case CLI_PROGRESS_OPENJD: /* printed at once, since another program reads it */
         if (total > 0)
             printf("openjd_progress: %.1f\n", 100.0 * done / total);
         printf("openjd_status: %s\n", text);
@@ -94,7 +95,7 @@ static void show(struct cli_progress *progress, uint32_t done, uint32_t total, c
     }
 }
 
-/* `what` comes from our importer, which is not trusted: only plain characters are shown. */
+/* Shows an import. `what` comes from the importer, which is not trusted: only plain characters are shown. */
 void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
                          const char *what)
 {
@@ -146,8 +147,8 @@ void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t
     show(progress, held, total, text);
 }
 
-/* Seconds until the error is small enough: it falls as a power of the time, by what was seen of that, n^-1/2 at
- * first; or until there are no more samples. */
+/* Estimates the seconds until the error is small enough, or until there are no more samples: the error falls as
+ * a power of the time, whose exponent is measured and is -1/2 at first. */
 static double noise_left_s(struct cli_progress *progress, const struct cli_noise *noise, double seconds)
 {
     const double ratio = (double)noise->error / (double)noise->wanted;
@@ -185,7 +186,7 @@ void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *n
     show(progress, (uint32_t)(1000 * seconds / (seconds + left_s)), is_known ? 1000 : 0, text);
 }
 
-/* Resident bytes of a process; 0: it is gone. */
+/* Resident bytes of a process; 0: it has ended. */
 static uint64_t resident_of(const char *process)
 {
     char path[64];
@@ -216,7 +217,7 @@ void cli_progress_frame(struct cli_progress *progress, uint32_t frame, double se
 {
     if (progress->silent || progress->form == CLI_PROGRESS_BAR)
         return;
-    /* The last pictures may be written when their daemon has ended. */
+    /* The daemon may have ended before the last pictures are written. */
     const uint64_t now_bytes = resident_bytes();
     progress->resident_bytes = now_bytes > progress->resident_bytes ? now_bytes : progress->resident_bytes;
     fprintf(stderr, "frame %u: %.2f s, %.0f MB, ", frame, seconds, (double)progress->resident_bytes * 1e-6);
@@ -244,7 +245,7 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
         show(progress, done, total, numbers);
         return;
     }
-    /* What is left of it is more worth than the rate. */
+    /* The remaining time is more important than the rate. */
     if (left[0] != '\0' && strlen(numbers) >= columns())
         snprintf(numbers + length, sizeof(numbers) - (size_t)length, ", %s left", left);
     if (strlen(numbers) >= columns())

@@ -7,8 +7,8 @@
 
 enum cli_progress_form {
     CLI_PROGRESS_LINES,
-    CLI_PROGRESS_BAR,   /* drawn over and over on one line */
-    CLI_PROGRESS_OPENJD /* what Open Job Description reads on standard output */
+    CLI_PROGRESS_BAR,   /* redrawn on one line */
+    CLI_PROGRESS_OPENJD /* for Open Job Description, on standard output */
 };
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
@@ -28,33 +28,34 @@ struct cli_progress {
     bool drawn;
     uint64_t begin_ns, shown_ns, first_ns;
     uint32_t total;
-    float error;             /* as it was last told, that many seconds after the beginning */
-    double error_s, slope;   /* it falls as that power of the time */
-    uint64_t resident_bytes; /* the most that a line has told */
+    float error;             /* last reported error, and its time in seconds after the start */
+    double error_s, slope;   /* exponent of its decrease over time */
+    uint64_t resident_bytes; /* maximum so far */
 };
 
 void cli_progress_begin(struct cli_progress *progress, const struct cli_talk *talk);
 void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
                          const char *what);
-/* From the first call on frames are counted. */
+/* Counts frames from the first call on. */
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total);
-/* `done` of `total` steps of different length are finished; `what` is the current one. Without a terminal one line
- * per step, once it has taken a second. */
+/* Shows that `done` of `total` steps of different lengths are finished; `what` is the current one. Without a
+ * terminal it prints a line for each step that has taken a second. */
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what);
-/* A progressive picture has `held` samples per pixel; `total` 0: only an interruption ends it. */
+/* Shows that a progressive picture has `held` samples per pixel; `total` 0: only an interruption ends it. */
 void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total);
-/* A picture has that error where it is largest, and goes on until it is `wanted`, or all have `total` samples. */
+/* The largest error of a picture, which is refined until the error is `wanted`, or all pixels have `total`
+ * samples. */
 struct cli_noise {
     float error, wanted;
     uint32_t held, total;
 };
 void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *noise);
-/* A line in the log for a picture that is complete: its number, seconds, the most memory that the command and
- * what it has started had at any line, and its file. Nothing where a bar is drawn. */
+/* Logs a finished picture: its number, seconds, the maximum memory of the command and its children so far, and
+ * its file. Prints nothing if there is a bar. */
 void cli_progress_frame(struct cli_progress *progress, uint32_t frame, double seconds, const char *path);
 /* Removes the bar, so that other output can be written. */
 void cli_progress_clear(struct cli_progress *progress);
-/* The bar of a finished command stays; any other is removed. */
+/* Keeps the bar of a finished command, and removes any other. */
 void cli_progress_end(struct cli_progress *progress, bool done);
 
 #endif

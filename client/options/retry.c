@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Daemons that are lost, and may come back. */
+/* Retries after the loss of a daemon. */
 #include "retry.h"
 #include "interrupt.h"
 
@@ -13,7 +13,7 @@
 #define DOUBLINGS_MAX 6u
 #define RETRY_MAX_S 2592000.0 /* 30 days */
 #define LOST_AFTER_MIN_S 3.0
-#define USUAL_TIMEOUT_S 30.0 /* of fl_connect */
+#define USUAL_TIMEOUT_S 30.0 /* the library's default */
 
 bool cli_is_temporary(const struct fl_error *error)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Sharing of a scene on a daemon. */
 #include "sharing.h"
 #include "job.h"
 #include "loading.h"
@@ -21,7 +22,8 @@ bool cli_socket_choose(struct cli_socket *chosen, struct fl_error *error)
     const char *folder = getenv("XDG_RUNTIME_DIR");
     *chosen = (struct cli_socket){.folder = ""};
     if (!folder || folder[0] != '/') {
-        /* Anyone may write to the folder of temporary files, so the socket goes into a subfolder of mode 0700. */
+        /* The folder of temporary files is writable for everyone, so the socket goes into a subfolder of mode
+         * 0700. */
         snprintf(chosen->folder, sizeof(chosen->folder), "%s/farlight-XXXXXX", P_tmpdir);
         folder = mkdtemp(chosen->folder);
     }
@@ -35,7 +37,7 @@ bool cli_socket_choose(struct cli_socket *chosen, struct fl_error *error)
     return true;
 }
 
-/* The daemon removes its socket, if it can. */
+/* Removes the remains; the daemon removes its socket itself if it can. */
 void cli_socket_remove(const struct cli_socket *chosen)
 {
     if (chosen->folder[0] == '\0')
@@ -51,7 +53,7 @@ static bool watch_scene(struct cli_sharing *sharing, struct fl_error *error)
     return !sharing->job->input.watch || cli_watch_scene(&sharing->watch, sharing->loading.scene, error);
 }
 
-/* Waits until files have changed, and reads them. Those that cannot be read are reported: the scene stays. */
+/* Waits until files have changed, and reloads them. Unreadable files are reported, and the scene stays. */
 static bool follow(struct cli_sharing *sharing, struct fl_error *error)
 {
     struct cli_loading *loading = &sharing->loading;
@@ -89,8 +91,8 @@ static bool load_again(struct cli_loading *loading, const struct cli_job *job, s
     return cli_loading_begin(loading, error) && cli_loading_end(loading, error);
 }
 
-/* A running daemon may have kept the scene; a new one gets it under the same name. */
-static bool come_back(struct cli_sharing *sharing, struct fl_error *error)
+/* Attaches again to a running daemon, which may have kept the scene; a new one gets it under the same name. */
+static bool load_after_loss(struct cli_sharing *sharing, struct fl_error *error)
 {
     struct cli_loading *loading = &sharing->loading;
     struct cli_job attaching = *sharing->job;
@@ -120,7 +122,7 @@ static bool recover(struct cli_sharing *sharing, struct fl_error *error)
             fprintf(stderr, "farlight: trying again in %.1f s\n", pause_ms * 1e-3);
         if (!cli_retry_wait(pause_ms, error))
             return false;
-        if (!come_back(sharing, error) || !watch_scene(sharing, error))
+        if (!load_after_loss(sharing, error) || !watch_scene(sharing, error))
             continue;
         cli_progress_clear(&sharing->progress);
         if (!job->talk.quiet)
@@ -159,7 +161,8 @@ bool cli_sharing_stay(struct cli_sharing *sharing, struct fl_error *error)
 void cli_sharing_end(struct cli_sharing *sharing)
 {
     if (sharing->loading.connection)
-        fl_connection_set_interrupt(sharing->loading.connection, 0); /* it is still told in order */
+        /* The daemon still gets an orderly goodbye */
+        fl_connection_set_interrupt(sharing->loading.connection, 0);
     cli_loading_close(&sharing->loading);
     cli_watch_end(&sharing->watch);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene that is up for other clients: on a daemon of its own, which ends with the command, or on a running one.
- * A lost daemon is waited for, and gets the scene again. With the job's `watch` the scene follows its files. */
+/* A scene shared with other clients, on a private daemon, which ends with the command, or on a running one.
+ * After the loss of a daemon the scene is loaded again. With the job's `watch` the scene follows its files. */
 #ifndef FARLIGHT_OPTIONS_SHARING_H
 #define FARLIGHT_OPTIONS_SHARING_H
 
@@ -8,18 +8,18 @@
 #include "progress.h"
 #include "watch.h"
 
-/* A Unix socket for a daemon of one's own, in $XDG_RUNTIME_DIR or a new folder that only its owner can enter. */
+/* A Unix socket for a private daemon, in $XDG_RUNTIME_DIR or a new folder that only its owner can enter. */
 struct cli_socket {
     char address[300];
-    char folder[64]; /* created for it; empty: there is none */
+    char folder[64]; /* created for the socket; empty: none */
 };
-/* False: *error names no field. */
+/* Chooses a socket. False: *error names no field. */
 bool cli_socket_choose(struct cli_socket *chosen, struct fl_error *error);
-/* What the daemon has left of it. */
+/* Removes the daemon's remains. */
 void cli_socket_remove(const struct cli_socket *chosen);
 
-/* `job`, `loading.scene_name` and `loading.daemon_arguments` are the caller's, and `restarts`: a daemon of its own
- * that has failed is started again, in place of an error. */
+/* A shared scene. The caller sets `job`, `loading.scene_name`, `loading.daemon_arguments`, and `restarts`: a
+ * private daemon that fails is started again instead of causing an error. */
 struct cli_sharing {
     const struct cli_job *job;
     bool restarts;
@@ -29,9 +29,9 @@ struct cli_sharing {
 };
 /* Loads the scene. */
 bool cli_sharing_begin(struct cli_sharing *sharing, struct fl_error *error);
-/* Serves until it is interrupted, which is success, or the daemon is gone for good. */
+/* Serves until it is interrupted, which is success, or the daemon is finally lost. */
 bool cli_sharing_stay(struct cli_sharing *sharing, struct fl_error *error);
-/* Also after a failed beginning. */
+/* Must follow cli_sharing_begin, also after a failure. */
 void cli_sharing_end(struct cli_sharing *sharing);
 
 #endif

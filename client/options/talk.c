@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Messages on standard error. */
 #include "talk.h"
 #include "interrupt.h"
 #include "retry.h"
@@ -53,7 +54,7 @@ void cli_note(const struct fl_note *note, bool chatty)
     if (note->severity == PROTOCOL_SEVERITY_INFO && !chatty)
         return;
     if (note->severity == PROTOCOL_SEVERITY_ERROR)
-        return; /* comes again as the reason of the failure */
+        return; /* will be repeated as the reason of the failure */
     fl_error_set(&line, FL_ERROR_NONE, note->where, "%s", note->text);
     say(note->severity == PROTOCOL_SEVERITY_WARNING ? "warning: " : "note: ", "\033[33m", &line);
 }

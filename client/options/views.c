@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Options of several views in a picture, of lenses and of frames that are made of depth layers. */
+/* Options of several views in a picture, of lenses and of frames made from depth layers. */
 #include "views.h"
 #include "lib/text.h"
 
@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define VIEWS_MAX 64u /* across and down; likewise of frames from one that is rendered to the next */
+#define VIEWS_MAX 64u /* across and down; also between two rendered frames */
 #define DISTANCE_MAX_M 1e6
 
 /* ---- what is typed ---- */
@@ -82,7 +82,7 @@ error_t cli_views_set(struct cli_job *job, const char *option, const char *value
         views->has_baseline = true;
         return set_distance(job, option, value, &views->baseline_m);
     }
-    if (strcmp(name, "views") == 0 || strcmp(name, "eyes") == 0) { /* the latter of the viewer */
+    if (strcmp(name, "views") == 0 || strcmp(name, "eyes") == 0) { /* the viewer calls it eyes */
         views->has_views = true;
         return set_source(job, option, value, &views->views);
     }
@@ -127,9 +127,9 @@ static bool complete_eyes(struct cli_job *job)
     return true;
 }
 
-/* Where it is not said, views and frames are made of layers, and a lens is not. Such pictures are not filtered and
- * have no motion and no parts of light, the layers from PROTOCOL_LAYER_MOTION on: where one of these is wanted,
- * views are rendered as they are. */
+/* Chooses the source. By default views and frames are made from layers, and a lens is not. Pictures from layers
+ * are not filtered and have neither motion nor light layers (those from PROTOCOL_LAYER_MOTION on): if one of
+ * these is requested, views are rendered. */
 static bool complete_source(struct cli_job *job)
 {
     const struct cli_views *views = &job->views;
@@ -177,7 +177,7 @@ bool cli_views_check_range(const struct cli_job *job, struct fl_error *error)
     return fl_error_remedy(error, "leave it out, or use a range of --frames such as 1-120");
 }
 
-/* Every N-th frame of a range that itself has only every M-th. */
+/* Renders every N-th frame of a range that has a step itself. */
 static bool complete_upsample(struct cli_job *job)
 {
     const struct cli_series *series = &job->series;

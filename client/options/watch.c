@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Watching of files. */
 #include "watch.h"
 #include "protocol/common/clock.h"
 
@@ -11,9 +12,9 @@
 #include <sys/inotify.h>
 #include <unistd.h>
 
-#define LOOK_NS 1000000000ull /* without a report */
+#define CHECK_NS 1000000000ull /* interval of checks without a report */
 #define SETTLE_NS                                                                                                 \
-    150000000ull /* exporters write a file in one go, and the files of one model soon after another */
+    150000000ull /* exporters write a file in one go, and the files of a model shortly after each other */
 #define WAIT_MS 50u
 #define FOLDER_EVENTS                                                                                             \
     (IN_CLOSE_WRITE | IN_MODIFY | IN_MOVED_TO | IN_MOVED_FROM | IN_CREATE | IN_DELETE | IN_ATTRIB | IN_ONLYDIR)
@@ -24,7 +25,7 @@ static bool cli_watch_begin(struct cli_watch *watch, struct fl_error *error)
     return watch->fd >= 0 || fl_error_set(error, FL_ERROR_SYSTEM, "--watch", "inotify_init1: %s", strerror(errno));
 }
 
-static struct stat look_at(const char *path)
+static struct stat state_of(const char *path)
 {
     struct stat now = {0};
     if (stat(path, &now) < 0)
@@ -53,11 +54,11 @@ bool cli_watch_add(struct cli_watch *watch, const char *path, struct fl_error *e
         watch->capacity = more;
     }
     struct cli_watched *file = &watch->files[watch->count];
-    *file = (struct cli_watched){.path = strdup(path), .seen = look_at(path)};
+    *file = (struct cli_watched){.path = strdup(path), .seen = state_of(path)};
     if (!file->path)
         return fl_error_set(error, FL_ERROR_MEMORY, "--watch", "out of memory");
     watch->count++;
-    /* A folder that cannot be watched is looked at. */
+    /* A folder that cannot be watched is checked at intervals. */
     const char *slash = strrchr(path, '/');
     const size_t length = !slash ? 1 : slash == path ? 1 : (size_t)(slash - path);
     if (length < sizeof(folder)) {
@@ -94,12 +95,12 @@ static bool take_reports(const struct cli_watch *watch)
     return any;
 }
 
-/* Whether one is not as it was; then it is from now on. */
-static bool look_at_all(struct cli_watch *watch)
+/* Checks all files; true if one has changed, whose new state is then recorded. */
+static bool check_all(struct cli_watch *watch)
 {
     bool any = false;
     for (size_t i = 0; i < watch->count; i++) {
-        const struct stat now = look_at(watch->files[i].path);
+        const struct stat now = state_of(watch->files[i].path);
         any = any || !is_same(&now, &watch->files[i].seen);
         watch->files[i].seen = now;
     }
@@ -108,14 +109,14 @@ static bool look_at_all(struct cli_watch *watch)
 
 bool cli_watch_has_changed(struct cli_watch *watch, uint64_t now_ns)
 {
-    if (take_reports(watch) || now_ns >= watch->look_ns) {
-        if (look_at_all(watch))
+    if (take_reports(watch) || now_ns >= watch->check_ns) {
+        if (check_all(watch))
             watch->changed_ns = now_ns;
-        watch->look_ns = now_ns + (watch->changed_ns > 0 ? SETTLE_NS : LOOK_NS);
+        watch->check_ns = now_ns + (watch->changed_ns > 0 ? SETTLE_NS : CHECK_NS);
     }
     if (watch->changed_ns == 0 || now_ns - watch->changed_ns < SETTLE_NS)
         return false;
-    const bool has_settled = !look_at_all(watch);
+    const bool has_settled = !check_all(watch);
     watch->changed_ns = has_settled ? 0 : now_ns;
     return has_settled;
 }
