@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* farlight info: lists the contents of a model file. */
 #include "commands.h"
 #include "options/interrupt.h"
 #include "options/job.h"
@@ -21,7 +22,7 @@ struct info_options {
     const char *model, *environment, *variant;
     bool json, has_camera;
     struct cli_info_camera camera;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds an option's error */
 };
 
 static const struct argp_option options[] = {
@@ -60,7 +61,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
 
 static json_t *string(const char *text)
 {
-    json_t *made = json_string(text); /* NULL where it is not UTF-8: cut names may not be */
+    json_t *made = json_string(text); /* NULL for text that is not UTF-8, which a cut name may be */
     return made ? made : json_string("");
 }
 
@@ -149,7 +150,7 @@ static void print_bounds(const float lower[3], const float upper[3])
            (double)upper[1], (double)upper[2]);
 }
 
-/* A list too long to be read is cut. */
+/* Prints a list, cut to a readable length. */
 static void print_objects(const char *kind, const struct fl_model_object *list, size_t count)
 {
     for (size_t i = 0; i < count && i < LISTED_MAX; i++) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The camera that 'farlight render' takes of a model, in coordinates: a daemon is asked for a tiny picture. */
+/* farlight info --camera: the default camera of 'farlight render' for a model, in coordinates, from a tiny
+ * picture of a daemon. */
 #include "cli/info_camera.h"
 
 #include "options/complete.h"
@@ -10,7 +11,7 @@
 
 #define DEGREES_PER_RADIAN 57.295779513082321
 
-/* The same shape with the fewest pixels. */
+/* Reduces the picture to the fewest pixels of the same shape. */
 static void shrink(struct message_render *wanted)
 {
     uint32_t a = wanted->width, b = wanted->height;
@@ -23,7 +24,7 @@ static void shrink(struct message_render *wanted)
     wanted->height /= a;
 }
 
-/* Ahead of the eye, as far away as the middle of what is shown. */
+/* Distance of the target on the view's axis, equal to the distance of the scene's middle. */
 static double target_distance(const float m[12], const struct fl_model_info *info)
 {
     double distance = 0;

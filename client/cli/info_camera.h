@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Of 'farlight info --camera'. */
+/* The camera of 'farlight info --camera'. */
 #ifndef FARLIGHT_CLI_INFO_CAMERA_H
 #define FARLIGHT_CLI_INFO_CAMERA_H
 
@@ -13,10 +13,10 @@ struct cli_info_camera {
     double ortho_height;             /* metres */
 };
 
-/* Starts a daemon for it, and imports the model once more. */
+/* Starts a daemon, and imports the model again. */
 bool cli_info_find_camera(const struct fl_load_options *load, const struct fl_model_info *info,
                           struct cli_info_camera *camera, struct fl_error *error);
-/* One line, which can be copied into options of 'farlight render'. */
+/* Prints the camera in a line of options for 'farlight render'. */
 void cli_info_print_camera(const struct cli_info_camera *camera);
 json_t *cli_info_camera_json(const struct cli_info_camera *camera); /* the caller owns it */
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* farlight: the command line, and its subcommands. */
 #include "commands.h"
 #include "cli/compare/commands.h"
 #include "cli/daemon/commands.h"
@@ -116,7 +117,7 @@ int main(int argc, char **argv)
         status = run(subcommand, argc - 1, argv + 1);
     else
         status = unknown(argv[1]);
-    /* A failed write of the output fails the command: a full disk shows only here. */
+    /* A failed write of the output fails the command; a full disk shows only here. */
     if (fflush(stdout) != 0 && (status == CLI_DONE || status == CLI_FAILED)) {
         fprintf(stderr, "farlight: standard output cannot be written: %m\n");
         status = subcommand && subcommand->run == cli_compare ? CLI_TROUBLE : CLI_FAILED;

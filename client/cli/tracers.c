@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* farlight tracers: every tracer and its settings, for people, for scripts, and for the build, which makes the
- * manual and the schema of shot files of them. farlight complete: for the shell. */
+/* farlight tracers: lists every tracer and its settings, for people, for scripts, and for the build, which
+ * makes the manual and the schema of shot files from it. farlight complete: serves the shell's completion. */
 #include "options/fields.h"
 #include "commands.h"
 #include "options/parse.h"
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define WHOLE_MAX 9007199254740992.0 /* that a number of JSON holds exactly */
+#define WHOLE_MAX 9007199254740992.0 /* largest number that JSON holds exactly */
 
 /* ---- for people ---- */
 
@@ -117,7 +117,7 @@ static json_t *tracers_json(void)
 
 /* ---- the schema of shot files ---- */
 
-/* Names that a batch may have. */
+/* Names of values that a batch allows. */
 static json_t *names_json(const struct field_desc *field)
 {
     json_t *names = json_array();
@@ -158,7 +158,7 @@ static json_t *member_json(const struct cli_field *member)
     return object;
 }
 
-/* A member of the object `properties`, of which each has a line. */
+/* Prints a member of the object `properties`, each on a line. */
 static void print_member(const char *name, json_t *object)
 {
     char *text = json_dumps(object, 0);
@@ -173,7 +173,7 @@ static json_t *layers_json(void)
     char list[512];
     char *rest;
     protocol_enum_list("layer", list, sizeof(list));
-    json_t *names = json_pack("[s]", "light"); /* all parts of it */
+    json_t *names = json_pack("[s]", "light"); /* stands for all light layers */
     for (char *word = strtok_r(list, ", ", &rest); word; word = strtok_r(NULL, ", ", &rest))
         json_array_append_new(names, json_string(word));
     return json_pack("{s:s, s:s, s:i, s:{s:o}}", "description", "of an EXR file; default: beauty alone", "type",
@@ -206,7 +206,7 @@ static void print_manual_setting(const struct cli_field *setting)
     printf(".El\n");
 }
 
-/* Items of the list of options: all tracers, then settings. */
+/* Prints items of the list of options: all tracers, then settings. */
 static void print_manual(void)
 {
     printf(".It Fl -tracer Ar NAME\nWhat finds intersections; the default is\n.Cm %s .\n"
@@ -262,7 +262,7 @@ int cli_tracers(int argc, char **argv)
     return CLI_DONE;
 }
 
-/* "bvh,reference" and so on: every two. */
+/* Prints every pair, "bvh,reference" and so on. */
 static void print_pairs(void)
 {
     for (size_t a = 0; a < tracer_desc_count; a++)

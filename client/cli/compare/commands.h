@@ -4,7 +4,8 @@
 #define FARLIGHT_CLI_COMPARE_COMMANDS_H
 
 int cli_compare(int argc, char **argv);
-int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
-int cli_compare_views(int argc, char **argv);   /* likewise --stereo and what else is made of depth layers */
+int cli_compare_tracers(int argc, char **argv); /* run by cli_compare for --tracers */
+/* Run by cli_compare for --stereo and other pictures from depth layers */
+int cli_compare_views(int argc, char **argv);
 
 #endif

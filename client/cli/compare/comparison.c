@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Figures of a comparison: names, limits, output. */
 #include "comparison.h"
 #include "lib/text.h"
 #include "options/talk.h"
@@ -9,9 +10,9 @@
 
 static const struct figure {
     const char *name, *unit;
-    bool is_share;   /* of the pixels; may be typed in percent */
+    bool is_share;   /* share of the pixels; may be typed in percent */
     bool less_fails; /* the limit is a minimum */
-    double min, max; /* that a limit may be; shares are 0 to 1 */
+    double min, max; /* allowed limits; shares are 0 to 1 */
 } figures[CLI_FIGURE_COUNT] = {
     [CLI_FIGURE_PSNR] = {.name = "psnr", .unit = " dB", .less_fails = true, .min = -1000, .max = 1000},
     [CLI_FIGURE_SHOWN_PSNR] = {.name = "shown_psnr", .unit = " dB", .less_fails = true, .min = -1000, .max = 1000},
@@ -114,7 +115,7 @@ static bool holds(const struct cli_limit *limit, const struct fl_comparison *com
     return figures[limit->figure].less_fails ? value >= limit->value : value <= limit->value;
 }
 
-/* Whether no limit is set for pixels that are not finite. */
+/* True if there are pixels that are not finite, and no limit for them. */
 static bool has_stray_pixels(const struct cli_limits *limits, const struct fl_comparison *comparison)
 {
     for (size_t i = 0; i < limits->count; i++)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The command line decides what is compared: two image files, with --tracers two tracers, or with an option of
- * views what is made of depth layers with what is rendered. */
+/* farlight compare: compares two image files, with --tracers two tracers, or with an option of views pictures
+ * from depth layers with rendered ones. */
 #include "commands.h"
 #include "options/image_path.h"
 #include "options/interrupt.h"
@@ -31,7 +31,7 @@ struct comparing {
     struct fl_compare_options options;
     struct cli_limits limits;
     bool json;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds an option's error */
 };
 
 static const struct argp_option options[] = {
@@ -53,7 +53,7 @@ static const struct argp_option options[] = {
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {0}};
 
-/* An error of a value that the library parsed gets the option's name. */
+/* Adds the option's name to an error of a value that the library parsed. */
 static error_t name_field(struct comparing *comparing, const char *field)
 {
     snprintf(comparing->job.error.field, sizeof(comparing->job.error.field), "%s", field);
@@ -160,10 +160,10 @@ static int compare_images(struct comparing *comparing)
     return cli_limits_hold(&comparing->limits, &comparison) ? CLI_DONE : CLI_FAILED;
 }
 
-/* Abbreviations count, as everywhere: down to `shortest` characters. */
+/* Options that select another form; abbreviations count, down to `shortest` characters. */
 struct form {
     const char *option;
-    size_t shortest; /* that no other option of images begins with; so does "--tracer" */
+    size_t shortest; /* shortest prefix that no other option of images has; "--tracer" qualifies */
     int (*run)(int argc, char **argv);
 };
 static const struct form forms[] = {
@@ -172,7 +172,7 @@ static const struct form forms[] = {
     {"--views", 4, cli_compare_views},       {"--upsample", 4, cli_compare_views},
 };
 
-/* What another form than that of two images is called by; NULL: none. */
+/* The other form that the options select; NULL: two images. */
 static const struct form *find_form(int argc, char **argv)
 {
     for (size_t k = 0; k < sizeof(forms) / sizeof(forms[0]); k++)

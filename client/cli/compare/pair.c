@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Rendering a job in two ways, and comparing the pictures. */
 #include "pair.h"
 #include "lib/text.h"
 #include "cli/jobs/series.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One picture by two tracers: every ray compared, then the pictures. */
+/* farlight compare --tracers: a picture by two tracers; compares every ray, then the pictures. */
 #include "pair.h"
 #include "lib/text.h"
 #include "commands.h"
@@ -21,7 +21,7 @@
 
 #define FAR_DEFAULT 1e-4
 #define FAR_MIN 1e-9
-#define STEPS 3u /* that progress is counted in */
+#define STEPS 3u /* steps of the progress */
 
 enum key { KEY_TRACERS = 0x400, KEY_FAR, KEY_FAIL_ABOVE };
 
@@ -29,9 +29,9 @@ struct tracer_comparison {
     struct cli_pair pair;
     bool has_tracers;
     enum protocol_tracer tracer, reference;
-    double far_share, min_agreement; /* of all rays; 0: no limit */
+    double far_share, min_agreement; /* share of all rays; 0: no limit */
     struct fl_comparison figures;
-    struct fl_frame *frame; /* the tracer's, with what came of the rays */
+    struct fl_frame *frame; /* the tracer's frame, with the results of the rays */
 };
 
 static const struct argp_option options[] = {
@@ -117,7 +117,7 @@ static bool complete(struct tracer_comparison *comparison)
 
 /* ---- pictures ---- */
 
-/* The one frame of a side; the caller's to destroy, NULL if it failed. */
+/* Renders the single frame of a side, which the caller destroys; NULL: failure. */
 static struct fl_frame *render(struct tracer_comparison *comparison, enum cli_pair_side side,
                                struct cli_warned *warned, struct fl_error *error)
 {
@@ -193,7 +193,7 @@ static void print_json(const struct tracer_comparison *comparison)
 {
     const struct fl_frame *frame = comparison->frame;
     const char *picture = comparison->pair.images.picture;
-    char model[4097]; /* a path need not be UTF-8, which JSON is */
+    char model[4097]; /* a path need not be UTF-8, but JSON is */
     json_t *object = json_pack(
         "{s:s,s:s,s:s,s:I,s:I,s:I,s:f,s:o,s:o,s:o,s:b}", "tracer", protocol_tracer_text(comparison->tracer),
         "reference", protocol_tracer_text(comparison->reference), "integrator",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Pictures that are made of depth layers beside the same ones rendered: two views or many, through a lens, or
- * frames between those that are rendered. */
+/* Pictures from depth layers compared with rendered ones: two views or many, a lens, or frames between rendered
+ * ones. */
 #include "pair.h"
 #include "lib/text.h"
 #include "commands.h"
@@ -22,25 +22,25 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define UNKNOWN_ROW "views/unknown" /* of a frame's structure */
+#define UNKNOWN_ROW "views/unknown" /* a row of a frame's structure */
 
 enum key { KEY_FAIL_ABOVE = 0x400 };
 
 struct compared_frame {
     uint32_t frame;
-    double unknown; /* share of its samples that no layer shows */
+    double unknown; /* share of the samples that no layer shows */
     struct fl_comparison figures;
-    char *picture; /* NULL: none is asked for */
+    char *picture; /* NULL: not requested */
 };
 
 struct views_comparison {
     struct cli_pair pair;
-    double max_unknown; /* of each frame's samples; below 0: no limit */
+    double max_unknown; /* share of each frame's samples; below 0: no limit */
     bool is_series;
-    struct fl_pattern pattern; /* of the pictures of a series */
+    struct fl_pattern pattern; /* paths of the pictures of a series */
     struct compared_frame *frames;
     uint32_t frame_count;
-    bool is_made; /* some frame says what no layer shows */
+    bool is_made; /* true if some frame is made from layers */
     struct cli_warned warned;
 };
 
@@ -73,7 +73,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-/* One picture, or one for each frame. */
+/* Checks the path of a single picture, or of one for each frame. */
 static bool check_picture(struct views_comparison *comparison)
 {
     const struct cli_pair *pair = &comparison->pair;
@@ -208,7 +208,7 @@ static bool is_within(const struct views_comparison *comparison)
     return good;
 }
 
-/* Over all frames: their samples and their pixels are equally many. */
+/* Totals over all frames, which have equal numbers of samples and pixels. */
 struct total {
     double unknown, psnr_db; /* INFINITY without error */
 };
@@ -265,7 +265,7 @@ static void print_json(const struct views_comparison *comparison)
 {
     const struct message_render *wanted = &comparison->pair.job.options;
     const struct total total = total_of(comparison);
-    char model[4097]; /* a path need not be UTF-8, which JSON is */
+    char model[4097]; /* a path need not be UTF-8, but JSON is */
     json_t *frames = json_array();
     for (uint32_t i = 0; i < comparison->frame_count; i++)
         json_array_append_new(frames, frame_json(comparison, &comparison->frames[i]));
@@ -305,8 +305,8 @@ int cli_compare_views(int argc, char **argv)
                "stands "
                "for its number. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared.",
         .children = children};
-    /* As a screen shows them: in linear light a lamp that is off by a pixel outweighs all else. Coverage is 1
-     * where a layer has a surface, and is not compared. */
+    /* Displayed colours are compared: in linear light a lamp displaced by a pixel would outweigh everything
+     * else. Coverage is 1 where a layer has a surface, and is not compared. */
     struct views_comparison comparison = {.pair = {.image = CLI_IMAGE_PNG, .images.ignore_alpha = true},
                                           .max_unknown = -1};
     struct fl_error error = {0};

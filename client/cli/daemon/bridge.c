@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What ssh runs on the daemon's host. */
+/* farlight bridge: the program that ssh runs on the daemon's host. */
 #include "commands.h"
 #include "options/job.h"
 #include "options/parse.h"
@@ -9,7 +9,7 @@
 
 struct bridge_options {
     const char *address;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds an option's error */
 };
 
 static error_t parse(int key, char *value, struct argp_state *state)

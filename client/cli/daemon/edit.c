@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Changes objects of a shared scene, for all clients that are attached to it. */
+/* farlight edit: changes objects of a shared scene, for all attached clients. */
 #include "commands.h"
 #include "options/daemon.h"
 #include "options/job.h"
@@ -19,19 +19,19 @@ enum key { KEY_SCENE = 0x400, KEY_FROM, KEY_LIST, KEY_JSON, KEY_PRINT_UNDO };
 
 #define LINE_MAX_BYTES 1024u
 #define ASSIGNMENTS_MAX 65536u
-#define NARROW 4u      /* values of a field that a list shows */
-#define NO_LIMIT 50000 /* a range that goes further tells nothing */
+#define NARROW 4u      /* number of values of a field that a list shows */
+#define NO_LIMIT 50000 /* wider ranges are not shown */
 
 struct editing {
     struct cli_daemon daemon;
     const char *scene;
-    const char **words; /* as typed, owned: assignments, or with `list` objects */
+    const char **words; /* assignments as typed, or objects for `list`; owned */
     size_t word_count;
     const char *from; /* NULL: none */
     bool list, json, print_undo;
     struct fl_assignment *assignments; /* owned */
     size_t assignment_count;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds an option's error */
 };
 
 static const struct argp_option options[] = {
@@ -68,7 +68,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         editing->print_undo = true;
         return 0;
     case ARGP_KEY_ARG:
-        editing->words[editing->word_count++] = value; /* it has a place for each argument */
+        editing->words[editing->word_count++] = value; /* has space for every argument */
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -102,7 +102,7 @@ static bool add_assignment(struct editing *editing, const char *text, const char
     return false;
 }
 
-/* Cuts the end of the line, and a comment: "#" at the beginning, or between blanks. */
+/* Cuts off the end of the line, and a comment: "#" at the beginning, or between blanks. */
 static char *strip_line(char *line)
 {
     char *start = line;
@@ -241,7 +241,7 @@ static void print_state_json(const struct fl_object_state *state)
     print_json(object);
 }
 
-/* Whether the name alone, as a file has it, means this object. */
+/* True if the name alone selects this object. */
 static bool is_known_by_name(struct fl_scene *scene, const struct fl_object_state *state)
 {
     const size_t length = strlen(state->name);
@@ -256,7 +256,7 @@ static bool is_known_by_name(struct fl_scene *scene, const struct fl_object_stat
     return found;
 }
 
-/* As assignments, so that the list can be changed and read by --from. */
+/* Prints the fields as assignments, so that the list can be edited and read by --from. */
 static void print_state(struct fl_scene *scene, const struct fl_object_state *state)
 {
     const bool by_name = is_known_by_name(scene, state);
@@ -283,7 +283,7 @@ static void print_state(struct fl_scene *scene, const struct fl_object_state *st
     }
 }
 
-/* "material.Steel", "node.*", "environment" */
+/* Lists "material.Steel", "node.*", "environment". */
 static bool list_fields(const struct editing *editing, struct fl_scene *scene, const char *word,
                         struct fl_error *error)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Statistics in the text format of Prometheus. */
 #include "metrics.h"
 
 #include <inttypes.h>

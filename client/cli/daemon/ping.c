@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* farlight ping: measures the round-trip time to a daemon. */
 #include "commands.h"
 #include "options/daemon.h"
 #include "options/job.h"
@@ -13,7 +14,7 @@
 struct ping_options {
     struct cli_daemon daemon;
     uint64_t count;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds an option's error */
 };
 
 static const struct argp_option options[] = {{"count", 'c', "N", 0, "Measure N times (default 5)", 0}, {0}};

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* farlight scenes: lists the scenes of a daemon. */
 #include "commands.h"
 #include "options/daemon.h"
 #include "options/job.h"
@@ -15,7 +16,7 @@
 struct scenes_options {
     struct cli_daemon daemon;
     bool json;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds an option's error */
 };
 
 static const struct argp_option options[] = {{"json", KEY_JSON, NULL, 0, "Print one JSON object per line", 0},

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Shares a scene: on a daemon of its own, which listens on the given addresses and ends with the command, or on a
- * running one. */
+/* farlight serve: shares a scene, on a private daemon, which listens on the given addresses and ends with the
+ * command, or on a running one. */
 #include "options/sharing.h"
 
 #include <errno.h>
@@ -30,16 +30,16 @@
 #define KEY_WATCH 0x407
 
 #define LISTENS_MAX 8
-#define DAEMON_WORDS_MAX 28 /* of fl_connect */
+#define DAEMON_WORDS_MAX 28 /* limit of fl_connect */
 
 struct serving {
-    struct cli_job job; /* model, environment, server, key file; and the error of what was typed */
+    struct cli_job job; /* model, environment, server, key file; and an option's error */
     const char *name;
     const char *listens[LISTENS_MAX];
     size_t listen_count;
     const char *words[DAEMON_WORDS_MAX + 1]; /* the daemon's arguments, and a NULL */
     size_t word_count;
-    struct cli_socket socket; /* where no address is given */
+    struct cli_socket socket; /* used if no address is given */
 };
 
 static const struct argp_option options[] = {
@@ -71,7 +71,7 @@ static error_t add_word(struct serving *serving, const char *word)
     return 0;
 }
 
-/* In order, so that arguments behind -- are distinguished from those before it. */
+/* Processes arguments in order, so that those after -- are distinguished from those before it. */
 static error_t take_argument(struct serving *serving, char *value, const struct argp_state *state)
 {
     if (state->quoted > 0 && state->next > state->quoted)
@@ -132,7 +132,7 @@ static const char *usual_address(struct serving *serving)
     return NULL;
 }
 
-/* The user's arguments for it come last: the later of two options counts. */
+/* Builds the daemon's arguments. The user's own come last, because the later of two options counts. */
 static bool complete_daemon(struct serving *serving)
 {
     const char *typed[DAEMON_WORDS_MAX];
@@ -146,7 +146,7 @@ static bool complete_daemon(struct serving *serving)
         status = add_word(serving, "--listen") != 0 ? EINVAL : add_word(serving, serving->listens[i]);
     if (serving->job.daemon.key_file && status == 0)
         status = add_word(serving, "--key-file") != 0 ? EINVAL : add_word(serving, serving->job.daemon.key_file);
-    /* Its output goes to us, and its last line is shown if it fails. */
+    /* The daemon's output goes to this process; its last line is shown if it fails. */
     if (status == 0)
         status = add_word(serving, "--log-level") != 0 ? EINVAL : add_word(serving, "error");
     for (size_t i = 0; i < typed_count && status == 0; i++)
@@ -176,7 +176,7 @@ static bool complete(struct serving *serving)
 
 /* ---- what people are told ---- */
 
-/* As one word of a shell. */
+/* Prints a word in the shell's syntax. */
 static void print_word(const char *word)
 {
     const char *harmless = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+@%,=:[]";
@@ -195,7 +195,7 @@ static void print_word(const char *word)
     putchar('\'');
 }
 
-/* If it listens on all addresses, others need this host's name. */
+/* Prints an address. For a daemon that listens on all addresses, other hosts need this host's name. */
 static void print_address(const char *address)
 {
     static const char *const all[] = {"tcp:0.0.0.0:", "tcp:[::]:"};

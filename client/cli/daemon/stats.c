@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* farlight stats: shows the statistics of a daemon. */
 #include "commands.h"
 #include "options/daemon.h"
 #include "options/image_path.h"
@@ -28,7 +29,7 @@ struct stats_options {
     bool json, limits, prometheus;
     const char *prometheus_path; /* NULL: standard output */
     double watch_s;              /* 0: once */
-    struct cli_job job;          /* holds the error of what was typed */
+    struct cli_job job;          /* holds an option's error */
 };
 
 static const struct argp_option options[] = {
@@ -194,7 +195,7 @@ static double mb(uint64_t bytes)
     return (double)bytes * 1e-6;
 }
 
-/* Texts of the daemon and of other clients, made harmless for a terminal. */
+/* Copies a text of the daemon or another client, made harmless for a terminal. */
 static const char *plain(const char *text, char out[130])
 {
     plain_text_copy(out, 130, text);
@@ -284,8 +285,8 @@ static bool write_metrics(const char *path, const struct message_stats_reply *re
     return done;
 }
 
-/* A monitor is to see that the daemon is away: the error is reported as well. */
-static void tell_that_it_is_away(const struct stats_options *wanted, const struct fl_error *error)
+/* Writes that the daemon is down into the metrics, so that a monitor notices; the error is reported as well. */
+static void print_down(const struct stats_options *wanted, const struct fl_error *error)
 {
     if (!wanted->prometheus || error->code == FL_ERROR_FILE || error->code == FL_ERROR_ARGUMENT)
         return;
@@ -303,7 +304,7 @@ static bool show(struct fl_connection *connection, const struct stats_options *w
     if (wanted->prometheus_path)
         return write_metrics(wanted->prometheus_path, reply, error);
     if (wanted->watch_s > 0 && !wanted->json && cli_is_terminal(STDOUT_FILENO))
-        fputs("\033[H\033[J", stdout); /* on an empty screen */
+        fputs("\033[H\033[J", stdout); /* clears the screen */
     if (wanted->prometheus)
         metrics_print(stdout, reply);
     else if (wanted->json)
@@ -315,14 +316,14 @@ static bool show(struct fl_connection *connection, const struct stats_options *w
     return true;
 }
 
-/* An interruption is its normal end. */
+/* Repeats until an interruption, which is the normal end. */
 static bool watch(struct fl_connection *connection, const struct stats_options *wanted, struct fl_error *error)
 {
     while (show(connection, wanted, error)) {
         if (!wanted->json && !cli_is_terminal(STDOUT_FILENO))
-            putchar('\n'); /* between blocks */
+            putchar('\n'); /* separates blocks */
         if (fflush(stdout) != 0)
-            return true; /* the reader is gone, or the disk is full: main() tells */
+            return true; /* the reader has closed or the disk is full; main() reports it */
         if (!fl_connection_wait(connection, (unsigned)(wanted->watch_s * 1e3), error))
             break;
     }
@@ -353,6 +354,6 @@ int cli_stats(int argc, char **argv)
     fl_connection_destroy(connection);
     if (done)
         return CLI_DONE;
-    tell_that_it_is_away(&wanted, &error);
+    print_down(&wanted, &error);
     return cli_report(&error);
 }

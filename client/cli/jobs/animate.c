@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* farlight animate and farlight turntable: series of frames. */
 #include "cli/shot/script.h"
 #include "lib/text.h"
 #include "commands.h"
@@ -15,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Edges of a model that turns are seen to creep with fewer. */
+/* with fewer samples, edges of a turning model visibly creep */
 #define TURNTABLE_SAMPLES 8u
 
 enum key {
@@ -102,7 +103,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-/* The script's members that only animations have. */
+/* Reads the script's members that only animations have. */
 static error_t set_series(void *user, const char *name, const char *value)
 {
     struct animation *animation = user;
@@ -115,7 +116,8 @@ static error_t set_series(void *user, const char *name, const char *value)
     return 0;
 }
 
-/* The script sets options that the command line does not. `typed` was read from the command line alone. */
+/* Sets the script's options, except those that the command line sets. `typed` was read from the command line
+ * alone. */
 static bool apply_script(struct animation *animation, const struct animation *typed)
 {
     const struct cli_job *job = &typed->job;
@@ -156,11 +158,11 @@ static bool read_all(struct animation *animation, int argc, char **argv)
         *animation = typed;
         return good;
     }
-    /* The command line again, over the script. */
+    /* Reads the command line again, over the script. */
     good = cli_job_begin(&animation->job, fl_render_defaults()) && apply_script(animation, &typed);
     struct cli_job *job = &animation->job;
-    const bool is_kept =
-        !typed.job.input.scene && !typed.job.input.model; /* the script's models, which these replace */
+    /* The command line has no models, so the script's stay */
+    const bool is_kept = !typed.job.input.scene && !typed.job.input.model;
     const char *model = is_kept ? job->input.model : NULL;
     const size_t model_count = is_kept ? job->input.count : 0;
     job->input.model = NULL;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Files with digests of pictures. */
 #include "digest.h"
 #include "options/image_path.h"
 
@@ -28,7 +29,7 @@ static bool name_digest(const char *path, char out[PATH_BYTES])
     return length > 0 && (size_t)length < PATH_BYTES;
 }
 
-/* errno says why not. */
+/* Computes the digest of a file. False: errno has the reason. */
 static bool digest_of(const char *path, char hex[HEX_BYTES])
 {
     FILE *file = fopen(path, "rbe");

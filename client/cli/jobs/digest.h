@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A file beside each picture, PATH.sha256, in the format of sha256sum(1): whether a picture is still what was
- * written can then be told on any host, by `farlight verify` or by `sha256sum -c`. */
+/* Files with digests beside pictures, PATH.sha256, in the format of sha256sum(1), by which `farlight verify` or
+ * `sha256sum -c` detects changed pictures on any host. */
 #ifndef FARLIGHT_CLI_JOBS_DIGEST_H
 #define FARLIGHT_CLI_JOBS_DIGEST_H
 
@@ -11,8 +11,8 @@
 enum digest_state {
     DIGEST_AGREES,
     DIGEST_NO_PICTURE,
-    DIGEST_MISSING, /* of a picture that is there */
-    DIGEST_DIFFERS, /* the picture is not what was written, or the digest is of another one */
+    DIGEST_MISSING, /* the picture exists */
+    DIGEST_DIFFERS, /* the picture has changed, or the digest is of another one */
     DIGEST_UNREADABLE,
     DIGEST_STATE_COUNT
 };

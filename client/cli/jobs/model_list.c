@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Lists of models in folders. */
 #include "model_list.h"
 
 #include <dirent.h>
@@ -11,7 +12,7 @@
 
 #define DEPTH_MAX 16
 
-/* Those of farlight-import. */
+/* Endings of the formats that farlight-import reads. */
 static const char *const endings[] = {".gltf", ".glb", ".obj", ".nff", ".3ds", ".3mf", ".ac",
                                       ".dae",  ".fbx", ".off", ".ply", ".stl", ".x3d"};
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The models in folders. */
+/* Lists of models in folders. */
 #ifndef FARLIGHT_CLI_JOBS_MODEL_LIST_H
 #define FARLIGHT_CLI_JOBS_MODEL_LIST_H
 
@@ -9,7 +9,7 @@
 
 struct model_list_entry {
     char *path;
-    size_t name_at; /* where its name within the folder, or its own name, begins in `path` */
+    size_t name_at; /* offset in `path` of its name within the folder, or of its own name */
 };
 
 struct model_list {
@@ -17,8 +17,8 @@ struct model_list {
     size_t count, capacity;
 };
 
-/* Adds a file, or of a folder all files with the ending of a model, in it and in the folders below, by their
- * names. Hidden folders and links to folders are passed over. */
+/* Adds a file, or the files in a folder and its subfolders with the ending of a model, sorted by name. Hidden
+ * files and links to folders are skipped. */
 bool model_list_add(struct model_list *list, const char *path, struct fl_error *error);
 void model_list_finish(struct model_list *list);
 

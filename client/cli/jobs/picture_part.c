@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Parts of a picture, as squares. */
 #include "picture_part.h"
 #include "lib/frame_part.h"
 #include "lib/imported.h"
@@ -14,11 +15,11 @@
 #include <string.h>
 #include <xxhash.h>
 
-#define HEADER_BYTES 65536 /* of a file; more than there are of all layers */
+#define HEADER_BYTES 65536 /* limit of a file's header; all layers need less */
 
 /* ---- options ---- */
 
-/* The option that does not go with parts, and why; NULL: none. */
+/* The option that is incompatible with parts, and why; NULL: none. */
 static const char *find_conflict(const struct cli_job *job, const char **why)
 {
     const struct message_render *wanted = &job->options;
@@ -74,7 +75,7 @@ bool cli_picture_part_complete(struct cli_job *job)
                   wanted->width, wanted->height);
         return fl_error_remedy(&job->error, "divide it into at most %u", most);
     }
-    /* Auto chooses by the device, and a rasteriser would draw the whole picture for each square. */
+    /* `auto` would choose by the device, and a rasteriser would draw the whole picture for each square */
     if (wanted->primary == PROTOCOL_PRIMARY_AUTO)
         wanted->primary = PROTOCOL_PRIMARY_TRACE;
     return true;
@@ -87,14 +88,14 @@ static void add_text(XXH3_state_t *state, const char *text)
     XXH3_64bits_update(state, text, strlen(text) + 1);
 }
 
-/* The job as it is asked for, without what only says how its frames travel. */
+/* Hashes the job's request, without fields that only affect the transport of frames. */
 static bool add_job(XXH3_state_t *state, const struct cli_job *job, struct fl_error *error)
 {
     static uint8_t bytes[CODEC_CONTROL_PAYLOAD_MAX_BYTES];
     const struct message_render defaults = fl_render_defaults();
     struct message message = {.type = MESSAGE_RENDER, .render = job->options};
     struct writer writer;
-    message.render.scene = 1; /* this one and the next: the least that there are */
+    message.render.scene = 1; /* the smallest valid numbers */
     message.render.channel = 2;
     message.render.encoding = defaults.encoding;
     message.render.quality = defaults.quality;
@@ -110,7 +111,7 @@ static bool add_job(XXH3_state_t *state, const struct cli_job *job, struct fl_er
     return true;
 }
 
-/* Choices for the file that change its pixels, and the names of its layers. */
+/* Hashes options of the file that change its pixels, and the names of its layers. */
 static void add_file(XXH3_state_t *state, const struct cli_job *job)
 {
     add_text(state, FARLIGHT_VERSION);
@@ -159,7 +160,7 @@ bool cli_picture_part_begin(struct cli_picture_part *part, struct cli_job *job, 
     return true;
 }
 
-/* The file appeared when it was complete, so what its header says is there. */
+/* Checks the header; files appear only when they are complete. */
 bool cli_picture_part_is_there(const struct cli_picture_part *part, const char *path)
 {
     static const char begin[] = "farlight/part\0string";
@@ -192,7 +193,7 @@ static size_t layers_of(const struct fl_frame *frame)
     return (size_t)__builtin_popcount(frame->layers);
 }
 
-/* The whole picture, with what the first square says of it. */
+/* Makes the whole picture, with the metadata of the first square. */
 static struct fl_frame *begin_frame(const struct squares *squares, struct fl_frame *square, struct fl_error *error)
 {
     struct fl_frame *frame = malloc(sizeof(*frame));
@@ -205,7 +206,7 @@ static struct fl_frame *begin_frame(const struct squares *squares, struct fl_fra
         return NULL;
     }
     fl_frame_alike(frame, square, squares->width, squares->height);
-    frame->structure = square->structure; /* which the picture has from now on */
+    frame->structure = square->structure; /* now owned by the picture */
     frame->structure_count = square->structure_count;
     square->structure = NULL;
     square->structure_count = 0;

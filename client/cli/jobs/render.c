@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* farlight render: a picture of a model. */
 #include "picture_part.h"
 #include "lib/frame_set.h"
 #include "lib/text.h"
@@ -15,7 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Edges are smooth and shadows soft with these; software GL has 1280x720 pixels in some seconds. */
+/* enough for smooth edges and soft shadows; software GL renders 1280x720 pixels in some seconds */
 #define STILL_SAMPLES 16u
 
 enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE, KEY_WATCH, KEY_PART, KEY_RESUME };
@@ -81,7 +82,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     return EINVAL;
 }
 
-/* Only files change, and only a file can be written again. */
+/* Checks --watch: only files change, and only a file can be written again. */
 static bool complete_watch(struct cli_job *job)
 {
     if (!job->input.watch || !cli_check_watch(job))

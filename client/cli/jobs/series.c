@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Options of a series of frames: which they are, how the camera moves, and which are made from others. */
+/* Options of a series of frames: the range, the camera's motion, and frames made from others. */
 #include "series.h"
 #include "options/complete.h"
 #include "lib/text.h"
@@ -63,7 +63,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     struct cli_job *job = state->input;
     const error_t status = set_option(job, key, value);
     for (const struct argp_option *option = options; status == EINVAL && option->name; option++)
-        if (option->key == key) /* an error of lib/text.h gets the option's name */
+        if (option->key == key) /* adds the option's name to an error of lib/text.h */
             snprintf(job->error.field, sizeof(job->error.field), "--%s", option->name);
     return status;
 }
@@ -108,7 +108,7 @@ bool cli_series_complete(struct cli_job *job)
                          "cannot be combined with --camera; it can begin at --eye and --look-at") == 0;
     if (job->camera.keys_file)
         return load_keys(job);
-    /* All frames would be alike if neither the camera nor anything else moves. */
+    /* Without motion of the camera or anything else, all frames would be equal. */
     job->camera.is_orbit = job->camera.is_orbit || (!job->camera.name && !job->script && job->clips.count == 0);
     if (job->camera.is_orbit)
         job->options.camera_path = PROTOCOL_CAMERA_ORBIT;

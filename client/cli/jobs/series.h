@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* A series of frames. */
+/* Options of a series of frames. */
 #ifndef FARLIGHT_CLI_JOBS_SERIES_H
 #define FARLIGHT_CLI_JOBS_SERIES_H
 
 #include "options/job.h"
 
-/* A child parser; its input is a struct cli_job. */
+/* Parser for use as a child parser; its input is a struct cli_job. */
 const struct argp *cli_series_argp(void);
-/* As if "--OPTION VALUE" had been typed. ARGP_ERR_UNKNOWN: there is none. */
+/* Sets an option as the command line "--OPTION VALUE" does. ARGP_ERR_UNKNOWN: there is none. */
 error_t cli_series_set(struct cli_job *job, const char *option, const char *value);
-/* cli_job_complete() for a series, and what only a series has. */
+/* Runs cli_job_complete() for a series, and completes options that only a series has. */
 bool cli_series_complete(struct cli_job *job);
 void cli_series_finish(struct cli_job *job);
 

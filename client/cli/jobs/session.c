@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From a model to pictures: loads the scene, fetches frames and writes them. A lost daemon is waited for: the
- * scene is loaded again, and the first unwritten frame is the next one. */
+/* A command that renders: loads the scene, fetches frames and writes them. After the loss of a daemon it
+ * retries: the scene is loaded again, and the first unwritten frame is the next one. */
 #include "session.h"
 #include "protocol/common/clock.h"
 #include "settle.h"
@@ -47,7 +47,7 @@ static bool start_sinks(struct cli_session *session, struct fl_error *error)
     return !session->sink_failed;
 }
 
-/* Of a scene that has been loaded. */
+/* Settles the options for a loaded scene. */
 static bool settle(struct cli_session *session, struct fl_error *error)
 {
     struct fl_scene *scene = session->loading.scene;
@@ -58,7 +58,7 @@ static bool settle(struct cli_session *session, struct fl_error *error)
            cli_sinks_names(&session->sinks, scene, error);
 }
 
-/* Without a number of attempts a duration is the limit. */
+/* Seconds that remain for retries; without a number of attempts a duration is the limit. */
 static double seconds_left(const struct cli_session *session)
 {
     const struct cli_retries *retries = &session->job->daemon.retries;
@@ -66,7 +66,8 @@ static double seconds_left(const struct cli_session *session)
     return for_s - (double)(monotonic_now_ns() - session->lost_ns) * 1e-9;
 }
 
-/* A daemon that does not answer takes no longer than it is to be tried; one of our own has its time to start. */
+/* Timeout of a connection, at most the remaining time for retries; a private daemon has the default time to
+ * start. */
 static unsigned connect_timeout_ms(const struct cli_session *session)
 {
     const struct cli_job *job = session->job;
@@ -75,8 +76,8 @@ static unsigned connect_timeout_ms(const struct cli_session *session)
     return cli_connect_timeout_ms(session->failures > 0 ? seconds_left(session) : job->daemon.retries.for_s);
 }
 
-/* The importer loads its libraries while the daemon starts, and the exporter while the importer runs: once the
- * scene is loaded the daemon uses all processors. */
+/* Loads the scene. The importer loads its libraries while the daemon starts, and the exporter while the
+ * importer runs: once the scene is loaded, the daemon uses all processors. */
 static bool load_scene(struct cli_session *session, struct fl_error *error)
 {
     struct cli_loading *loading = &session->loading;
@@ -135,7 +136,7 @@ static bool choose_frames(struct cli_session *session, struct fl_error *error)
 
 static void close_connection(struct cli_session *session)
 {
-    /* After an interruption the daemon still gets a proper end. */
+    /* The daemon gets an orderly goodbye, also after an interruption. */
     if (session->loading.connection)
         fl_connection_set_interrupt(session->loading.connection, 0);
     fl_render_destroy(session->rendering);
@@ -143,7 +144,8 @@ static void close_connection(struct cli_session *session)
     cli_loading_close(&session->loading);
 }
 
-/* Where no daemon has answered yet, the address may be misspelt: the command waits only if that was asked for. */
+/* True if the error may pass. If no daemon has answered yet, the address may be misspelt: the command then
+ * retries only on request. */
 static bool may_be_retried(const struct cli_session *session, const struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -151,10 +153,10 @@ static bool may_be_retried(const struct cli_session *session, const struct fl_er
            (session->was_reached || error->retryable || job->daemon.retries.has_duration);
 }
 
-/* Longer each time, and no longer than is left. False: interrupted. */
+/* Waits, longer each time, within the remaining time. False: interrupted. */
 static bool pause_before_retry(const struct cli_session *session, uint32_t min_ms, struct fl_error *error)
 {
-    const double left_s = fmax(seconds_left(session), 0); /* closing the connection may have taken the rest */
+    const double left_s = fmax(seconds_left(session), 0); /* closing the connection may have used up the rest */
     uint32_t pause_ms = cli_retry_pause_ms(session->failures, min_ms);
     if (pause_ms * 1e-3 > left_s)
         pause_ms = (uint32_t)(left_s * 1e3) + 1;
@@ -171,13 +173,13 @@ static bool pause_before_retry(const struct cli_session *session, uint32_t min_m
     return cli_retry_wait(pause_ms, error);
 }
 
-/* Reports the error; true: the session continues after it. */
+/* Reports the error; true: the session continues. */
 static bool recover(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_retries *retries = &session->job->daemon.retries;
     if (!may_be_retried(session, error))
         return false;
-    if (session->failures == 0) /* a daemon that does not answer is lost from the beginning of the attempt */
+    if (session->failures == 0) /* a daemon that never answers counts as lost from the beginning of the attempt */
         session->lost_ns = session->loading.connection ? monotonic_now_ns() : session->loading.connect_begin_ns;
     if ((retries->has_count && session->failures >= retries->count) || seconds_left(session) <= 0) {
         if (session->failures > 0 && !session->job->talk.quiet)
@@ -199,7 +201,7 @@ static bool load_and_render(struct cli_session *session, struct fl_error *error)
     while (!load_scene(session, error) || !choose_frames(session, error) || !session_render(session, error))
         if (!recover(session, error))
             return false;
-    /* What a private daemon takes to end it takes while the last file is written. */
+    /* A private daemon ends while the last file is written. */
     if (!session->job->daemon.server && !session->job->input.watch)
         fl_connection_end(session->loading.connection);
     return session_finish_sinks(session, error);
@@ -223,8 +225,8 @@ static bool render_again(struct cli_session *session, struct fl_error *error)
            session_render(session, error) && session_finish_sinks(session, error);
 }
 
-/* Until it is interrupted, which is its end. A model that cannot be read is reported, and its last picture stays.
- */
+/* Renders again after changes, until an interruption, which is the normal end. An unreadable model is reported,
+ * and its last picture stays. */
 static bool follow(struct cli_session *session, struct fl_error *error)
 {
     if (!session->job->talk.quiet)
@@ -254,7 +256,7 @@ static bool run(struct cli_session *session, struct fl_error *error)
 {
     if (!cli_sinks_prepare(&session->sinks, session->job, session->is_series, error))
         return false;
-    /* Nothing left to do needs no daemon. */
+    /* Without frames to render, no daemon is needed. */
     if (session->is_series && session->job->series.has_range && !choose_frames(session, error))
         return false;
     if (session->has_set && session->set.frame_count == 0)

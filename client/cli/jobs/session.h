@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A command that renders: what it has done so far, and its two halves. session.c loads the scene, waits for lost
- * daemons and for changed files; session_frames.c fetches frames and writes them. */
+/* The state of a command that renders, and its two halves: session.c loads the scene, retries after losses and
+ * watches files; session_frames.c fetches frames and writes them. */
 #ifndef FARLIGHT_CLI_JOBS_SESSION_H
 #define FARLIGHT_CLI_JOBS_SESSION_H
 
@@ -12,9 +12,9 @@
 #include "options/loading.h"
 #include "options/progress.h"
 
-/* Renders the job's frames into its outputs: paths or "-", patterns if `is_series`. */
+/* Renders the job's frames into its outputs: paths or "-", patterns if `is_series`. Returns the exit status. */
 int cli_run_job(struct cli_job *job, bool is_series);
-/* Checks what can be checked of an animation without a daemon. */
+/* Checks everything about an animation that needs no daemon. Returns the exit status. */
 int cli_dry_run(struct cli_job *job);
 
 struct cli_session {
@@ -24,36 +24,36 @@ struct cli_session {
     bool sinks_started, sink_failed;
     struct cli_loading loading;
     struct cli_watch watch;
-    struct message_render typed; /* the job's options before a scene has settled them */
+    struct message_render typed; /* the job's options before the scene settles them */
     struct fl_job *rendering;
     struct cli_picture_part part;
-    bool was_reached, was_loaded; /* the daemon, once at least; likewise, and it has accepted the scene */
-    bool has_set;                 /* which frames are wanted is known */
+    bool was_reached, was_loaded; /* true once a daemon was reached; once it has accepted the scene */
+    bool has_set;                 /* `set` is known */
     struct fl_frame_set set;
-    size_t run;        /* the current one of the set */
-    bool begun;        /* of this run a frame has been written */
-    uint64_t next;     /* once begun: its first frame that has not */
-    float noise;       /* of the last frame that has come */
-    uint32_t done;     /* frames written */
+    size_t run;        /* index of the current run of the set */
+    bool begun;        /* a frame of this run has been written */
+    uint64_t next;     /* once begun: the run's first unwritten frame */
+    float noise;       /* noise of the last frame */
+    uint32_t done;     /* number of written frames */
     unsigned failures; /* lost connections since the last frame */
-    uint64_t lost_ns;  /* when the first of them was lost */
+    uint64_t lost_ns;  /* time of the first of these losses */
     struct cli_warned warned;
     struct cli_timings *timings;
-    struct cli_trace_file *trace; /* NULL: none is wanted */
+    struct cli_trace_file *trace; /* NULL: not requested */
     struct cli_progress progress;
-    bool is_being_written; /* a picture of a series: */
+    bool is_being_written; /* a picture of a series is being written: */
     uint32_t written_frame;
-    uint64_t frame_ns;      /* when the picture before it had come */
-    double written_seconds; /* from then until it had */
+    uint64_t frame_ns;      /* time at which the previous picture arrived */
+    double written_seconds; /* time from then until this one arrived */
     char written_path[4352];
-    uint32_t written_samples; /* of a pixel */
+    uint32_t written_samples; /* samples of a pixel */
     uint64_t begin_ns, export_ns;
 };
 
-/* Renders the frames of the set that have not been written, and passes them to the sinks. */
+/* Renders the unwritten frames of the set, and passes them to the sinks. */
 bool session_render(struct cli_session *session, struct fl_error *error);
 /* Waits until the last file is complete. */
 bool session_finish_sinks(struct cli_session *session, struct fl_error *error);
-void session_show_progress(struct cli_session *session); /* of a series */
+void session_show_progress(struct cli_session *session); /* for a series */
 
 #endif

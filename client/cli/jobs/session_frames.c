@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of a session: jobs, passes of a picture that is refined, squares of a part of one, and their files. */
+/* Frames of a session: jobs, passes of a refined picture, squares of a part, and their files. */
 #include "session.h"
 #include "protocol/common/clock.h"
 #include "protocol/plain_text.h"
@@ -14,9 +14,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define ERROR_PASS_SAMPLES 16u /* fewer have no error yet */
+#define ERROR_PASS_SAMPLES 16u /* fewer samples have no error estimate */
 #define LONG_PASS_NS 1000000000u
-#define PASS_SAMPLES_MAX 65536u /* of one request, in the protocol */
+#define PASS_SAMPLES_MAX 65536u /* the protocol's limit of a request */
 
 static void add_export(struct cli_session *session, int64_t frame, uint64_t begin_ns)
 {
@@ -31,7 +31,7 @@ static bool is_enough(const struct cli_session *session, float noise, uint32_t s
     return noise <= options->noise || samples >= options->samples;
 }
 
-/* Whether it is more than a step on the way to a picture. */
+/* True for a frame that has to be written, not a step on the way to a picture. */
 static bool is_wanted(const struct cli_session *session, const struct fl_frame *frame)
 {
     const struct cli_job *job = session->job;
@@ -55,7 +55,8 @@ static bool write_frame(struct cli_session *session, const struct fl_frame *fram
     return written;
 }
 
-/* The picture that was being written is complete: another one is, or the sinks are finished. */
+/* Logs the picture that was being written, which is complete: another one is being written, or the sinks are
+ * finished. */
 static void log_frame(struct cli_session *session)
 {
     if (session->is_being_written)
@@ -120,8 +121,9 @@ static bool take_frames(struct cli_session *session, const struct fl_frame_run *
     return error->code == FL_ERROR_NONE;
 }
 
-/* The samples of the next pass: if it is not given, the number so far, so that little time is spent on writing
- * files; without an end, no more than before once a pass takes long, so that the picture keeps changing. */
+/* Number of samples of the next pass: by default the number so far, so that little time is spent on writing
+ * files; for an endless picture no more than in the last pass if that took long, so that the picture keeps
+ * changing. */
 static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t total, uint32_t last,
                              uint64_t last_ns)
 {
@@ -141,7 +143,7 @@ static void print_held(const char *path, uint32_t held)
     fprintf(stderr, " has %u sample%s a pixel\n", held, held == 1 ? "" : "s");
 }
 
-/* After an interruption: completes the file that is being written. False: the interruption is an error. */
+/* Completes the file that is being written after an interruption. False: the interruption is an error. */
 static bool end_passes(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -160,8 +162,8 @@ static bool end_passes(struct cli_session *session, struct fl_error *error)
     return job->sampling.endless;
 }
 
-/* A progressive picture, or one that is sampled by its error: one job per pass, whose samples the daemon adds to
- * the previous ones. */
+/* Renders a progressive picture, or one that is sampled by its error: a job for each pass, whose samples the
+ * daemon adds to the previous ones. */
 static bool render_passes(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -193,7 +195,7 @@ static bool render_passes(struct cli_session *session, struct fl_error *error)
     return true;
 }
 
-/* The squares of a part of a picture that have not come yet, one job each; its file is written once, with all. */
+/* Renders the missing squares of a part, with a job for each; its file is written once, with all squares. */
 static bool render_part(struct cli_session *session, struct fl_error *error)
 {
     struct cli_job *job = session->job;
@@ -227,7 +229,7 @@ static bool render_part(struct cli_session *session, struct fl_error *error)
     return write_frame(session, part->frame, error);
 }
 
-/* Renders the rest of one run, as one job. */
+/* Renders the rest of a run, as one job. */
 static bool render_run(struct cli_session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct message_render options = session->job->options;

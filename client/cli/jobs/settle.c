@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Settings that depend on the loaded scene. */
+/* Options that depend on the loaded scene. */
 #include "settle.h"
 #include "options/views.h"
 #include "lib/json_text.h"
@@ -11,9 +11,9 @@
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define FRAME_MAX 10000000u
-#define ORBIT_SECONDS 4 /* once around */
+#define ORBIT_SECONDS 4 /* a full turn */
 
-/* An error in a script's value names the script. */
+/* Adds the script's name to an error in one of its values. */
 static bool in_script(const struct cli_job *job, unsigned line, const char *path, struct fl_error *error)
 {
     const struct fl_error why = *error;
@@ -32,7 +32,7 @@ static bool in_script_at(const struct cli_job *job, const struct fl_json_place *
 
 /* ---- clips ---- */
 
-/* *longest_s: the maximum duration of one pass at their speeds. */
+/* Settles the clips. *longest_s: the maximum duration of a pass at their speeds. */
 static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *longest_s, struct fl_error *error)
 {
     for (size_t i = 0; i < job->clips.count; i++) {
@@ -41,7 +41,7 @@ static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *lo
         const struct fl_clip_info *info = NULL;
         if (!fl_scene_find_clip(scene, clip->which, &use->clip, &info, error))
             return clip->line > 0 ? in_script(job, clip->line, "clips", error) : false;
-        /* The first rendered frame is at time 0. */
+        /* the first rendered frame is at time 0 */
         use->start_s = (float)((double)clip->start_s - job->clips.time_s);
         use->speed = clip->speed;
         use->loop = clip->loop ? 1 : 0;
@@ -50,7 +50,7 @@ static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *lo
     return true;
 }
 
-/* What the value changes, and that it can. */
+/* Finds the object of a channel, and checks that the channel can change it. */
 static bool settle_target(const struct cli_channel *given, struct fl_scene *scene, uint32_t *object,
                           struct fl_error *error)
 {
@@ -66,7 +66,7 @@ static bool settle_target(const struct cli_channel *given, struct fl_scene *scen
         error, "give a point light of a glTF file \"extras\": {\"radius\": 0.1}, which makes it a sphere");
 }
 
-/* The script's values, as an own clip that is played last. */
+/* Adds the script's channels as a clip of our own, which is played last. */
 static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
     struct record_clip_use *use = &job->clips.uses[job->clips.count];
@@ -99,8 +99,8 @@ static double last_key_s(const struct cli_job *job)
     return fmax(last_s, job->series.dolly_seconds);
 }
 
-/* Without a range: one pass of the clips, of the script's keys, or of the orbit. A repeated clip and an orbit
- * begin again one frame after the last. */
+/* Chooses the range if none is given: a pass of the clips, of the script's keys, or of the orbit. A repeated
+ * clip and an orbit start again one frame after the last. */
 static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *error)
 {
     struct cli_series *series = &job->series;
@@ -130,8 +130,8 @@ static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *e
     return true;
 }
 
-/* Motions that last as long as the range. An orbit ends one frame after the last, so that a full turn repeats
- * without a doubled frame; a dolly arrives with the last. */
+/* Settles motions that last as long as the range. An orbit ends one frame after the last, so that a full turn
+ * repeats without a doubled frame; a dolly arrives at the last frame. */
 static void settle_camera(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Layout and drawing of contact sheets. */
 #include "sheet.h"
 
 #include <stdlib.h>
@@ -7,7 +8,7 @@
 #define GAP 8u /* pixels between cells, and around them */
 #define NAME_PIXELS 22u
 #define LINE_PIXELS 18u
-#define LETTER_PIXELS 9u /* of a line of the exporter's font: about its mean, and a little */
+#define LETTER_PIXELS 9u /* mean width of a letter of the exporter's font, and a little more */
 #define USUAL_WIDTH 1600u
 #define EDGE_MAX 8192u
 #define PAPER 0x22u
@@ -83,7 +84,7 @@ static bool put_name(struct sheet *sheet, uint32_t index, const char *name, stru
     return add_text(sheet, x, y + sheet->cell_height + NAME_PIXELS - 6, INK, strdup(name), error);
 }
 
-/* The picture is over the paper: a transparent background shows it. */
+/* Draws the picture over the paper, which a transparent background shows. */
 bool sheet_put(struct sheet *sheet, uint32_t index, const char *name, const struct fl_frame *picture,
                struct fl_error *error)
 {
@@ -109,7 +110,7 @@ static size_t line_length(const char *text, size_t width)
     for (size_t i = width; i > width / 4; i--)
         if (text[i] == ' ')
             return i;
-    while (width > 1 && ((unsigned char)text[width] & 0xc0) == 0x80) /* within a character */
+    while (width > 1 && ((unsigned char)text[width] & 0xc0) == 0x80) /* a continuation byte */
         width--;
     return width;
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Writing of frames into files. */
 #include "sink.h"
 #include "digest.h"
 #include "lib/frame_part.h"
@@ -22,8 +23,8 @@
 
 /* ---- what can be known before ---- */
 
-/* Standard output and devices cannot be replaced by a rename: the file is written elsewhere, and copied when it is
- * complete. */
+/* Prepares a temporary file for standard output and devices, which a rename cannot replace: the complete file
+ * is copied there. */
 static bool prepare_temporary(struct cli_sink *sink, struct fl_error *error)
 {
     if (!cli_temporary_folder(sink->folder, sizeof(sink->folder), error))
@@ -46,7 +47,7 @@ static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
     return sink->output.image == CLI_IMAGE_Y4M || prepare_temporary(sink, error);
 }
 
-/* Whether it is a character device, such as /dev/null. */
+/* True for a character device, such as /dev/null. */
 static bool is_device(const char *path)
 {
     struct stat status;
@@ -70,18 +71,18 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
         snprintf(error->field, sizeof(error->field), "--output");
         return false;
     }
-    /* The highest possible frame number: it gives the longest path. */
+    /* The highest possible frame number gives the longest path. */
     if (!fl_pattern_path(&sink->pattern, 10000000, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "the path of a frame is too long");
     if (cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error) &&
         cli_check_folder(path, sink->folder, sink->job->output.parents, error))
         return true;
-    /* No frame of that number may be wanted. */
+    /* The series may lack a frame with this number, so the error names the pattern. */
     fl_text_utf8(path, error->field, sizeof(error->field));
     return false;
 }
 
-/* "pair.png" becomes "pair-left.png", "frames/%04d.exr" "frames/%04d-left.exr". */
+/* Turns "pair.png" into "pair-left.png", "frames/%04d.exr" into "frames/%04d-left.exr". */
 static bool name_part(struct cli_sink *sink, struct fl_error *error)
 {
     const char *path = sink->output.path, *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
@@ -118,7 +119,7 @@ bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool 
 
 /* ---- frames ---- */
 
-/* A .y4m file: written under a temporary name. */
+/* Opens a .y4m file under a temporary name. */
 static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
 {
     const int length = snprintf(sink->path, sizeof(sink->path), "%s/.farlight-XXXXXX", sink->folder);
@@ -129,14 +130,14 @@ static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
     return fl_text_write_error(error, sink->output.path, "cannot be written", errno);
 }
 
-/* A path tells where the file lay, which differs from host to host. */
+/* The model's name without its folders, which differ from host to host. */
 static const char *model_name(const struct cli_job *job)
 {
     const char *model = job->input.model ? job->input.model : job->input.scene;
     return strcmp(model, "-") == 0 ? "standard input" : job->output.full_metadata ? model : cli_base_name(model);
 }
 
-/* A GIF file is shown at the nearest rate that it can have. */
+/* Notes that a GIF file is shown at the nearest possible rate. */
 static void note_rate(const struct cli_sink *sink)
 {
     char text[160];
@@ -188,7 +189,7 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     for (size_t i = 0, used = 0; i < job->light_groups.count; i++)
         used += (size_t)snprintf(names + used, sizeof(names) - used, "%s%s", i > 0 ? "," : "",
                                  job->light_groups.names[i]);
-    /* An interruption is the normal end of progressive pictures: a file that has begun is finished. */
+    /* An interruption is the normal end of progressive pictures, so a file in progress is finished. */
     const struct fl_exporter_options options = {
         .folder = sink->folder,
         .model = model_name(job),
@@ -257,7 +258,7 @@ bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame)
     return true;
 }
 
-/* Of the image before, which is complete now. */
+/* Writes the digest of the previous image, which is complete now. */
 static bool write_digest(struct cli_sink *sink, struct fl_error *error)
 {
     const bool done = sink->undigested[0] == '\0' || digest_write(sink->undigested, error);
@@ -294,7 +295,7 @@ static bool write_all(struct cli_sink *sink, const struct fl_frame *frame, struc
                          : write_image(sink, frame, error);
 }
 
-/* One of two views. */
+/* Writes one of two views. */
 static bool write_part(struct cli_sink *sink, const struct fl_frame *frame, struct fl_error *error)
 {
     const bool is_right = sink->part == CLI_PART_RIGHT;
@@ -326,7 +327,7 @@ bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, stru
     return true;
 }
 
-/* Gives the file its name, with the rights that a new file has. */
+/* Renames the file, with the rights of a new file. */
 static bool finish_y4m(struct cli_sink *sink, struct fl_error *error)
 {
     const mode_t mask = umask(0);

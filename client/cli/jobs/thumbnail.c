@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pictures of many models: a contact sheet, or a file for each. One daemon renders them all. */
+/* farlight thumbnail: pictures of many models by one daemon, in a contact sheet, or a file for each. */
 #include "commands.h"
 #include "options/arguments.h"
 #include "options/complete.h"
@@ -21,7 +21,7 @@
 #include <sys/stat.h>
 
 #define CELL_PIXELS 256u
-#define SAMPLES 4u /* so that edges are smooth */
+#define SAMPLES 4u /* smooth edges */
 #define COLUMNS_MAX 512u
 
 enum key { KEY_OUTPUT = 'o', KEY_COLUMNS = 0x400 };
@@ -32,10 +32,10 @@ struct thumbnails {
     const char *output;
     uint32_t columns;
     bool to_folder;
-    char folder[4097]; /* of the files */
+    char folder[4097]; /* folder of the files */
     struct fl_connection *connection;
-    struct fl_import *ahead;   /* of the next model */
-    struct fl_model placed[2]; /* the model and the next one, as --up turns them */
+    struct fl_import *ahead;   /* importer of the next model */
+    struct fl_model placed[2]; /* this model and the next one, turned by --up */
     struct fl_exporter *exporter;
     struct sheet sheet;
     struct cli_progress progress;
@@ -101,8 +101,8 @@ static bool complete(struct thumbnails *wanted)
     job->sampling.filters = true;
     job->input.model = wanted->models.entries[0].path;
     if (job->camera.has_up && !job->camera.has_eye)
-        job->input.models[job->input.count++] =
-            (struct fl_model){.path = job->input.model}; /* which is turned, as all are */
+        /* --up turns it like all others */
+        job->input.models[job->input.count++] = (struct fl_model){.path = job->input.model};
     job->output.path = wanted->to_folder ? "model.png" : wanted->output;
     if (!cli_job_complete(job, false))
         return false;
@@ -138,7 +138,7 @@ static bool prepare_folder(struct thumbnails *wanted, struct fl_error *error)
     return cli_make_folder(wanted->folder, error) && start_exporter(wanted, wanted->folder, CLI_IMAGE_PNG, error);
 }
 
-/* "FOLDER/fbx/monkey.fbx.png": models of one name and several formats lie beside each other. */
+/* Writes "FOLDER/fbx/monkey.fbx.png", so that models of one name and several formats do not collide. */
 static bool write_file(struct thumbnails *wanted, const char *name, const struct fl_frame *picture,
                        struct fl_error *error)
 {
@@ -204,7 +204,7 @@ static struct fl_frame *render(const struct thumbnails *wanted, struct fl_scene 
     return frame;
 }
 
-/* The importer of the next model reads while this one is rendered. */
+/* Renders a model while the importer of the next one reads. */
 static struct fl_frame *make(struct thumbnails *wanted, size_t index, struct fl_error *error)
 {
     struct fl_load_options load = load_options(wanted, index);
@@ -212,7 +212,7 @@ static struct fl_frame *make(struct thumbnails *wanted, size_t index, struct fl_
     wanted->ahead = NULL;
     struct fl_scene *scene = fl_scene_load(wanted->connection, &load, error);
     if (index + 1 < wanted->models.count) {
-        struct fl_error later; /* comes again when it is its turn */
+        struct fl_error later; /* reported when it is that model's turn */
         const struct fl_load_options next = load_options(wanted, index + 1);
         wanted->ahead = fl_import_start(&next, &later);
     }
@@ -225,7 +225,7 @@ static struct fl_frame *make(struct thumbnails *wanted, size_t index, struct fl_
 
 /* ---- all of them ---- */
 
-/* What is wrong with one model does not stop the others. False: something else is wrong. */
+/* Reports a fault of one model, which does not stop the others. False: another error. */
 static bool report(struct thumbnails *wanted, size_t index, const struct fl_error *why, struct fl_error *error)
 {
     const struct model_list_entry *entry = &wanted->models.entries[index];
@@ -243,7 +243,7 @@ static bool report(struct thumbnails *wanted, size_t index, const struct fl_erro
     return connect_to(wanted, error);
 }
 
-/* A picture beside the others has the model's name. */
+/* Refuses a name that is not UTF-8, since the picture's file is named after the model. */
 static bool check_name(const char *name, struct fl_error *error)
 {
     char plain[4097];
@@ -306,7 +306,7 @@ static bool finish(struct thumbnails *wanted, const struct cli_job *sheet_job, s
     return done;
 }
 
-/* Everything that can fail does so before the first model is loaded. */
+/* Checks everything that can fail before the first model is loaded. */
 static bool run(struct thumbnails *wanted, struct fl_error *error)
 {
     char folder[4097];

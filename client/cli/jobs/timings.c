@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the time went: a table for people (means over the frames), or every number as JSON. */
+/* Times of a command: a table for people (means over the frames), or every number as JSON. */
 #include "timings.h"
 #include "structure.h"
 #include "options/talk.h"
@@ -16,12 +16,12 @@
 
 struct sum {
     uint64_t ns;
-    bool measured; /* no result is not 0 */
+    bool measured; /* false differs from 0 */
 };
 
 struct part {
     bool seen;
-    struct fl_structure_part last; /* of the last frame that has it */
+    struct fl_structure_part last; /* from the last frame with this part */
     uint64_t builds;
     struct sum build[CLOCKS];
 };
@@ -34,7 +34,7 @@ struct cli_timings {
     uint64_t pixels_bytes, wait_ns, receive_ns, decode_ns;
     struct sum stages[STAGES][CLOCKS];
     struct sum waves[2][WAVES_SHOWN][CLOCKS]; /* trace, shade */
-    struct part parts[PARTS_SHOWN];           /* of the structure, by their numbers */
+    struct part parts[PARTS_SHOWN];           /* parts of the structure, by number */
     char title[160];
 };
 
@@ -228,7 +228,7 @@ static void print_row(const struct cli_timings *timings, const char *indent, con
     fputc('\n', timings->out);
 }
 
-/* For a structure without parts the row above says the same. */
+/* Prints rows of parts; a structure without parts has everything in the row above. */
 static void print_part_rows(const struct cli_timings *timings)
 {
     for (unsigned i = 0; i < PARTS_SHOWN; i++)
@@ -253,7 +253,7 @@ static void print_stages(const struct cli_timings *timings)
     }
 }
 
-/* GPU time where it was measured. */
+/* GPU time if it was measured, else CPU time. */
 static uint64_t best_ns(const struct cli_timings *timings, enum protocol_stage stage)
 {
     const struct sum *gpu = &timings->stages[stage][PROTOCOL_CLOCK_GPU];
@@ -326,7 +326,7 @@ static void print_table(struct cli_timings *timings, const struct cli_client_tim
     }
     fprintf(timings->out, "  %-16s%12s  all frames together\n", "client", "ms");
     print_part(timings, "start", times->start_ns, "daemon started or reached");
-    if (times->import->load_ns > 0) /* else the scene was there */
+    if (times->import->load_ns > 0) /* else the scene existed already */
         print_import(timings, times->import);
     print_part(timings, "wait", timings->wait_ns, "for frames; including:");
     print_part(timings, "  receive", timings->receive_ns, "first byte to last");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the time of a picture went, as a table or JSON. */
+/* Times of a command, as a table or JSON. */
 #ifndef FARLIGHT_CLI_JOBS_TIMINGS_H
 #define FARLIGHT_CLI_JOBS_TIMINGS_H
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Writing of trace files. */
 #include "trace_file.h"
 
 #include "protocol/common/trace_event.h"
@@ -28,7 +29,7 @@ static const struct {
     [CLI_TRACE_OUTPUT] = {2, "output, CPU"}, [CLI_TRACE_GPU] = {2, "render, GPU"},
 };
 
-/* The file can be read while the command runs, and survives a crash. */
+/* Flushes, so that the file can be read while the command runs, and survives a crash. */
 static void flush(struct cli_trace_file *file)
 {
     if (fflush(file->out) != 0 && file->failure == 0)
@@ -82,13 +83,13 @@ static void put_stages(struct cli_trace_file *file, const struct fl_frame *frame
     }
     for (size_t i = 0; i < frame->stage_count; i++) {
         const struct record_stage_time *span = &frame->stages[i];
-        /* A daemon may say what it likes. */
+        /* a daemon's numbers are not trusted */
         if (span->start_ns > UINT64_MAX / 4 || span->duration_ns > UINT64_MAX / 4)
             continue;
         events[count++] = (struct trace_event){
             .name = protocol_stage_text(span->stage),
             .gpu = span->clock == PROTOCOL_CLOCK_GPU,
-            .rank = (uint32_t)span->stage, /* frame contains its one stage */
+            .rank = (uint32_t)span->stage, /* the stage frame encloses others */
             .start_ns = arrival_ns - last_ns + span->start_ns,
             .duration_ns = span->duration_ns,
             .arguments = {{"frame", frame->frame}, {"wave", span->wave}},
@@ -165,7 +166,7 @@ bool cli_trace_file_destroy(struct cli_trace_file *file, struct fl_error *error)
     fputs(TRACE_FILE_END, file->out);
     flush(file);
     if (ferror(file->out) != 0 && file->failure == 0)
-        file->failure = EIO; /* a write between two flushes */
+        file->failure = EIO; /* a write failed between two flushes */
     if (fclose(file->out) != 0 && file->failure == 0)
         file->failure = errno;
     const int failure = file->failure;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Whether the pictures of an animation are all there, and are still what was written. */
+/* farlight verify: checks that the pictures of an animation exist and are unchanged. */
 #include "commands.h"
 #include "options/job.h"
 #include "options/parse.h"
@@ -21,7 +21,7 @@ struct verifying {
     const char *path;
     bool json, quiet, has_range;
     struct fl_frame_run range;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds an option's error */
     uint32_t counts[DIGEST_STATE_COUNT];
     json_t *bad;
 };

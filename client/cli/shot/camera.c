@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The camera of a shot file: one of the model's, or eye, look_at, up and fov, each constant or keyed; an orbit or
- * a dolly; the lens. */
+/* The camera of a shot file: one of the model's, or eye, look_at, up and fov, each constant or keyed; an orbit
+ * or a dolly; the lens. */
 #include "read.h"
 #include "script.h"
 #include "options/job.h"
@@ -28,7 +28,7 @@ static const float *first_value(const struct fl_channel *channel)
     return channel->values + (has_handles ? channel->width : 0);
 }
 
-/* Reads one property: its first value, and a channel if it changes. */
+/* Reads a property: its first value, and a channel if it changes. */
 static bool read_view(const struct shot_reader *reader, const struct shot_value *at, enum view which, float *first)
 {
     struct fl_channel channel;
@@ -59,7 +59,7 @@ static bool read_orbit(const struct shot_reader *reader, const struct shot_value
            (!seconds.value || shot_number(reader, &seconds, 1e-3, 1e6, &series->orbit_seconds));
 }
 
-/* The end of a dolly: a point, or a share of the distance to the target. */
+/* Reads the end of a dolly: a point, or a share of the distance to the target. */
 static bool dolly_end(const struct shot_reader *reader, const struct shot_value *at, float to[3])
 {
     const struct record_camera_key *key = &reader->job->camera.key;
@@ -92,7 +92,7 @@ static bool dolly_end(const struct shot_reader *reader, const struct shot_value 
     return true;
 }
 
-/* Two keys of the eye; the time of the second may depend on the range of frames. */
+/* Reads a dolly as two keys of the eye; the time of the second may depend on the range of frames. */
 static bool read_dolly(const struct shot_reader *reader, const struct shot_value *at)
 {
     static const char *const known[] = {"to", "by", "seconds", "ease", NULL};
@@ -109,10 +109,11 @@ static bool read_dolly(const struct shot_reader *reader, const struct shot_value
     if (!values)
         return false;
     series->dolly_times = times;
-    times[1] = 1; /* until it is settled */
+    times[1] = 1; /* replaced when the range is settled */
     const bool eases = json_is_true(ease.value);
     const size_t parts =
-        eases ? 3 : 1; /* a Bezier key: before, itself, after, all equal: the velocity is zero there */
+        /* A Bezier key has three equal values, before, itself and after: the velocity is zero there */
+        eases ? 3 : 1;
     for (size_t i = 0; i < parts; i++) {
         memcpy(values[i], reader->job->camera.key.eye_world, sizeof(*values));
         memcpy(values[parts + i], to, sizeof(*values));
@@ -127,7 +128,7 @@ static bool read_dolly(const struct shot_reader *reader, const struct shot_value
     return shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_CAMERA, NULL);
 }
 
-/* What cannot go together. */
+/* Checks for members that exclude each other. */
 static bool check_place(const struct shot_reader *reader, const struct shot_value *at,
                         const struct shot_value view[VIEW_COUNT])
 {
@@ -177,7 +178,8 @@ static bool read_place(const struct shot_reader *reader, const struct shot_value
     return (!orbit.value || read_orbit(reader, &orbit)) && (!dolly.value || read_dolly(reader, &dolly));
 }
 
-/* The command line's values instead; all of the file has been read, so that every mistake in it is reported. */
+/* Applies the command line's values instead, after the whole file was read, so that every mistake in it is
+ * reported. */
 static void override(const struct shot_reader *reader, const struct cli_job *before)
 {
     struct cli_job *job = reader->job;

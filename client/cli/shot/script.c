@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Application of a shot file to a job. */
 #include "script.h"
 #include "read.h"
 #include "lib/text.h"
@@ -127,7 +128,7 @@ static bool apply_clips(const struct shot_reader *reader, const struct shot_valu
 
 /* ---- outputs ---- */
 
-/* The file's folder before a pattern: a percent sign in it is one. */
+/* Joins the file's folder and a pattern; a percent sign in the folder is doubled. */
 static bool join_pattern(const struct shot_reader *reader, const char *pattern, const char **joined)
 {
     const char *folder = pattern[0] == '/' ? "" : reader->shot->folder;
@@ -243,10 +244,10 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
                           "\"output\" and \"outputs\" cannot be combined");
     if ((output.value && !apply_output(reader, &output)) || (outputs.value && !apply_outputs(reader, &outputs)))
         return false;
-    /* All of the file has been read, so that every mistake in it is reported. */
+    /* The whole file has been read, so that every mistake in it is reported. */
     if (given->output) {
         job->output.count = 0;
-        job->output.image = CLI_IMAGE_UNKNOWN; /* of the file's outputs */
+        job->output.image = CLI_IMAGE_UNKNOWN; /* set by the file's outputs */
     }
     job->clips.count = given->clips ? 0 : job->clips.count;
     return true;

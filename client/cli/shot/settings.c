@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Members of a shot file that are also options: each is set as if it had been typed. */
+/* Members of a shot file that are also options: each is set as on the command line. */
 #include "read.h"
 
 #include "options/fields.h"
@@ -14,7 +14,7 @@
 
 enum type { WORD, WHOLE, REAL, SIZE, FLAG, WHOLE_OR_WORD, WORDS, GROUPS };
 
-/* Those that are no field of `render`. */
+/* Settings that are no field of `render`. */
 static const struct setting {
     const char *name, *option;
     enum type type;
@@ -67,7 +67,7 @@ static bool is_whole(const json_t *value)
     return json_is_number(value) && number >= 0 && number <= 9007199254740992.0 && floor(number) == number;
 }
 
-/* "a,b"; NULL: not all are strings, or there is none. */
+/* Joins strings as "a,b"; NULL: an element is not a string, or there is none. */
 static const char *joined(const json_t *array, char *text, size_t text_bytes)
 {
     size_t used = 0;
@@ -80,7 +80,7 @@ static const char *joined(const json_t *array, char *text, size_t text_bytes)
     return used > 0 ? text : NULL;
 }
 
-/* As it would be typed; NULL: it has the wrong type. */
+/* The value as it would be typed; NULL: it has the wrong type. */
 static const char *typed(const struct setting *setting, const json_t *value, char *text, size_t text_bytes)
 {
     const json_t *width = json_array_get(value, 0), *height = json_array_get(value, 1);
@@ -108,7 +108,7 @@ static const char *typed(const struct setting *setting, const json_t *value, cha
     }
 }
 
-/* Each as "key=Sun,Lamp*". */
+/* Applies light groups, each as "key=Sun,Lamp*". */
 static bool apply_groups(const struct shot_reader *reader, const struct shot_value *at,
                          const struct setting *setting)
 {
@@ -152,7 +152,7 @@ static bool apply_setting(const struct shot_reader *reader, const struct shot_va
     return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : remedy, "%s", why.text);
 }
 
-/* A member that is a field of `render`, with an example from its description. */
+/* Applies a member that is a field of `render`, with an example from its description. */
 static bool apply_field(const struct shot_reader *reader, const struct shot_value *at,
                         const struct cli_field *field)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A keyed value of a shot file: {"times": [..], "values": [..], "interpolation": "..", "handles": [[before,
+/* Keyed values of a shot file: {"times": [..], "values": [..], "interpolation": "..", "handles": [[before,
  * after], ..]}. */
 #include "read.h"
 #include "options/job.h"
@@ -12,18 +12,18 @@
 #define KEYS_MAX 65536u
 #define CHANNELS_MAX 4096u
 #define TIME_MAX_S 1e6
-/* Rotations in degrees are cut into steps below this, so that the shorter arc is the intended one. */
+/* Rotations in degrees are divided into steps below this, so that the shorter arc is the intended one. */
 #define STEP_DEGREES 60.0
 #define RADIANS_PER_DEGREE 0.017453292519943295
 
-/* A property's keys as they are read; `numbers` is the protocol's count per value. */
+/* Keys of a property; `numbers` is the protocol's count for a value. */
 struct keys {
     const struct shot_property *property;
     enum protocol_interpolation interpolation;
     size_t count;
     unsigned numbers;
     float *times;
-    float *values; /* per key `numbers`, or three times that */
+    float *values; /* `numbers` for each key, or three times as many */
 };
 
 bool shot_is_keyed(const struct shot_value *at)
@@ -61,7 +61,7 @@ static bool read_scaled(const struct shot_reader *reader, const struct shot_valu
     return true;
 }
 
-/* The file's numbers, scaled: property->width of them. */
+/* Reads property->width numbers, scaled. */
 static bool read_plain(const struct shot_reader *reader, const struct shot_value *at,
                        const struct shot_property *property, float value[4])
 {
@@ -94,7 +94,7 @@ static bool read_plain(const struct shot_reader *reader, const struct shot_value
     return true;
 }
 
-/* Rotated about x, then y, then z, each a fixed axis. */
+/* Converts angles about x, then y, then z, each a fixed axis. */
 static void quaternion_of_angles(const double degrees[3], float quaternion[4])
 {
     double c[3], s[3];
@@ -185,7 +185,7 @@ static bool read_times(const struct shot_reader *reader, const struct shot_value
     return true;
 }
 
-/* The values of a spline's key: before it, itself, after it. Without handles the velocity is zero there. */
+/* Reads a spline's key: the values before it, at it and after it. Without handles the velocity is zero there. */
 static bool read_spline_key(const struct shot_reader *reader, const struct shot_value *handles, size_t i,
                             struct keys *keys, const float value[4])
 {
@@ -204,7 +204,7 @@ static bool read_spline_key(const struct shot_reader *reader, const struct shot_
     if (json_array_size(pair.value) != 2)
         return shot_wrong(reader, &pair, "give two values per key: before it and after it",
                           "must be an array of two values");
-    /* A curve's control values may lie beyond what the curve reaches, and tangents are per second. */
+    /* A curve's control values may lie beyond the curve, and tangents are per second. */
     struct shot_property property = *keys->property;
     property.min = -1e12;
     property.max = 1e12;
@@ -235,7 +235,7 @@ static bool read_values(const struct shot_reader *reader, const struct shot_valu
     return true;
 }
 
-/* Angles are followed as they are written: [0, 0, 0] to [0, 720, 0] turns twice. */
+/* Reads angles, which are interpolated as written: [0, 0, 0] to [0, 720, 0] turns twice. */
 static bool read_angles(const struct shot_reader *reader, const struct shot_value *values, struct keys *keys)
 {
     const size_t written = keys->count;
@@ -251,7 +251,7 @@ static bool read_angles(const struct shot_reader *reader, const struct shot_valu
         double maximum = 0;
         for (unsigned k = 0; k < 3 && i > 0; k++)
             maximum = fmax(maximum, fabs((double)degrees[i][k] - (double)degrees[i - 1][k]));
-        /* In place of the fourth number: steps from the previous key. */
+        /* the fourth number holds the number of steps from the previous key */
         degrees[i][3] =
             keys->interpolation == PROTOCOL_INTERPOLATION_STEP ? 1 : (float)(floor(maximum / STEP_DEGREES) + 1);
         total += i > 0 ? (size_t)degrees[i][3] : 0;
@@ -338,8 +338,8 @@ bool shot_channel(const struct shot_reader *reader, const struct shot_value *at,
     return true;
 }
 
-/* A copy that lives as long as the shot; NULL: out of memory. Lines are only counted for a message, as that scans
- * the file. */
+/* Copies a place, for as long as the shot lives; NULL: out of memory. Lines are counted only for a message, as
+ * that scans the file. */
 static const struct fl_json_place *keep_place(const struct shot_reader *reader, const struct fl_json_place *place)
 {
     struct fl_json_place *kept = shot_allocate(reader, 1, sizeof(*kept));
