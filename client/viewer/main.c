@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* farlight-view: a window on a scene that a daemon renders. Started by `farlight view`; a program of its own so
- * that nothing else links SDL and libavcodec. */
+/* farlight-view: a window on a scene that a daemon renders. Started by `farlight view`; it is a program of its
+ * own so that nothing else links SDL and libavcodec. */
 #include "options/arguments.h"
 #include "options/complete.h"
 #include "options/daemon.h"
@@ -20,11 +20,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The C library looks for it by name, past our hidden visibility. */
+/* argp finds this variable by name, despite our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-view " FARLIGHT_VERSION;
 
 #define MOVING_RATE_DEFAULT 15.0f
-#define STEREO_DEFAULT_M 0.065f /* between the eyes of people */
+#define STEREO_DEFAULT_M 0.065f /* mean distance of human eyes */
 
 enum key {
     KEY_SCENE = 0x500,
@@ -145,7 +145,7 @@ static error_t set_still_encoding(struct command_line *line, const char *value)
     return cli_usage(&line->job, "--still-encoding", "'%s' is not raw, predicted, zstd or jpeg", value);
 }
 
-/* *choice: the index of the name. */
+/* Sets *choice to the index of the name. */
 static error_t set_choice(struct command_line *line, const char *option, const char *const names[],
                           const char *value, int *choice)
 {
@@ -167,7 +167,7 @@ static error_t set_views(struct command_line *line, const char *value)
 
 static error_t set_holes(struct command_line *line, const char *value)
 {
-    static const char *const names[] = {"fill", "pattern", NULL}; /* enum fl_warp_holes */
+    static const char *const names[] = {"fill", "pattern", NULL}; /* the order of enum fl_warp_holes */
     int choice = FL_WARP_FILL;
     const error_t status = set_choice(line, "--holes", names, value, &choice);
     line->viewer.holes = (enum fl_warp_holes)choice;
@@ -262,7 +262,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-/* The list of keys, behind the options. */
+/* Appends the list of keys to the options. */
 static char *help_filter(int key, const char *text, void *input)
 {
     (void)input;
@@ -270,7 +270,7 @@ static char *help_filter(int key, const char *text, void *input)
     size_t bytes = 0;
     FILE *out = key == ARGP_KEY_HELP_POST_DOC ? open_memstream(&list, &bytes) : NULL;
     if (!out)
-        return (char *)(uintptr_t)text; /* argp hands it back as const */
+        return (char *)(uintptr_t)text; /* argp returns it as const */
     fprintf(out, "%s\n\nKeys:\n", text);
     input_print_bindings(out);
     fclose(out);
@@ -346,7 +346,7 @@ static void fill(struct command_line *line)
     viewer->note = job->talk.quiet ? NULL : on_note;
 }
 
-/* What is remembered stands for the defaults: variables and options count for more. */
+/* Reads variables and options over saved choices, which replace the defaults. */
 static bool read_line(struct command_line *line, const struct argp *argp, int argc, char **argv,
                       const struct recall *recall)
 {
@@ -372,7 +372,7 @@ static bool read_line(struct command_line *line, const struct argp *argp, int ar
            complete(line);
 }
 
-/* A file of that name is named with its folder: ./none. */
+/* A file with the name "none" needs its folder: ./none. */
 static const char *state_file(const struct viewer_options *viewer)
 {
     static char path[4096];
@@ -381,7 +381,7 @@ static const char *state_file(const struct viewer_options *viewer)
     return !viewer->replay && recall_default_path(path, sizeof(path)) ? path : NULL;
 }
 
-/* The command line says which file is remembered in, so it is read a second time. */
+/* Reads the command line twice, since it names the file of saved choices. */
 static bool read_all(struct command_line *line, const struct argp *argp, int argc, char **argv)
 {
     struct recall recall = {0};
@@ -390,7 +390,7 @@ static bool read_all(struct command_line *line, const struct argp *argp, int arg
     const char *state = state_file(&line->viewer);
     if (state)
         recall_load(&recall, state);
-    /* What is remembered must not make a command line wrong. */
+    /* Saved choices must not make a command line invalid. */
     if (state && !read_line(line, argp, argc, argv, &recall) &&
         !read_line(line, argp, argc, argv, &(struct recall){0}))
         return false;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Rows of the editing panel: values, steps and drags. */
 #include "rows.h"
 #include "lib/text.h"
 
@@ -6,12 +7,12 @@
 #include <stdio.h>
 #include <string.h>
 
-#define VECTOR_MAX 4u          /* a matrix is not edited number by number */
-#define BOUNDED_MAX 400.0      /* a longer range is no slider's */
-#define STEPS_OF_RANGE 20.0    /* keys from end to end */
-#define GROWTH_PER_STEP 1.1892 /* four double it */
-#define FIRST 0.01             /* beyond 0, which does not grow */
-#define SMALLEST 1e-4          /* before 0 */
+#define VECTOR_MAX 4u          /* matrices are not edited number by number */
+#define BOUNDED_MAX 400.0      /* a longer range gets no slider */
+#define STEPS_OF_RANGE 20.0    /* key presses from end to end */
+#define GROWTH_PER_STEP 1.1892 /* four steps double the value */
+#define FIRST 0.01             /* first value after 0, which does not grow */
+#define SMALLEST 1e-4          /* last value before 0 */
 #define STEP_DEGREES 5.0
 #define PIXELS_PER_STEP 12.0
 
@@ -73,7 +74,7 @@ void edit_row_show(const struct fl_object_state *state, struct edit_row row, str
     if (word)
         snprintf(shown->value, sizeof(shown->value), "%.39s", word);
     else
-        snprintf(shown->value, sizeof(shown->value), "%.4g", value == 0 ? 0 : value); /* no -0 */
+        snprintf(shown->value, sizeof(shown->value), "%.4g", value == 0 ? 0 : value); /* avoids -0 */
     if (is_bounded(field))
         shown->share = (value - field->min) / (field->max - field->min);
     shown->has_colour = is_colour && row.component == 0;
@@ -90,7 +91,7 @@ const char *edit_row_hint(const struct fl_object_state *state, struct edit_row r
                             : "Left and Right, a drag or a number change it";
 }
 
-/* Of words that have gaps between their numbers, too. */
+/* Steps to the next word, whose numbers may have gaps. */
 static double next_word(const struct fl_field *field, double value, double steps)
 {
     const int count = (int)(field->max - field->min) + 1, step = steps > 0 ? 1 : count - 1;
@@ -103,7 +104,7 @@ static double next_word(const struct fl_field *field, double value, double steps
     return field->min + at;
 }
 
-/* By so many steps from a value; a number without ends grows, and one of both signs moves. */
+/* Moves a value by steps: a number without bounds grows by a factor, a signed one by a distance. */
 static double moved(const struct fl_field *field, double from, double steps, double metre)
 {
     const bool is_angle = strstr(field->unit, "degree") != NULL, is_length = strstr(field->unit, "met") != NULL;

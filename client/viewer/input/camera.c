@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
+/* Motion of the user's camera. */
 #include "camera.h"
 
 #include <math.h>
 #include <string.h>
 
-#define POLE_MARGIN 0.02 /* radians between the view and the orbit's axis */
+#define POLE_MARGIN 0.02 /* minimum angle in radians between the view and the orbit's axis */
 #define ORTHOGRAPHIC_FOV 0.35
 
 /* ---- vectors ---- */
@@ -168,7 +169,7 @@ void camera_from_frame(struct viewer_camera *camera, const struct fl_frame *fram
     unit(right);
     unit(above);
     unit(into);
-    /* A camera that is not tilted turns about the vertical; a tilted one keeps its horizon. */
+    /* A camera without tilt turns about the vertical; a tilted one keeps its horizon. */
     const bool is_upright =
         fabs(dot(right, vertical)) < 1e-3 && above[1] > 0 && fabs(dot(into, vertical)) < cos(POLE_MARGIN);
     memcpy(camera->up, is_upright ? vertical : above, sizeof(camera->up));

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
+/* Bindings of keys, and camera controls. */
 #include "controls.h"
 
 #include <math.h>
 #include <string.h>
 
-#define ORBIT_RADIANS_PER_HEIGHT 3.5 /* across the window's height: a little more than half around */
+#define ORBIT_RADIANS_PER_HEIGHT 3.5 /* for the window's height: a little more than half a turn */
 #define TURN_RADIANS_PER_HEIGHT 1.6
-#define DOLLY_PER_NOTCH 0.88 /* the distance is multiplied by it */
-#define MIN_SHARE 1e-4       /* of the distance that one notch leaves at least */
+#define DOLLY_PER_NOTCH 0.88 /* factor of the distance */
+#define MIN_SHARE 1e-4       /* minimum share of the distance after a notch */
 #define FLY_DISTANCES_PER_SECOND 0.8
 #define FLY_FAST 4.0
 
@@ -82,7 +83,7 @@ static bool drag(struct controls *controls, const struct input *input, double he
     else if (controls->dragging[INPUT_RIGHT])
         camera_turn(camera, right * TURN_RADIANS_PER_HEIGHT, -down * TURN_RADIANS_PER_HEIGHT);
     else if (controls->dragging[INPUT_LEFT])
-        /* The dragged scene follows the pointer: the eye moves the other way. */
+        /* The dragged scene follows the pointer, so the eye moves the other way. */
         camera_orbit(camera, right * ORBIT_RADIANS_PER_HEIGHT, -down * ORBIT_RADIANS_PER_HEIGHT);
     else
         return false;
@@ -120,7 +121,7 @@ bool controls_input(struct controls *controls, const struct input *input, double
     case INPUT_KEY_UP:
         hold(controls, input);
         return false;
-    case INPUT_FOCUS_LOST: /* what is let go of now is not told */
+    case INPUT_FOCUS_LOST: /* buttons and keys that are released now are not reported */
         *controls = (struct controls){.x = controls->x, .y = controls->y};
         return false;
     default:

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Events of mouse and keyboard, and their meaning. Independent of the window: a real one and a replay both create
- * them. */
+/* Events of mouse and keyboard, and their meaning. Independent of the window: a real one and a replay create
+ * the same events. */
 #ifndef FARLIGHT_VIEWER_INPUT_CONTROLS_H
 #define FARLIGHT_VIEWER_INPUT_CONTROLS_H
 
@@ -27,18 +27,18 @@ enum input_button { INPUT_LEFT, INPUT_MIDDLE, INPUT_RIGHT };
 struct input {
     enum input_kind kind;
     enum input_button button;
-    unsigned clicks;   /* of a button that goes down: 2 for the second of a double click */
+    unsigned clicks;   /* 2 for the second press of a double click */
     double x, y;       /* pointer, pixels of the window from its top left */
-    double wheel;      /* notches away from the person */
-    char key[16];      /* as the key is labelled, in small letters: "a", "f1", "space", "[" */
-    bool shift, ctrl;  /* held */
-    char text[16];     /* INPUT_TEXT: what was typed, by whatever keys */
-    int width, height; /* of a window of another size, pixels */
+    double wheel;      /* notches away from the user */
+    char key[16];      /* the key's label, in small letters: "a", "f1", "space", "[" */
+    bool shift, ctrl;  /* held modifiers */
+    char text[16];     /* INPUT_TEXT: typed text, by any keys */
+    int width, height; /* new size of the window, pixels */
     double scale;      /* pixels of the window per pixel of the desktop, for text */
-    const char *path;  /* of a file that is dropped on the window; until the next event */
+    const char *path;  /* file dropped on the window; valid until the next event */
 };
 
-/* What a key does at once. */
+/* Immediate effects of keys. */
 enum action {
     ACTION_NONE,
     ACTION_QUIT,
@@ -83,35 +83,35 @@ enum action {
     ACTION_REDO,
 };
 
-/* One line of the list of keys; those with action NONE are held down or of the mouse. */
+/* A line of the list of keys; keys with action NONE are held, or belong to the mouse. */
 struct binding {
-    const char *keys; /* as shown: "T, Shift+T" */
-    const char *key;  /* as of struct input; NULL: of the mouse, or held */
+    const char *keys; /* label: "T, Shift+T" */
+    const char *key;  /* key as in struct input; NULL: held, or the mouse */
     enum action plain, with_shift;
     const char *doc;
 };
 extern const struct binding input_bindings[];
 extern const size_t input_binding_count;
 
-enum action input_action(const struct input *input); /* of a key that went down */
+enum action input_action(const struct input *input); /* for a pressed key */
 void input_print_bindings(FILE *out);
 
 /* ---- the camera's way ---- */
 
 enum fly_key { FLY_FORWARD, FLY_BACK, FLY_LEFT, FLY_RIGHT, FLY_UP, FLY_DOWN, FLY_COUNT };
 
-/* What is held. All zero at first. */
+/* Held buttons and keys; initially zero. */
 struct controls {
     bool dragging[3]; /* by enum input_button */
-    bool shift;       /* while the drag began */
-    double x, y;      /* of the pointer, pixels */
+    bool shift;       /* held when the drag began */
+    double x, y;      /* pointer, pixels */
     bool held[FLY_COUNT], fast;
 };
 
-/* True: it moved the camera. `height` of the window, pixels. */
+/* Processes an event; true: it moved the camera. `height` is the window's, pixels. */
 bool controls_input(struct controls *controls, const struct input *input, double height,
                     struct viewer_camera *camera);
-/* True: held keys moved it during the last `seconds`. */
+/* Moves the camera by held keys for `seconds`; true: it has moved. */
 bool controls_fly(struct controls *controls, double seconds, struct viewer_camera *camera);
 
 #endif

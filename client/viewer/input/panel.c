@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* The panel of a tracer's settings. */
 #include "panel.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define REAL_SMALLEST 1e-3f /* beside 0: a range of lengths has no natural unit */
+#define REAL_SMALLEST 1e-3f /* first value after 0, since a range of lengths has no natural unit */
 
 const struct field_desc *panel_setting(enum protocol_tracer tracer, size_t index)
 {
@@ -24,7 +25,7 @@ size_t panel_setting_count(enum protocol_tracer tracer)
     return count;
 }
 
-/* Fields lie where they do in the message. */
+/* Address of a setting, whose offset is as in the message. */
 static void *place_of(const struct field_desc *setting, struct tracer_settings *settings)
 {
     return (char *)settings + setting->offset - offsetof(struct message_render, settings);
@@ -62,7 +63,7 @@ static uint64_t next_choice(const struct enum_desc *choices, uint64_t number, in
     return choices->values[0].number;
 }
 
-/* Of "2, 4, 8", and 0 where it stands for a default that is none of them: auto. */
+/* The next number of "2, 4, 8"; also 0 if that stands for a default outside of the list: auto. */
 static uint64_t next_of_set(const struct field_desc *setting, uint64_t number, int step)
 {
     uint64_t numbers[32];

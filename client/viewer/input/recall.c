@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Saved choices of the viewer. */
 #include "recall.h"
 #include "options/image_path.h"
 #include "lib/json_text.h"
@@ -95,7 +96,7 @@ bool recall_default_path(char *path, size_t path_bytes)
     return length > 0 && (size_t)length < path_bytes;
 }
 
-/* An integer of the object within a range. */
+/* Reads an integer of the object within a range. */
 static bool read_int(const json_t *root, const char *key, int minimum, int maximum, int *value)
 {
     const json_t *found = json_object_get(root, key);

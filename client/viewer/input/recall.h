@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the viewer remembers from one time to the next, in a small JSON file: the window's place and what keys have
- * chosen. The file is not trusted: what it must not hold is passed over. Independent of window and daemon. */
+/* State that the viewer saves in a small JSON file: the window's place and choices of keys. The file is not
+ * trusted: invalid contents are ignored. Independent of window and daemon. */
 #ifndef FARLIGHT_VIEWER_INPUT_RECALL_H
 #define FARLIGHT_VIEWER_INPUT_RECALL_H
 
@@ -18,25 +18,25 @@ enum recall_choice {
 };
 
 struct recall {
-    int width, height; /* of the window, pixels of the desktop; 0: not known */
+    int width, height; /* size of the window, pixels of the desktop; 0: unknown */
     bool has_place;
-    int x, y; /* of its top left on the desktop */
+    int x, y; /* top left of the window on the desktop */
     bool full_screen;
     bool has[RECALL_COUNT]; /* keys have chosen it .. */
     int chosen[RECALL_COUNT];
 };
 
-/* Where it is by default: farlight/viewer.json in $XDG_STATE_HOME or ~/.local/state (XDG Base Directory
+/* The default path: farlight/viewer.json in $XDG_STATE_HOME or ~/.local/state (XDG Base Directory
  * Specification). False: there is no such folder. */
 bool recall_default_path(char *path, size_t path_bytes);
-/* A missing or broken file is as an empty one. */
+/* Loads the file; a missing or broken one counts as empty. */
 void recall_load(struct recall *recall, const char *path);
-/* Makes missing folders; the file appears complete or not at all. */
+/* Saves the file, which appears complete or not at all; makes missing folders. */
 bool recall_save(const struct recall *recall, const char *path, struct fl_error *error);
 
-/* A choice as a number, and back. */
+/* Applies saved choices to the settings. */
 void recall_apply(const struct recall *recall, struct settings *settings);
-/* Notes what is another than it was at first. */
+/* Records choices that differ from the first settings. */
 void recall_note(struct recall *recall, const struct settings *first, const struct settings *now);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Reading of recorded events. */
 #include "replay.h"
 #include "lib/json_text.h"
 
@@ -13,7 +14,7 @@ struct reader {
     struct fl_json json;
     const char *path;
     struct fl_error *error;
-    struct fl_json_place event; /* which is read */
+    struct fl_json_place event; /* current event */
 };
 
 static bool refuse(struct reader *reader, const char *key, const char *what)
@@ -26,7 +27,7 @@ static bool refuse(struct reader *reader, const char *key, const char *what)
                         fl_json_line(&reader->json, place), name, what);
 }
 
-/* *value stays if the event lacks the key. */
+/* Reads a number; *value stays if the event lacks the key. */
 static bool read_number(struct reader *reader, const json_t *event, const char *key, double minimum,
                         double maximum, double *value)
 {
@@ -101,7 +102,7 @@ static bool read_resize(struct reader *reader, const json_t *json, struct replay
     return true;
 }
 
-/* A key that is held is two events. */
+/* Reads a key; a held one becomes two events. */
 static bool read_key(struct reader *reader, const json_t *json, struct replay *replay, struct replay_event *event)
 {
     double hold_s = 0;

@@ -1,29 +1,29 @@
 /* SPDX-License-Identifier: MIT */
-/* A list of timed events in JSON, in place of a user. Independent of the window. */
+/* A list of timed events in JSON that replaces a user. Independent of the window. */
 #ifndef FARLIGHT_VIEWER_INPUT_REPLAY_H
 #define FARLIGHT_VIEWER_INPUT_REPLAY_H
 
 #include "controls.h"
 
 enum replay_kind {
-    REPLAY_INPUT,      /* a dropped file is `path` */
-    REPLAY_REST,       /* wait until the picture is at rest, with all samples or `samples` of them, or the map has
-                          arrived */
-    REPLAY_LIVE,       /* wait until the scene is there */
+    REPLAY_INPUT, /* a dropped file is `path` */
+    /* Wait until the picture is at rest, with all samples or `samples` of them, or the map has arrived */
+    REPLAY_REST,
+    REPLAY_LIVE,       /* wait until the scene is loaded */
     REPLAY_LOST,       /* wait until the connection is lost */
-    REPLAY_CAMERA,     /* wait until the picture is of the newest camera, the daemon's own or made here */
-    REPLAY_CHANGE,     /* wait until the scene has changed since the event before */
+    REPLAY_CAMERA,     /* wait until the picture shows the newest camera, from the daemon or made in the client */
+    REPLAY_CHANGE,     /* wait until the scene has changed since the previous event */
     REPLAY_SCREENSHOT, /* into `path` */
-    REPLAY_STATE       /* one line of JSON on standard output */
+    REPLAY_STATE       /* a line of JSON on standard output */
 };
 
 struct replay_event {
     enum replay_kind kind;
-    size_t number;  /* in the file, counted from 0 */
-    double after_s; /* since the event before was done */
+    size_t number;  /* index in the file */
+    double after_s; /* since the end of the previous event */
     struct input input;
     unsigned samples; /* 0: all */
-    double timeout_s; /* of a wait */
+    double timeout_s; /* limit of a wait */
     char path[4096];
 };
 

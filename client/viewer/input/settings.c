@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Changes of the picture's settings by keys. */
 #include "settings.h"
 
 #include <stdlib.h>
@@ -19,7 +20,7 @@ static bool is_for_everybody(enum protocol_tracer tracer)
     return desc && !desc->is_for_tests;
 }
 
-/* What only the panel listens to, while it is shown. */
+/* Applies actions that only an open panel handles. */
 static enum settings_change act_on_panel(struct settings *settings, enum action action)
 {
     const size_t count = panel_setting_count(settings->tracer);
@@ -41,7 +42,7 @@ static enum settings_change act_on_panel(struct settings *settings, enum action 
     }
 }
 
-/* What the daemon has to be told of. */
+/* Applies actions that change the daemon's picture. */
 static bool change_view(struct settings *settings, enum action action)
 {
     const struct settings before = *settings;
@@ -99,7 +100,8 @@ enum settings_change settings_act(struct settings *settings, enum action action)
     case ACTION_PANEL:
         settings->panel = !settings->panel;
         return SETTINGS_DRAWN;
-    case ACTION_LOCAL: /* the daemon is told when something moves: what rests goes on being refined */
+    /* The daemon gets the change with the next motion; a picture at rest continues to be refined */
+    case ACTION_LOCAL:
         settings->local = (enum local_views)around((int)settings->local, 1, LOCAL_VIEWS_COUNT);
         return SETTINGS_DRAWN;
     case ACTION_HOLES:

@@ -17,15 +17,15 @@ struct settings {
     enum protocol_tracer tracer;
     enum protocol_integrator integrator;
     enum protocol_tone_map tone_map;
-    int exposure_thirds;             /* of a stop, added to that of the command line */
+    int exposure_thirds;             /* thirds of a stop, added to the command line's exposure */
     int coarser;                     /* pixels along an edge are divided by 2 to this power */
-    struct tracer_settings tracers;  /* their settings */
+    struct tracer_settings tracers;  /* settings of all tracers */
     bool stereo;                     /* two views in the picture .. */
-    enum protocol_view_source views; /* .. of this origin */
-    bool panel;                      /* lists those of the tracer .. */
-    size_t setting;                  /* .. of which this one is chosen */
-    enum local_views local;          /* whether views are made here .. */
-    enum fl_warp_holes holes;        /* .. and how they show what nobody has seen yet */
+    enum protocol_view_source views; /* .. from this source */
+    bool panel;                      /* lists the tracer's settings .. */
+    size_t setting;                  /* .. with this setting chosen */
+    enum local_views local;          /* whether the client makes views .. */
+    enum fl_warp_holes holes;        /* .. and how they show unknown regions */
     bool error_map, help;
     enum overlay_mode overlay;
 };
@@ -34,10 +34,10 @@ struct settings {
 
 enum settings_change {
     SETTINGS_SAME,
-    SETTINGS_DRAWN, /* the overlay is another */
-    SETTINGS_VIEW   /* the daemon has to be told */
+    SETTINGS_DRAWN, /* the overlay has changed */
+    SETTINGS_VIEW   /* the daemon's picture has changed */
 };
-/* Whether a panel that is shown takes the key for itself. */
+/* True if an open panel handles the key. */
 bool settings_is_of_panel(enum action action);
 enum settings_change settings_act(struct settings *settings, enum action action);
 

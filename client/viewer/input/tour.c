@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The current camera, clip and time. */
 #include "tour.h"
 
 #include <math.h>
@@ -26,7 +27,7 @@ int tour_camera(struct tour *tour, int step)
 
 int tour_clip(struct tour *tour, int step)
 {
-    const int places = (int)tour->clip_count + 1; /* one for none */
+    const int places = (int)tour->clip_count + 1; /* plus one for no clip */
     tour->clip = ((tour->clip + 1) + step % places + places) % places - 1;
     tour->time_s = 0;
     tour->duration_s = 0;
@@ -59,7 +60,7 @@ void tour_change_speed(struct tour *tour, int doublings)
     tour->speed = fmax(0.125, fmin(8, tour->speed * pow(2, doublings)));
 }
 
-/* A clip begins again at its end. */
+/* Moves the time; a clip starts again at its end. */
 static bool go(struct tour *tour, double seconds)
 {
     const double before = tour->time_s;

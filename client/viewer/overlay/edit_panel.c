@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Drawing of the editing panel, and hits in it. */
 #include "edit_panel.h"
 #include "mark.h"
 #include "protocol/common/srgb.h"
@@ -7,18 +8,18 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Pixels of the desktop. */
+/* Lengths in pixels of the desktop. */
 #define WIDTH 376.0
 #define HEADER 46.0 /* tabs and title */
 #define SLIDER_BEGIN 190.0
 #define SLIDER_WIDTH 96.0
 #define FOOTER 22.0
 
-/* The same wherever a text ends: it is found without a font. */
+/* The widths do not depend on texts, so hits can be found without a font. */
 struct edit_place {
     double x, y, width, height;
     double line, rows_y;
-    size_t first, shown; /* rows */
+    size_t first, shown; /* index of the first row, and number of shown rows */
 };
 
 static struct edit_place place(const struct hud_edit *edit, double width, double height, double s)
@@ -30,7 +31,7 @@ static struct edit_place place(const struct hud_edit *edit, double width, double
     const double room = height - HUD_MARGIN * s - (FOOTER + HUD_PADDING) * s - frame.rows_y;
     const size_t most = (size_t)fmax(room / frame.line, 1);
     frame.shown = edit->count < most ? edit->count : most;
-    /* The chosen row is in the middle where not all fit. */
+    /* The chosen row is in the middle if not all fit. */
     const size_t above = frame.shown / 2, last = edit->count - frame.shown;
     frame.first = edit->chosen > above ? edit->chosen - above : 0;
     frame.first = frame.first < last ? frame.first : last;

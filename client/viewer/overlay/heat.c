@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Maps of errors as colours. */
 #include "heat.h"
 
 #include <math.h>

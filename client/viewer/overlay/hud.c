@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Layout of the overlay. */
 #include "hud.h"
 #include "mark.h"
 
@@ -6,7 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Of the window's width and height, for what a tracer says: longer lines are broken, those below are left out. */
+/* Maximum share of the window's width and height for the tracer's report: longer lines are broken, and rows
+ * below are left out. */
 #define STRUCTURE_SHARE_MAX 0.6
 #define STRUCTURE_LINES_MAX 10u
 
@@ -40,12 +42,12 @@ struct row {
     char value[HUD_TEXT_MAX];
 };
 
-/* Where its panel ends. */
+/* The lower right corner of a panel. */
 struct corner {
     double right, bottom;
 };
 
-/* As much of a text as fits into a line, behind which commas follow or nothing; at least up to the first one. */
+/* Length of a text's beginning that fits into a line, up to a comma or the end; at least up to the first comma. */
 static size_t line_length(const struct hud_layout *layout, const char *said)
 {
     size_t length = 0, next;
@@ -63,7 +65,7 @@ static size_t line_length(const struct hud_layout *layout, const char *said)
     return length;
 }
 
-/* Adds rows that say it. */
+/* Adds the report as rows. */
 static size_t break_structure(const struct hud_layout *layout, const char *said, struct row *rows, size_t room)
 {
     size_t count = 0;
@@ -126,7 +128,7 @@ static struct corner draw_scene(struct hud_layout *layout)
         hud_text(layout, x + inner, at, HUD_PLAIN, hud_faint, "%s", rows[i].name);
         hud_text(layout, x + inner + names, at, HUD_PLAIN, hud_ink, "%s", rows[i].value);
     }
-    if (bar > 0) { /* how far it is refined */
+    if (bar > 0) { /* progress of the refinement */
         const double at = y + inner + 3 * s + line * ((double)count + 1) + 2 * s;
         const double share = state->moving ? 0 : fmin(1, (double)state->samples / state->samples_wanted);
         hud_box(layout, x + inner, at, widest, 3 * s, hud_rule);
@@ -162,7 +164,7 @@ static void draw_line(struct hud_layout *layout)
     size_t shown = 0;
     for (; shown < count; shown++) {
         widths[shown] = hud_text_width(layout, HUD_PLAIN, items[shown].value) + (shown > 0 ? gap : 0);
-        /* Beside the panel, if that is open. */
+        /* The line is beside the panel, if that is open. */
         if (shown > 0 && width + widths[shown] + 2 * (inner + HUD_MARGIN * s) > layout->right)
             break;
         width += widths[shown];
@@ -190,7 +192,7 @@ static void print_amount(double amount, const char *unit, char *out, size_t byte
     snprintf(out, bytes, amount < 9.95 && factor > 0 ? "%.1f %s%s" : "%.0f %s%s", amount, factors[factor], unit);
 }
 
-/* Its bytes by part, and how the picture was encoded. */
+/* Prints a frame's bytes by part, and the encoding of its picture. */
 static void print_frame(const struct hud_state *state, char out[HUD_TEXT_MAX])
 {
     char amount[40], depth[40];
@@ -205,7 +207,7 @@ static void print_frame(const struct hud_state *state, char out[HUD_TEXT_MAX])
 
 #define LOCAL_ROWS 4u
 
-/* What is made here: how many rows. */
+/* Fills rows about views made in the client; returns their number. */
 static size_t print_local(const struct hud_state *state, const struct metrics_summary *summary, struct row *rows)
 {
     const struct hud_local *local = &state->local;
@@ -229,7 +231,7 @@ static size_t print_local(const struct hud_state *state, const struct metrics_su
     return LOCAL_ROWS;
 }
 
-/* Its bottom; not drawn where it does not fit beside `left`. */
+/* Draws the figures, if they fit beside `left`; returns their lower edge. */
 static double draw_figures(struct hud_layout *layout, double left)
 {
     const struct hud_state *state = layout->state;
@@ -312,7 +314,7 @@ static void draw_help(struct hud_layout *layout)
     size_t count = 0;
     for (size_t i = 0; i < input_binding_count; i++)
         count += input_bindings[i].keys != NULL;
-    /* In a small window the lines move together, and the letters become smaller. */
+    /* In a small window the lines move closer together, and the letters become smaller. */
     double line = fmin(usual + 3 * s, (state->height - 2 * inner) / (double)count);
     layout->line = fmin(usual, line);
     for (size_t i = 0; i < input_binding_count; i++) {
@@ -335,12 +337,12 @@ static void draw_help(struct hud_layout *layout)
     layout->line = usual;
 }
 
-/* In the middle of the window: nothing else is as important. */
+/* Draws the status in the middle of the window, where it is most visible. */
 static void draw_status(struct hud_layout *layout)
 {
     const struct hud_state *state = layout->state;
     const double s = layout->scale, inner = 16 * s, line = HUD_LINE * s;
-    const bool is_lost = state->status != HUD_LOADING; /* or refused */
+    const bool is_lost = state->status != HUD_LOADING; /* lost or refused */
     const char *title = state->status == HUD_REFUSED ? "This scene cannot be shown"
                         : is_lost                    ? "The connection is lost"
                                                      : "Loading";
@@ -364,7 +366,7 @@ static void draw_status(struct hud_layout *layout)
     }
 }
 
-/* The settings of the tracer, below `top`; the chosen one with what it means. */
+/* Draws the tracer's settings below `top`; the chosen one with its explanation. */
 static void draw_panel(struct hud_layout *layout, double top)
 {
     const struct hud_state *state = layout->state;
@@ -436,7 +438,7 @@ void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *mea
         const size_t before = hud->count;
         if (overlay == OVERLAY_ALL)
             hud_draw_timeline(&layout, fmax(corner.bottom, figures));
-        if (hud->count > before) /* its first mark is its panel */
+        if (hud->count > before) /* the first mark is the panel itself */
             bottom = hud->marks[before].y - HUD_MARGIN * state->scale;
     }
     if (overlay != OVERLAY_NONE)

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Boxes and texts of the overlay. */
 #include "mark.h"
 
 #include <stdarg.h>
@@ -13,7 +14,7 @@ const struct hud_colour hud_panel = {14, 17, 22, 205}, hud_ink = {232, 236, 241,
 static struct hud_mark *add(struct hud_layout *layout)
 {
     struct hud *hud = layout->hud;
-    /* The last one is drawn over and over where there are too many. */
+    /* The last mark is overwritten if there are too many. */
     struct hud_mark *mark = &hud->marks[hud->count < HUD_MARKS_MAX ? hud->count++ : HUD_MARKS_MAX - 1];
     *mark = (struct hud_mark){0};
     return mark;

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
+/* Statistics of frames and views. */
 #include "metrics.h"
 
 #include <stdlib.h>
 
 #define SECOND_NS 1000000000ull
-#define ROUNDS_MAX 7u /* what holds for the next picture: few enough to be of now */
+#define ROUNDS_MAX 7u /* number of recent frames that predict the next one */
 
 const char *const lane_names[LANE_COUNT] = {"input",   "scene",  "primary", "trace",  "shade",
                                             "resolve", "encode", "receive", "decode", "show"};
@@ -33,7 +34,7 @@ static enum lane lane_of(enum protocol_stage stage)
     }
 }
 
-/* The daemon counts from the frame's begin, which was before its readback. */
+/* Adds stages; the daemon's times start at the frame's beginning, which was before its readback. */
 static void add_stages(struct metrics_frame *made, const struct fl_frame *frame)
 {
     uint64_t whole_ns = 0;

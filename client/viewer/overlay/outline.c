@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
+/* Outlines of objects. */
 #include "outline.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define LEVELS_MAX 1000u /* of a hierarchy; a list that others change while it is read may have a circle */
+/* Limit of a hierarchy's depth: a list that other clients change while it is read may have a cycle */
+#define LEVELS_MAX 1000u
 
-static const uint8_t colour[4] = {255, 190, 92, 255}; /* of what is chosen in the panel */
+static const uint8_t colour[4] = {255, 190, 92, 255}; /* colour of the chosen object in the panel */
 
 static int by_id(const void *key, const void *object)
 {
@@ -42,13 +44,13 @@ static int by_number(const void *a, const void *b)
 void outline_mark(const uint8_t *pixels, size_t pixel_count, enum outline_by by, const uint32_t *ids, size_t count,
                   uint8_t *marks)
 {
-    uint32_t last = 0; /* neighbours mostly show the same */
+    uint32_t last = 0; /* neighbours mostly show the same object */
     bool is_last_meant = false;
     for (size_t i = 0; i < pixel_count; i++) {
         float numbers[4];
         memcpy(numbers, pixels + i * sizeof(numbers), sizeof(numbers));
         const float number = numbers[by];
-        /* What is no identifier is none of them. */
+        /* invalid identifiers match no object */
         const uint32_t id = numbers[3] > 0 && number >= 1 && number < 4294967296.0f ? (uint32_t)number : 0;
         if (id != last)
             is_last_meant = id != 0 && bsearch(&id, ids, count, sizeof(*ids), by_number);
@@ -57,7 +59,7 @@ void outline_mark(const uint8_t *pixels, size_t pixel_count, enum outline_by by,
     }
 }
 
-/* Along a row or a column: what is marked, or has a mark within reach. */
+/* Marks pixels of a row or column that are marked, or have a mark within reach. */
 static void spread(const uint8_t *from, uint8_t *to, size_t count, size_t stride, unsigned reach)
 {
     unsigned left = 0;
@@ -77,7 +79,7 @@ static void spread(const uint8_t *from, uint8_t *to, size_t count, size_t stride
 bool outline_trace(uint8_t *marks, const struct outline_size *size, unsigned reach)
 {
     const size_t width = size->width, height = size->height, count = width * height;
-    const size_t across = width / size->views_across, down = height / size->views_down; /* of a view */
+    const size_t across = width / size->views_across, down = height / size->views_down; /* size of a view */
     uint8_t *rows = malloc(2 * count + 1);
     if (!rows)
         return false;

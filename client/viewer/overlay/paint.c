@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Painting of picture and overlay with SDL. */
 #include "paint.h"
 
 #include <SDL2/SDL.h>
@@ -9,15 +10,15 @@
 
 #define TEXTS_KEPT 256u
 #define FONTS_KEPT 8u
-#define BASELINE 0.77 /* from the top of a line, share of its height */
+#define BASELINE 0.77 /* share of a line's height from its top */
 
-/* A drawn text: most texts are the same in the next picture. */
+/* A rendered text, cached because most texts are the same in the next picture. */
 struct drawn_text {
     char text[HUD_TEXT_MAX];
     TTF_Font *font;
     SDL_Texture *texture; /* white */
     int width, height;
-    uint64_t used; /* by number of the picture */
+    uint64_t used; /* number of the last picture with it */
 };
 
 struct kept_font {
@@ -28,14 +29,14 @@ struct kept_font {
 
 struct painter {
     SDL_Renderer *renderer;
-    SDL_Texture *texture; /* of the picture */
+    SDL_Texture *texture; /* texture of the picture */
     int texture_width, texture_height;
-    const struct pixmap *picture; /* that is in it, .. */
-    uint64_t version;             /* .. as it was then */
+    const struct pixmap *picture; /* the picture in the texture, .. */
+    uint64_t version;             /* .. and its version */
     struct kept_font fonts[FONTS_KEPT];
     size_t font_count;
     struct drawn_text texts[TEXTS_KEPT];
-    uint64_t drawn; /* pictures so far */
+    uint64_t drawn; /* number of drawn pictures */
     struct hud hud;
 };
 
@@ -57,7 +58,7 @@ static TTF_Font *open_font(enum hud_font font, int pixels)
     return opened;
 }
 
-/* `height` is a line's. NULL: there is no font, and no text is drawn. */
+/* Opens the font for a line's height. NULL: there is no font, and no text is drawn. */
 static TTF_Font *font_of(struct painter *painter, enum hud_font font, double height)
 {
     const int pixels = (int)fmax(6, floor(height * 0.76));
@@ -143,7 +144,7 @@ static bool load_picture(struct painter *painter, const struct pixmap *picture)
     return true;
 }
 
-/* As large as it fits, in the middle. */
+/* The largest rectangle for the picture, in the middle. */
 static SDL_Rect picture_place(int width, int height, const struct pixmap *picture)
 {
     const double across = (double)width / picture->width, down = (double)height / picture->height;

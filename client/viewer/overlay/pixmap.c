@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Pictures for display. */
 #include "pixmap.h"
 
 #include <stdlib.h>

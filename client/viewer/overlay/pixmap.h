@@ -6,19 +6,19 @@
 #include "lib/farlight.h"
 
 struct pixmap {
-    int width, height; /* 0: there is none */
+    int width, height; /* 0: none */
     uint8_t *pixels;
-    uint64_t version; /* another one whenever the pixels are */
+    uint64_t version; /* changes with the pixels */
 };
 
-/* Allocates width by height pixels, whose values are then undefined. */
+/* Allocates width by height pixels with undefined values. */
 bool pixmap_resize(struct pixmap *picture, int width, int height, struct fl_error *error);
 /* Copies a frame's pixels; transparent ones are composited over black. */
 void pixmap_take(struct pixmap *picture, struct fl_frame *frame);
 bool pixmap_copy(struct pixmap *to, const struct pixmap *from, struct fl_error *error);
-/* Copies what is left of it without so many pixels on each side. */
+/* Copies the picture without a margin of this many pixels on each side. */
 bool pixmap_crop(struct pixmap *to, const struct pixmap *from, int margin_x, int margin_y, struct fl_error *error);
-void pixmap_exchange(struct pixmap *a, struct pixmap *b); /* each is another version of itself then */
+void pixmap_exchange(struct pixmap *a, struct pixmap *b); /* both get new versions */
 void pixmap_finish(struct pixmap *picture);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Writing of screenshots. */
 #include "snapshot.h"
 
 #include <stdio.h>

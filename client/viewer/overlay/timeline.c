@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The stages of the last frames on one axis of time, at the bottom of the window. */
+/* The timeline: stages of the last frames on one axis of time, at the bottom of the window. */
 #include "hud.h"
 #include "mark.h"
 
 #include <math.h>
 
-#define ROW 12.0 /* of the timeline */
+#define ROW 12.0 /* height of a row of the timeline */
 #define TIMELINE_FRAMES 8u
 #define TIMELINE_MIN_NS 20e6
 
@@ -46,7 +46,7 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
             begin_ns = span.begin_ns < begin_ns ? span.begin_ns : begin_ns;
             end_ns = span.end_ns > end_ns ? span.end_ns : end_ns;
         }
-        /* A pause between frames is not worth its room. */
+        /* a pause between frames would waste space */
         const struct metrics_frame *before = metrics_frame(metrics, back + 1);
         if (!frame || !before || (double)(begin_ns - (int64_t)before->shown_ns) > TIMELINE_MIN_NS * 4)
             break;
@@ -65,7 +65,7 @@ static void draw_span(struct hud_layout *layout, const struct axis *axis, double
     struct hud_colour colour = lane_colours[lane];
     if (span->end_ns < axis->begin_ns)
         return;
-    colour.a = is_even ? 255 : 150; /* neighbours are told apart */
+    colour.a = is_even ? 255 : 150; /* distinguishes neighbouring frames */
     hud_box(layout, from, top + (double)lane * ROW * s + 2 * s, fmax(to - from, s), ROW * s - 3 * s, colour);
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The window, with SDL. */
 #include "window.h"
 #include "paint.h"
 
@@ -12,10 +13,10 @@ struct window {
     SDL_Renderer *renderer;
     struct painter *painter;
     bool wants_drawing, is_full_screen;
-    char *dropped; /* SDL's: the file that was told last */
+    char *dropped; /* SDL's: the last dropped file */
 };
 
-/* Without a display SDL draws off-screen, even if that was not requested. */
+/* False without a display: SDL draws off-screen then, even if that was not requested. */
 static bool is_seen(const char *driver)
 {
     const char *asked = getenv("SDL_VIDEODRIVER");
@@ -23,7 +24,7 @@ static bool is_seen(const char *driver)
                                            strcmp(driver, "dummy") != 0 && strcmp(driver, "evdev") != 0);
 }
 
-/* A screen that is gone since then must not keep a window: the middle of its title bar is to be seen. */
+/* A saved place on a screen that no longer exists is rejected: the middle of the title bar must be visible. */
 static bool is_on_a_display(const struct window_place *place)
 {
     const SDL_Point middle = {place->x + place->width / 2, place->y};
@@ -41,7 +42,7 @@ struct window *window_create(const char *title, const struct window_place *place
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
-    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1"); /* the program has its own */
+    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1"); /* the program has its own handlers */
     SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
     if (SDL_Init(SDL_INIT_VIDEO) != 0 || !is_seen(SDL_GetCurrentVideoDriver())) {
         fl_error_set(error, FL_ERROR_SYSTEM, "", "no display for a window");
@@ -127,7 +128,7 @@ static bool take_button(const SDL_Event *event, double scale, struct input *inpu
     input->clicks = event->button.clicks;
     input->x = event->button.x * scale;
     input->y = event->button.y * scale;
-    /* A drag goes on beyond the window's edge. */
+    /* A drag continues beyond the window's edge. */
     SDL_CaptureMouse(event->type == SDL_MOUSEBUTTONDOWN ? SDL_TRUE : SDL_FALSE);
     return true;
 }
@@ -151,7 +152,7 @@ static bool take_window_event(struct window *window, const SDL_Event *event, str
     }
 }
 
-/* False: it means nothing to us. */
+/* Converts an event; false: it has no meaning here. */
 static bool take_event(struct window *window, const SDL_Event *event, struct input *input)
 {
     int width = 0, height = 0;

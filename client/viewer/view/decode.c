@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Decoding of H.264 with libavcodec. */
 #include "decode.h"
 
 #include <libavcodec/avcodec.h>
@@ -6,18 +7,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* libswscale writes the pixels of a row in groups, up to as many as this with the widest instructions, and the
- * last group whole: past the end of a row of another width. */
+/* libswscale writes the pixels of a row in groups, whose size depends on the widest instructions and is at most
+ * this; the last group may extend past the end of a row. */
 #define GROUP_PIXELS 64
 
 struct decoder {
     AVCodecContext *context;
     AVPacket *packet;
     AVFrame *frame;
-    struct SwsContext *colours; /* of the last frame's size and form */
+    struct SwsContext *colours; /* converter for the last frame's size and format */
     uint8_t *padded;            /* owned: rows of whole groups; NULL: not needed so far */
     size_t padded_bytes;
-    bool lost; /* until the next key frame */
+    bool lost; /* frames are undecodable until the next key frame */
 };
 
 struct decoder *decoder_create(struct fl_error *error)
@@ -34,7 +35,7 @@ struct decoder *decoder_create(struct fl_error *error)
     decoder->packet = av_packet_alloc();
     decoder->frame = av_frame_alloc();
     if (decoder->context && decoder->packet && decoder->frame) {
-        /* A frame comes out as soon as it is in: threads per frame would delay some. */
+        /* Threads for slices output a frame as soon as it is complete; threads for frames would delay some. */
         decoder->context->flags |= AV_CODEC_FLAG_LOW_DELAY;
         decoder->context->thread_type = FF_THREAD_SLICE;
         decoder->context->err_recognition = AV_EF_EXPLODE;
@@ -82,7 +83,7 @@ static bool to_pixels(struct decoder *decoder, struct pixmap *picture, struct fl
     return true;
 }
 
-/* The chroma of an H.264 stream is subsampled by 2: an odd edge may be one longer. */
+/* The chroma of an H.264 stream is subsampled by 2, so an odd edge may be longer by one. */
 static bool is_of_size(const AVFrame *decoded, const struct fl_frame *frame)
 {
     return (uint32_t)decoded->width - frame->width <= 1 && (uint32_t)decoded->height - frame->height <= 1;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* H.264 to pixels, by libavcodec. */
+/* Decoding of H.264 with libavcodec. */
 #ifndef FARLIGHT_VIEWER_VIEW_DECODE_H
 #define FARLIGHT_VIEWER_VIEW_DECODE_H
 
@@ -7,9 +7,9 @@
 
 struct decoder;
 
-/* NULL with *error set: there is no decoder. */
+/* Creates a decoder. NULL with *error set: there is none. */
 struct decoder *decoder_create(struct fl_error *error);
-/* One access unit. False: it cannot be decoded, and nothing after it before the next key frame. */
+/* Decodes an access unit. False: it is undecodable, and so are all units before the next key frame. */
 bool decoder_decode(struct decoder *decoder, const struct fl_frame *frame, struct pixmap *picture,
                     struct fl_error *error);
 void decoder_destroy(struct decoder *decoder);

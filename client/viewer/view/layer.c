@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Layers of hidden surfaces. */
 #include "layer.h"
 
 #include <stdlib.h>
@@ -11,7 +12,7 @@ void views_layer_finish(struct views_layer *layer)
     layer->depth = NULL;
 }
 
-/* Of so many pixels along a side, of which half of them cover one more where they are odd. */
+/* Index in a picture of half the size, rounded up, of the pixel that covers a pixel of the full size. */
 static int half_of(int pixel, int pixels)
 {
     const int half = (pixels + 1) / 2;

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+/* Decisions about views made in the client. */
 #include "plan.h"
 
 #include <math.h>
 
 /* ---- whether ---- */
 
-#define FAST_SHARE 0.6 /* of a display's frame: where no view is needed */
+#define FAST_SHARE 0.6 /* share of a display frame within which pictures are fast enough without views */
 #define FAST_NS UINT64_C(2000000000)
 
 bool plan_switch(struct plan_switch *plan, double round_s, uint64_t now_ns)
@@ -25,11 +26,13 @@ bool plan_switch(struct plan_switch *plan, double round_s, uint64_t now_ns)
 
 /* ---- of which camera ---- */
 
-#define VELOCITY_NS UINT64_C(100000000) /* over which it is measured: the pointer's steps are uneven */
+/* Time over which velocity is measured, since the pointer moves in uneven steps */
+#define VELOCITY_NS UINT64_C(100000000)
 #define AHEAD_MAX_NS UINT64_C(400000000)
 
-#define PACE_NS UINT64_C(66666667)         /* of pictures that are not known yet: what the daemon is asked for */
-#define PACE_PAUSE_NS UINT64_C(1000000000) /* without a picture: that was another motion */
+/* Interval of pictures assumed before the first two: the rate requested from the daemon */
+#define PACE_NS UINT64_C(66666667)
+#define PACE_PAUSE_NS UINT64_C(1000000000) /* a longer pause separates two motions */
 
 static void learn(uint64_t last_ns[2], uint64_t seen_ns)
 {
@@ -70,7 +73,7 @@ static size_t step_back(const struct plan_motion *motion, size_t back)
     return (motion->next + PLAN_STEPS - 1 - back) % PLAN_STEPS;
 }
 
-/* The newest one from before the time over which velocity is measured: there it was when that time began. */
+/* The newest step from before the measured time, which is the position at its beginning. */
 static size_t first_step(const struct plan_motion *motion, uint64_t now_ns)
 {
     size_t back = 0;
@@ -96,7 +99,7 @@ void plan_motion_predict(const struct plan_motion *motion, uint64_t now_ns, uint
         return;
     const struct viewer_camera *newest = &motion->steps[step_back(motion, 0)].camera;
     const size_t first = first_step(motion, now_ns);
-    /* Of two cameras at once the velocity is unknown: they are a frame apart. */
+    /* The interval between two simultaneous cameras counts as a display frame. */
     const uint64_t elapsed_ns = clamp(now_ns - motion->steps[first].at_ns, PLAN_FRAME_NS, VELOCITY_NS);
     const double share = (double)clamp(ahead_ns, 0, AHEAD_MAX_NS) / (double)elapsed_ns;
     const struct viewer_camera *before = &motion->steps[first].camera;
@@ -116,7 +119,7 @@ void plan_motion_predict(const struct plan_motion *motion, uint64_t now_ns, uint
 
 /* ---- in which quality ---- */
 
-#define SLOW_FRAMES 2 /* a hiccup is no reason, but one view of three frames is seen */
+#define SLOW_FRAMES 2 /* a single slow view is tolerated, but one as long as three frames is visible */
 #define PAUSE_MIN_NS UINT64_C(1000000000)
 #define PAUSE_MAX_NS UINT64_C(16000000000)
 

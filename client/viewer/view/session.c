@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The viewer's connection, scene and view. */
 #include "session.h"
 #include "options/retry.h"
 #include "options/watch.h"
@@ -17,33 +18,33 @@
 
 struct session {
     struct session_options options;
-    uint64_t number;    /* of this session, by chance */
-    char name[40];      /* of the next scene that we load */
-    char kept_name[40]; /* by which the one that we loaded is found again */
+    uint64_t number;    /* random number of this session */
+    char name[40];      /* name of the next scene that is loaded */
+    char kept_name[40]; /* name under which the loaded scene is found again */
     struct cli_watch watch;
     enum session_state state;
     unsigned times_live, times_read;
     struct fl_error error;
     uint64_t retry_ns, pause_ns;
-    uint64_t lost_ns; /* since when it is tried; 0: it is live */
+    uint64_t lost_ns; /* time since which it is retried; 0: it is live */
 
-    /* Of the thread while it runs, ours else. */
+    /* Owned by the thread while it runs, else by the caller's. */
     pthread_t thread;
-    bool has_thread, reads; /* `reads`: changed files, into the scene that is there */
-    atomic_bool opened;     /* the thread is at its end */
+    bool has_thread, reads; /* `reads`: the thread reloads changed files into the scene */
+    atomic_bool opened;     /* the thread has finished */
     struct fl_connection *connection;
     struct fl_scene *scene;
     bool is_read,
         is_other; /* changed files are in the scene; it is another one, in the place of one that is gone */
     struct fl_error open_error;
 
-    pthread_mutex_t lock; /* guards what follows */
+    pthread_mutex_t lock; /* guards the members below */
     char doing[160];
     double share;
-    char doing_copy[160]; /* as it was told last */
+    char doing_copy[160]; /* the last copy for the caller */
 
     struct fl_view *view;
-    uint64_t changes; /* of `view` */
+    uint64_t changes; /* number of changes of `view` */
     struct fl_job *job;
 };
 
@@ -72,7 +73,7 @@ static void on_note(void *user, const struct fl_note *note)
 static struct fl_load_options load_options(struct session *session)
 {
     const struct session_options *options = &session->options;
-    /* A private daemon ends with its connection, and its scenes with it. */
+    /* A private daemon's scenes end with its connection. */
     return (struct fl_load_options){.model = options->model,
                                     .models = options->models,
                                     .model_count = options->model_count,
@@ -106,8 +107,8 @@ static struct fl_scene *load(struct session *session, struct fl_error *error)
     return NULL;
 }
 
-/* A daemon that kept running still has the scene; a new one gets it again. */
-static struct fl_scene *come_to_scene(struct session *session, struct fl_error *error)
+/* Attaches again: a daemon that kept running still has the scene; a new one gets it again. */
+static struct fl_scene *attach(struct session *session, struct fl_error *error)
 {
     const struct session_options *options = &session->options;
     if (options->scene_name)
@@ -144,13 +145,12 @@ static void *open_all(void *argument)
     set_progress(session, options->server ? options->server : "starting a daemon", 0);
     session->connection = fl_connect(&connect, &session->open_error);
     if (session->connection)
-        session->scene = come_to_scene(session, &session->open_error);
+        session->scene = attach(session, &session->open_error);
     atomic_store(&session->opened, true);
     return NULL;
 }
 
-/* Only what changed, into the scene that is there, unless it must be another one; until that is there the old one
- * stays. */
+/* Reloads the changes into the scene, or loads another one if necessary; the old one stays until then. */
 static void *read_again(void *argument)
 {
     struct session *session = argument;
@@ -168,7 +168,7 @@ static void *read_again(void *argument)
     return NULL;
 }
 
-/* The next scene that is loaded is another one than those that were. */
+/* Chooses a name that no earlier scene had. */
 static void name_scene(struct session *session)
 {
     snprintf(session->name, sizeof(session->name), "view-%016" PRIx64, session->number++);
@@ -197,7 +197,7 @@ static void close_all(struct session *session)
     session->connection = NULL;
 }
 
-/* Where no daemon has answered yet, the address may be misspelt. */
+/* If no daemon has answered yet, the address may be misspelt. */
 static bool may_be_tried_again(const struct session *session, uint64_t now_ns)
 {
     const struct session_options *options = &session->options;
@@ -222,7 +222,7 @@ static void lose(struct session *session, const struct fl_error *error, uint64_t
     session->pause_ns = session->pause_ns < LONGEST_PAUSE_NS / 2 ? session->pause_ns * 2 : LONGEST_PAUSE_NS;
 }
 
-/* The view of the old scene ends with it. */
+/* Takes over another scene; the view of the old one ends with it. */
 static void take_other(struct session *session)
 {
     fl_render_destroy(session->job);
@@ -232,7 +232,7 @@ static void take_other(struct session *session)
     session->times_live++;
 }
 
-/* A file that cannot be read leaves everything as it was; edits that are refused leave what was read. */
+/* Finishes reloading. An unreadable file leaves everything unchanged; refused edits leave the new contents. */
 static bool end_reading(struct session *session)
 {
     const struct fl_error *error = &session->open_error;
@@ -251,7 +251,7 @@ static bool end_reading(struct session *session)
 
 static void end_opening(struct session *session, uint64_t now_ns)
 {
-    struct fl_error ignored; /* files beyond the memory are not watched */
+    struct fl_error ignored; /* files are not watched if memory is short */
     pthread_join(session->thread, NULL);
     session->has_thread = false;
     if (session->options.watch && session->scene)
@@ -320,7 +320,7 @@ struct session *session_create(const struct session_options *options, struct fl_
     return NULL;
 }
 
-/* Does not wait for a daemon that does not answer: the interruption descriptor is already readable. */
+/* Does not wait for a daemon that does not answer, since the interrupt descriptor is readable. */
 void session_destroy(struct session *session)
 {
     if (!session)
@@ -391,7 +391,7 @@ bool session_can_h264(const struct session *session)
     return fl_connection_can_h264(session->connection);
 }
 
-/* Whether a retry on another connection may help: always, unless this request was refused. */
+/* True if a retry on another connection may help: always, unless this request was refused. */
 static bool is_lost(const struct fl_error *error)
 {
     if (error->code == FL_ERROR_REFUSED)
@@ -419,7 +419,7 @@ bool session_show(struct session *session, const struct message_render *options,
     }
     if (session->view && error.code != FL_ERROR_REFUSED)
         return fail(session, &error, &ignored);
-    fl_view_destroy(session->view); /* it was refused from the beginning */
+    fl_view_destroy(session->view); /* the view was refused from the beginning */
     session->changes = *change = 0;
     session->view = fl_view_start(session->scene, options, &error);
     return session->view || fail(session, &error, &ignored);

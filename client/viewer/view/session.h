@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The connection to a daemon and a scene on it, opened in a thread of its own and again after a loss; and on it a
- * view and one job at a time. */
+/* The connection to a daemon and a scene on it, opened by a thread of its own, and again after a loss; and on
+ * it a view and one job at a time. */
 #ifndef FARLIGHT_VIEWER_VIEW_SESSION_H
 #define FARLIGHT_VIEWER_VIEW_SESSION_H
 
@@ -9,26 +9,27 @@
 struct session;
 
 struct session_options {
-    const char *server, *key_file;   /* as of fl_connect_options */
-    const char *model, *environment; /* that are loaded .. */
-    const struct fl_model *models;   /* several, as of fl_load_options */
+    const char *server, *key_file;   /* see fl_connect_options */
+    const char *model, *environment; /* files to load .. */
+    const struct fl_model *models;   /* several models, see fl_load_options */
     size_t model_count;
-    int input_fd; /* likewise */
+    int input_fd; /* see fl_load_options */
     double environment_degrees, point_size;
     bool without_studio;
     const char *variant;
-    const struct fl_assignment *edits; /* of what is loaded, each time */
+    const struct fl_assignment *edits; /* edits after each load */
     size_t edit_count;
-    const char *scene_name; /* .. or, not NULL, the scene to attach to */
-    bool watch;             /* the files are read again when they change */
-    /* How long a daemon is tried that is lost, or not there at first. Without has_retry_for: for ever, and not at
-     * all. */
+    const char *scene_name; /* .. or, if not NULL, the scene to attach to */
+    bool watch;             /* reloads files when they change */
+    /* Limit of retries for a daemon that is lost, or missing at first. Without has_retry_for: unlimited, or
+     * none. */
     bool has_retry_for;
     double retry_for_s;
-    unsigned lost_after_ms; /* as of fl_connect */
+    unsigned lost_after_ms; /* see fl_connect_options */
     int interrupt_fd;
-    void (*note)(void *user, const struct fl_note *note); /* of the first load; called from another thread */
-    /* Why changed files could not be loaded: the scene stays as it was. */
+    /* Notes of the first load; called from another thread */
+    void (*note)(void *user, const struct fl_note *note);
+    /* Reports that changed files could not be loaded; the scene is unchanged. */
     void (*stale)(void *user, const struct fl_error *error);
     void *user;
 };
@@ -36,48 +37,48 @@ struct session_options {
 enum session_state {
     SESSION_OPENING,
     SESSION_LIVE,
-    SESSION_LOST,  /* it is tried again in a while */
-    SESSION_FAILED /* it never was there, and will not be; or it was tried for as long as wanted */
+    SESSION_LOST,  /* will be retried */
+    SESSION_FAILED /* was never live, and will not be; or the time for retries is over */
 };
 
-/* The strings and lists must live until it is destroyed. */
+/* Creates a session; strings and lists must live until it is destroyed. */
 struct session *session_create(const struct session_options *options, struct fl_error *error);
-/* Advances the current state; never waits for long. */
+/* Advances the current state; never blocks for long. */
 enum session_state session_step(struct session *session, uint64_t now_ns);
-/* The number of times that it has become live: a new number means a new connection, or a new scene, of which
- * nothing is shown yet. */
+/* The number of times that the session has become live: a new number means a new connection or a new scene, of
+ * which nothing is shown yet. */
 unsigned session_times_live(const struct session *session);
-/* The number of times that changed files were read. It became live with that, too, if they are another scene; else
- * the scene is the same, and what it told of cameras and clips is not valid any more. */
+/* The number of times that changed files were read. If they became another scene, the session became live with
+ * it; else the scene is the same, and pointers to its cameras and clips are invalid. */
 unsigned session_times_read(const struct session *session);
-bool session_reads(const struct session *session);     /* that happens now, in a thread, which has the scene */
-bool session_has_scene(const struct session *session); /* also while it is read again */
-/* The current activity (valid until the next call) and its progress: 0 to 1, 0 also if it is not known. */
+bool session_reads(const struct session *session);     /* true while a thread reloads files and uses the scene */
+bool session_has_scene(const struct session *session); /* also true while it is reloaded */
+/* The current activity (valid until the next call) and its progress: 0 to 1, 0 also if unknown. */
 const char *session_progress(struct session *session, double *share);
-const struct fl_error *session_error(const struct session *session); /* why it was lost, or failed */
-uint64_t session_retry_ns(const struct session *session);            /* SESSION_LOST: when it is tried again */
+const struct fl_error *session_error(const struct session *session); /* reason of the loss or failure */
+uint64_t session_retry_ns(const struct session *session);            /* SESSION_LOST: time of the next attempt */
 void session_destroy(struct session *session);
 
 /* The functions below need SESSION_LIVE; the next step notices a connection that is lost meanwhile. */
-struct fl_scene *session_scene(struct session *session); /* NULL: in no other state there is one */
+struct fl_scene *session_scene(struct session *session); /* NULL in every other state */
 bool session_is_local(const struct session *session);
 bool session_can_h264(const struct session *session);
-/* Shows it from now on. *change is the number that its frames have in fl_frame.change. */
+/* Shows the picture with these options. *change is the number of its frames in fl_frame.change. */
 bool session_show(struct session *session, const struct message_render *options, uint64_t *change);
 bool session_look(struct session *session, const struct fl_view_camera *camera, uint64_t *command);
 void session_want_key_frame(struct session *session);
-void session_deliver_parts(struct session *session, bool deliver); /* as fl_view_deliver_parts */
+void session_deliver_parts(struct session *session, bool deliver); /* see fl_view_deliver_parts */
 /* The next frame; NULL: none within the time, or *refusal (code not NONE) says that the view or its last change
- * was refused. A view that was refused is shown no more. */
+ * was refused. A refused view is not shown any more. */
 struct fl_frame *session_next(struct session *session, unsigned timeout_ms, struct fl_error *refusal);
 
-/* Requests one frame beside the view and abandons the previous request. False: refused, or lost. */
+/* Requests a frame beside the view, and cancels the previous request. False: refused, or lost. */
 bool session_ask(struct session *session, const struct message_render *options, struct fl_error *refusal);
-/* Its frame once it has arrived. NULL with *refusal code NONE: not yet. */
+/* The requested frame once it has arrived. NULL with *refusal code NONE: not yet. */
 struct fl_frame *session_answer(struct session *session, struct fl_error *refusal);
-void session_give_up(struct session *session); /* what was asked for */
+void session_give_up(struct session *session); /* cancels the request */
 
-/* The scene's objects, as the functions of the library; they wait for the daemon. False: refused, or lost. */
+/* Call the library's functions for the scene's objects, and wait for the daemon. False: refused, or lost. */
 bool session_objects(struct session *session, enum protocol_object_kind kind, struct fl_object **objects,
                      size_t *count, struct fl_error *refusal);
 bool session_object(struct session *session, enum protocol_object_kind kind, uint32_t id, struct fl_object *object,

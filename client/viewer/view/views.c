@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Threads that make views. */
 #include "views.h"
 
 #include "layer.h"
@@ -15,48 +16,48 @@
 #include <time.h>
 #include <unistd.h>
 
-#define THREADS 2u /* that make a view: the decoder, the window and often the daemon want the others */
-#define KEY_NICE 5 /* of the thread that prepares keys: views are more urgent */
+#define THREADS 2u /* threads for a view: decoder, window and often the daemon need the other processors */
+#define KEY_NICE 5 /* niceness of the thread that prepares keys, since views are more urgent */
 #define SECOND_NS UINT64_C(1000000000)
-#define STILL_NS UINT64_C(80000000) /* without another wish: then there is time for a better view */
+#define STILL_NS UINT64_C(80000000) /* without another request for this time, a better view is made */
 
 struct views {
     pthread_t thread, key_thread;
-    pthread_mutex_t lock; /* guards what follows, up to the threads' own */
+    pthread_mutex_t lock; /* guards the members below, up to the threads' own */
     pthread_cond_t changed;
     bool quit;
-    struct views_key given; /* the newest that was not taken; no depth: there is none */
-    uint64_t keys;          /* that were given */
-    struct views_layer given_layers[FL_WARP_LAYERS_MAX - 1]; /* of the last one, that were not taken */
+    struct views_key given;                                  /* newest key that was not taken; no depth: none */
+    uint64_t keys;                                           /* number of given keys */
+    struct views_layer given_layers[FL_WARP_LAYERS_MAX - 1]; /* layers of the last key that were not taken */
     uint32_t given_layer_count;
-    bool is_adding;      /* one of them to the key .. */
-    uint32_t key_layers; /* .. that the thread has */
-    uint64_t first_key;  /* since which none is forgotten */
-    bool is_prepared;    /* `next` is to become `current` */
+    bool is_adding;      /* a layer is being added to the key .. */
+    uint32_t key_layers; /* .. whose number of layers in the thread this is */
+    uint64_t first_key;  /* first key that is not dropped */
+    bool is_prepared;    /* `next` shall become `current` */
     bool wants;
     struct views_wish wish;
-    atomic_uint_fast64_t wishes; /* number of `wish`; read without the lock, too */
+    atomic_uint_fast64_t wishes; /* number of `wish`; also read without the lock */
     uint64_t wished_ns;
-    uint64_t first_wish; /* since which some view was wanted all the time */
+    uint64_t first_wish; /* first request since which views have been wanted without a pause */
     struct pixmap made_picture;
     struct views_made made;
-    bool has_made; /* that was not taken */
+    bool has_made; /* a view is ready */
     struct fl_warp_error error;
 
-    struct warped_key next;    /* the key thread's own, unless it is prepared; its number is guarded */
-    struct warped_key current; /* the view thread's own, likewise */
+    struct warped_key next;    /* owned by the key thread, unless it is prepared; its number is guarded */
+    struct warped_key current; /* owned by the view thread; its number is guarded */
 
-    /* The view thread's own. */
-    uint64_t making;       /* number of the wish whose view is made */
-    struct pixmap picture; /* that is made */
+    /* The view thread's own members. */
+    uint64_t making;       /* number of the request that is being made */
+    struct pixmap picture; /* picture of the view */
     uint8_t *mask;
     size_t mask_bytes;
     struct views_made last;
     struct plan_rung rung;
-    uint64_t begun_ns; /* the last view */
+    uint64_t begun_ns; /* beginning of the last view */
 };
 
-/* With the lock. */
+/* Drops the layers that were not taken; needs the lock. */
 static void drop_layers(struct views *views)
 {
     while (views->given_layer_count > 0)
@@ -87,7 +88,7 @@ static bool is_overtaken(const void *context)
     return atomic_load(&views->wishes) != views->making;
 }
 
-/* `share` of all pixels. */
+/* Adds an eye's counts, which cover `share` of all pixels. */
 static void add_counts(struct fl_warp_counts *sum, const struct fl_warp_counts *of_eye, float share)
 {
     sum->known += share * of_eye->known;
@@ -100,7 +101,7 @@ static void add_counts(struct fl_warp_counts *sum, const struct fl_warp_counts *
     sum->processor_ns += of_eye->processor_ns;
 }
 
-/* One of `count` into its part of the picture. */
+/* Makes the view of one of `count` eyes in its part of the picture. */
 static bool make_eye(struct views *views, const struct views_wish *wish, unsigned eye, unsigned count,
                      struct fl_warp_view view, struct fl_warp_error *error)
 {
@@ -117,8 +118,8 @@ static bool make_eye(struct views *views, const struct views_wish *wish, unsigne
     return true;
 }
 
-/* Pixels along a side of the picture that is made for each that is wanted: more than the key's texels show
- * nothing. */
+/* Pixels of the made picture along a side for each requested one; more than the key's texels would show nothing
+ * more. */
 static double density_of(const struct views *views, const struct views_wish *wish, uint32_t eye_height)
 {
     const double of_key = views->current.height / tan((double)views->current.key.camera.fov_y / 2);
@@ -132,7 +133,7 @@ static uint32_t fewer(uint32_t pixels, double density)
     return made > 1 ? (uint32_t)made : 1;
 }
 
-/* As it is made. */
+/* The request with the size that is made. */
 static struct views_wish sized(const struct views *views, const struct views_wish *wish, unsigned eyes)
 {
     const uint32_t across = wish->over ? 1 : eyes, down = wish->over ? eyes : 1;
@@ -143,7 +144,7 @@ static struct views_wish sized(const struct views *views, const struct views_wis
     return made;
 }
 
-/* Into `picture` and `last`. `may_end`: it is given up when another one is wanted. */
+/* Makes a view in `picture` and `last`. `may_end`: it is cancelled for a newer request. */
 static bool make(struct views *views, const struct views_wish *wanted, enum fl_warp_quality quality, bool may_end,
                  struct fl_warp_error *error)
 {
@@ -185,7 +186,7 @@ static float distance(const struct fl_warp_camera *a, const struct fl_warp_camer
     return hypotf(hypotf(to[3] - from[3], to[7] - from[7]), to[11] - from[11]);
 }
 
-/* A picture of motion that was given is no better than what the last view was made of. */
+/* True if a new picture of motion is no better than the source of the last view. */
 static bool keeps_key(const struct views *views)
 {
     const struct views_key *key = &views->current.key;
@@ -195,7 +196,7 @@ static bool keeps_key(const struct views *views)
            views_unseen(&views->last) <= (float)PLAN_UNSEEN_LITTLE;
 }
 
-/* At rest the first picture of a camera and the last one are prepared, so that motion begins with a view. */
+/* At rest the first and the last picture of a camera are prepared, so that motion starts with a view. */
 static bool wants_key(const struct views *views)
 {
     if (!views->given.depth || (views->wants && keeps_key(views)))
@@ -221,7 +222,7 @@ static bool wants_view(const struct views *views)
            (!is_of_now(views, &views->last) || views->last.quality != FL_WARP_TREE);
 }
 
-/* A view in time is made again as well as possible, if no other is wanted for a while. */
+/* A view that was made in time is made again in the best quality, if no other is requested for a while. */
 static uint64_t due_ns(const struct views *views)
 {
     const uint64_t next_ns = views->begun_ns + views->wish.frame_ns, still_ns = views->wished_ns + STILL_NS;
@@ -285,7 +286,7 @@ static void take_wish(struct views *views)
     pthread_mutex_lock(&views->lock);
     if (error.code == FL_WARP_ERROR_GIVEN_UP)
         return;
-    /* What fails is not tried again before there is another key. */
+    /* After a failure nothing is made before there is another key. */
     views->current.number = done ? views->current.number : 0;
     if (!done) {
         views->error = error;
@@ -295,7 +296,7 @@ static void take_wish(struct views *views)
     views->last.camera = wish.camera;
     views->last.key = views->current.number;
     views->last.layers = views->key_layers;
-    pthread_cond_broadcast(&views->changed); /* its holes may be why another key is wanted */
+    pthread_cond_broadcast(&views->changed); /* holes of the view may be the reason to take another key */
     if (number < views->first_wish)          /* another motion's */
         return;
     pixmap_exchange(&views->made_picture, &views->picture);

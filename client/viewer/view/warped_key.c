@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Keys as structures for warping. */
 #include "warped_key.h"
 
 #include "layer.h"
@@ -6,7 +7,7 @@
 
 #include <stdlib.h>
 
-#define KEY_PIXELS 0.5f /* that planes may be off beside the rounding of depths: it is not seen in motion */
+#define KEY_PIXELS 0.5f /* additional error of planes, invisible in motion */
 
 void views_key_finish(struct views_key *key)
 {
@@ -17,14 +18,14 @@ void views_key_finish(struct views_key *key)
     key->sticking = NULL;
 }
 
-/* In place. */
+/* Inverts depths in place. */
 static void invert(float *depths, size_t count, float unit)
 {
     for (size_t i = 0; i < count; i++)
         depths[i] = depths[i] > 0 ? unit / depths[i] : 0;
 }
 
-/* Makes numbers of the order of one. */
+/* Scales numbers to the order of one. */
 static float unit_of(const struct views_key *key)
 {
     return key->radius / (float)PLAN_RADIUS_SHARE;
