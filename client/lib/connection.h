@@ -23,7 +23,7 @@ typedef int fl_take_fn(struct fl_receiver *receiver, const struct framing_header
                        const struct message *message, struct fl_error *error);
 /* A job, a view or a scene: messages may arrive for it at any time, also while another answer is awaited. */
 struct fl_receiver {
-    struct fl_receiver *next; /* of the connection's */
+    struct fl_receiver *next; /* next receiver of the same connection */
     fl_take_fn *take;
 };
 

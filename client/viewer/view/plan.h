@@ -44,7 +44,7 @@ struct plan_motion {
 
 void plan_motion_add(struct plan_motion *motion, const struct viewer_camera *camera, uint64_t at_ns);
 
-/* How the last two pictures of motion came. All zero at first. */
+/* Timing of the last two pictures of motion; initially zero. */
 struct plan_pace {
     /* From a camera to its picture, and from picture to picture; 0: unknown. Two values, because a single late
      * picture does not predict the next. */

@@ -34,8 +34,7 @@ struct session {
     atomic_bool opened;     /* the thread has finished */
     struct fl_connection *connection;
     struct fl_scene *scene;
-    bool is_read,
-        is_other; /* changed files are in the scene; it is another one, in the place of one that is gone */
+    bool is_read, is_other; /* changed files are in the scene; it replaces one that was lost */
     struct fl_error open_error;
 
     pthread_mutex_t lock; /* guards the members below */
