@@ -87,7 +87,7 @@ const struct field_desc *struct_field(const struct struct_desc *desc, const char
  * fit. */
 const char *field_allowed_text(const struct field_desc *field, char *out, size_t out_bytes);
 const char *field_default_text(const struct field_desc *field, char *out, size_t out_bytes); /* "1024", "auto" */
-/* true if an INT field may have this value */
+/* True if an INT field may have this value. */
 bool field_has_number(const struct field_desc *field, uint64_t value);
 /* The text of an enum's value; NULL: no such value. */
 const char *enum_desc_text(const struct enum_desc *desc, uint32_t number);

@@ -39,7 +39,7 @@ extern "C" {
 /* Bits of `capabilities`. */
 #define HANDSHAKE_CAN_H264 (UINT64_C(1) << 0)      /* client: decodes H.264; daemon: encodes it */
 #define HANDSHAKE_CAN_READ_ONLY (UINT64_C(1) << 1) /* reply: this client may view scenes but not edit them */
-/* reply of version 0: the daemon accepts sealed connections only */
+/* Reply of version 0: the daemon accepts sealed connections only. */
 #define HANDSHAKE_NEEDS_KEY (UINT64_C(1) << 2)
 #define HANDSHAKE_TRY_AGAIN (UINT64_C(1) << 4)   /* reply of version 0: the daemon may have a place later */
 #define HANDSHAKE_CAN_ABANDON (UINT64_C(1) << 3) /* frames of views may end unfinished, as frame_end says */

@@ -175,7 +175,7 @@ static int enter_landlock(const struct sandbox_options *options)
 /* ---- seccomp ---- */
 
 static const char *const allowed_calls[] = {
-    /* memory, threads, time */
+    /* Memory, threads, time. */
     "brk", "munmap", "mremap", "madvise", "futex", "set_robust_list", "rseq", "set_tid_address", "sched_yield",
     "sched_getaffinity", "getcpu", "clock_gettime", "clock_getres", "gettimeofday", "time", "nanosleep",
     "clock_nanosleep", "restart_syscall", "arch_prctl", "membarrier",
@@ -184,7 +184,7 @@ static const char *const allowed_calls[] = {
     "lstat", "statx", "open", "openat", "openat2", "access", "faccessat", "faccessat2", "readlink", "readlinkat",
     "getdents64", "dup", "poll", "ppoll", "sendto", "sendmsg", "recvfrom", "recvmsg", "shutdown", "fadvise64",
     "getcwd", "statfs", "fstatfs", "select", "pselect6",
-    /* the process itself */
+    /* The process itself. */
     "exit", "exit_group", "rt_sigprocmask", "rt_sigreturn", "sigaltstack", "getpid", "gettid", "getuid", "geteuid",
     "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage", "times", "getrlimit"};
 static const char *const write_calls[] = {"fsync", "fdatasync", "ftruncate", "fallocate", "fchmod", "umask"};

@@ -92,7 +92,7 @@ struct fl_connect_options {
     /* Silence after which the daemon counts as lost, though calls ping it: FL_ERROR_CONNECTION. A daemon answers
      * pings however long it renders. 0: 60 s. */
     unsigned lost_after_ms;
-    /* arguments of a private daemon, NULL-terminated, at most 28; NULL: none */
+    /* Arguments of a private daemon, NULL-terminated, at most 28; NULL: none. */
     const char *const *daemon_arguments;
 };
 
@@ -189,7 +189,7 @@ struct fl_load_options {
     int input_fd;             /* > 0: a file with the bytes of the model whose path is "-" */
     const char *input_format; /* the format of those bytes, such as "glb"; NULL: recognised by the first bytes */
     const char *environment;  /* equirectangular image file; NULL: none. Allowed without a model */
-    /* rotation of the environment about +y, -360 to 360; 0: its middle column is +x, as in glTF viewers */
+    /* Rotation of the environment about +y, -360 to 360; 0: its middle column is +x, as in glTF viewers. */
     double environment_degrees;
     double point_size;   /* diameter of points without faces, metres; 0: derived from their distances */
     unsigned timeout_ms; /* the importer is killed after this time; 0: 10 minutes */
@@ -510,8 +510,8 @@ struct fl_frame {
     size_t encoded_bytes;
     float *depth;     /* width * height, metres along the view; 0 where nothing is; NULL: none */
     float depth_step; /* 1 / depth was rounded to multiples of it, 1 / metres; 0: it was not */
-    /* depth comes from a frame's first parts: bilinear on one surface, the nearest surface's elsewhere, in
-     * blocks of 8 x 8 pixels */
+    /* Depth comes from a frame's first parts: bilinear on one surface, the nearest surface's elsewhere, in
+     * blocks of 8 x 8 pixels. */
     bool depth_is_coarse;
     float depth_error; /* 1 / depth is off by at most this, 1 / metres: half a step, or, where it is coarse, that
                           at the worst edge: it is no noise */
@@ -566,7 +566,7 @@ struct fl_view;
 enum fl_attachment { /* bits */
                      FL_ATTACH_DEPTH = 1 << PROTOCOL_ATTACHMENT_DEPTH,
                      FL_ATTACH_NORMALS = 1 << PROTOCOL_ATTACHMENT_NORMALS,
-                     /* daemons that do not know it leave it out */
+                     /* Daemons that do not know it leave it out. */
                      FL_ATTACH_STICKING = 1 << PROTOCOL_ATTACHMENT_STICKING
 };
 
@@ -639,9 +639,9 @@ struct fl_exporter_options {
     const char *model;       /* named in the files; may be NULL */
     float frames_per_second; /* named in EXR files; 0: unknown */
     int interrupt_fd;
-    /* the format of all files, as in fl_export_options: some formats start faster; NULL: any */
+    /* The format of all files, as in fl_export_options: some formats start faster; NULL: any. */
     const char *format;
-    /* date, times of stages and revision are written too; equal pictures then give different files */
+    /* Date, times of stages and revision are written too; equal pictures then give different files. */
     bool full_metadata;
     bool draws_text; /* pictures come with text */
     /* EXR: "key,fill": names of the layers light_group1 and so on; NULL: light_group1.. */
@@ -656,8 +656,8 @@ struct fl_exporter_options {
     const char *ocio;         /* the configuration of OpenColorIO, a file */
     struct {
         uint32_t x, y, width, height;
-        /* position of the frames in a picture of width x height, as EXR files record it; all 0: frames are whole
-         * pictures */
+        /* Position of the frames in a picture of width x height, as EXR files record it; all 0: frames are whole
+         * pictures. */
     } window;
 };
 /* A line of text, about 14 pixels high, in the middle of a box; the beginning of a text that is too long for
@@ -802,11 +802,11 @@ struct fl_comparison {
     uint64_t beyond;                              /* pixels beyond the threshold */
     bool has_errors;                              /* false: no pixel is finite, the next seven mean nothing */
     bool identical;                               /* no error at all, and no pixel that is not finite */
-    /* peak signal-to-noise ratio, 20 log10(1 / rms_error): the peak is white, 1, in both spaces; INFINITY
-     * without error */
+    /* Peak signal-to-noise ratio, 20 log10(1 / rms_error): the peak is white, 1, in both spaces; INFINITY
+     * without error. */
     double psnr_db;
-    /* the same ratio for red, green and blue as shown on a screen: linear files through the tone map and the
-     * sRGB curve, so that no highlight exceeds the peak */
+    /* The same ratio for red, green and blue as shown on a screen: linear files through the tone map and the
+     * sRGB curve, so that no highlight exceeds the peak. */
     double shown_psnr_db;
     double mean_error, rms_error, max_error;
     uint32_t max_error_x, max_error_y, max_error_channel; /* position from the top left; all count from 0 */

@@ -9,8 +9,8 @@
 
 enum fl_wiring {
     FL_WIRING_DESCRIPTOR, /* the socket is descriptor 3 ("--fd 3" comes first); output is recorded */
-    /* the socket is standard input and output; the program writes to our standard error and may ask the
-     * terminal for a passphrase */
+    /* The socket is standard input and output; the program writes to our standard error and may ask the
+     * terminal for a passphrase. */
     FL_WIRING_STANDARD,
 };
 
@@ -18,9 +18,9 @@ struct fl_process {
     pid_t pid;    /* 0: none */
     int input_fd; /* > 0: the program's standard input, set by the caller, who keeps it; 0: none */
     int talk_fd;  /* memory file with the program's standard output and error; -1: none */
-    /* set by the caller: the program's memory comes in huge pages, if the C library can do that */
+    /* Set by the caller: the program's memory comes in huge pages, if the C library can do that. */
     bool has_large_arrays;
-    /* set by the caller: the program gets all variables, as it reads no files of other people */
+    /* Set by the caller: the program gets all variables, as it reads no files of other people. */
     bool keeps_environment;
     char name[32];
 };

@@ -25,7 +25,7 @@ struct load {
     const struct fl_imported *before; /* the previous import's record; NULL: everything is new */
     struct message commit;            /* the commit, queued until missing objects are removed; type 0: none */
     size_t gone_cursor;
-    /* true if an object of `before` is missing; true if the load was given up unchanged */
+    /* True if an object of `before` is missing; true if the load was given up unchanged. */
     bool removes, abandoned;
 };
 

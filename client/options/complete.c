@@ -193,7 +193,7 @@ static bool complete_format(struct cli_job *job)
 static bool complete_outputs(struct cli_job *job, bool is_series)
 {
     if (job->output.path) {
-        /* standard output has no folder in which a finished file could replace it */
+        /* Standard output has no folder in which a finished file could replace it. */
         const char *path = strcmp(job->output.path, "/dev/stdout") == 0 ? "-" : job->output.path;
         job->output.list[0] = (struct cli_output){.path = path, .image = job->output.image};
         job->output.count = 1;

@@ -266,7 +266,7 @@ bool colour_convert(struct message_frame_begin *begin, uint8_t *pixels, char *re
     }
     if (!run.shows)
         return true;
-    // a byte is written only after the float at its place was read
+    // A byte is written only after the float at its place was read.
     std::transform(values, values + plane_values, pixels, byte_of);
     begin->format = PROTOCOL_PIXEL_FORMAT_RGBA8;
     return true;

@@ -15,7 +15,7 @@ struct serve_options {
     float frames_per_second;  /* metadata; 0: none */
     const char *light_groups; /* names of light groups; NULL: none */
     bool full_metadata, dwaa;
-    /* if set, the first answer says whether these colours exist, before any request */
+    /* If set, the first answer says whether these colours exist, before any request. */
     struct colour_wanted colour;
     struct image_window window;       /* window of EXR files */
     const struct compare_file *files; /* the only files that requests may compare or merge */

@@ -166,7 +166,7 @@ static bool begin_file(struct video_encoder *encoder, const struct video_source 
     av_dict_set(&encoder->format->metadata, "comment", comment, 0);
     /* Omits the time of day and random numbers, so that the same frames make the same file. */
     encoder->format->flags |= AVFMT_FLAG_BITEXACT;
-    /* the index comes first, so that a download can be played */
+    /* The index comes first, so that a download can be played. */
     if (strcmp(encoder->plan->container, "mp4") == 0)
         av_dict_set(&options, "movflags", "faststart+write_colr", 0);
     if (encoder->plan->pixels == VIDEO_RGBA || encoder->plan->pixels == VIDEO_PALETTE)

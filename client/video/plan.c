@@ -10,7 +10,7 @@
 
 #define DEFAULT_FACTOR 18 /* x264's constant rate factor: hardly distinguishable from the original */
 #define FACTOR_MAX 51
-/* hardly distinguishable, too; 95, as for pictures, makes files half as large again */
+/* Hardly distinguishable, too; 95, as for pictures, makes files half as large again. */
 #define DEFAULT_WEBP_QUALITY 90
 
 /* H.264 (ITU-T H.264, table A-1): level 6.2 allows 139,264 macroblocks of 16x16. */

@@ -226,7 +226,7 @@ static bool complete(struct command_line *line, struct fl_error *error)
                               .server = server,
                               .key_file = cli_key_file(server, job->daemon.key_file),
                               .scene = job->input.scene ? job->input.scene : cli_base_name(job->input.model),
-                              /* with a private daemon the sharing thread reports outages */
+                              /* With a private daemon the sharing thread reports outages. */
                               .outage = job->input.model ? NULL : &line->outage};
     line->gateway.interrupt_signal = cli_interrupt_signal;
     return true;

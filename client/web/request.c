@@ -55,7 +55,7 @@ static bool is_sound(const double eye[3], const double at[3], const double up[3]
     for (int i = 0; i < 3; i++) {
         if (!(fabs(eye[i]) <= PLACE_MAX && fabs(at[i]) <= PLACE_MAX && fabs(up[i]) <= PLACE_MAX))
             return false;
-        /* rounded to floats as in the message */
+        /* Rounded to floats as in the message. */
         into[i] = (double)(float)at[i] - (double)(float)eye[i];
         into_square += into[i] * into[i];
         up_square += up[i] * up[i];

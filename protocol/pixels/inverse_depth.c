@@ -7,7 +7,7 @@
 float inverse_depth_step(float pixels, float radius, uint32_t height, float fov_y)
 {
     const double pixels_a_radian = (double)height / (2.0 * tan((double)fov_y / 2.0));
-    /* the error is at most half of it */
+    /* The error is at most half of it. */
     return (float)(2.0 * (double)pixels / (pixels_a_radian * (double)radius));
 }
 

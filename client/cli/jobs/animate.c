@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* with fewer samples, edges of a turning model visibly creep */
+/* With fewer samples, edges of a turning model visibly creep. */
 #define TURNTABLE_SAMPLES 8u
 
 enum key {

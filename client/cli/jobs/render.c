@@ -16,7 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* enough for smooth edges and soft shadows; software GL renders 1280x720 pixels in some seconds */
+/* Enough for smooth edges and soft shadows; software GL renders 1280x720 pixels in some seconds. */
 #define STILL_SAMPLES 16u
 
 enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE, KEY_WATCH, KEY_PART, KEY_RESUME };

@@ -41,7 +41,7 @@ static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *lo
         const struct fl_clip_info *info = NULL;
         if (!fl_scene_find_clip(scene, clip->which, &use->clip, &info, error))
             return clip->line > 0 ? in_script(job, clip->line, "clips", error) : false;
-        /* the first rendered frame is at time 0 */
+        /* The first rendered frame is at time 0. */
         use->start_s = (float)((double)clip->start_s - job->clips.time_s);
         use->speed = clip->speed;
         use->loop = clip->loop ? 1 : 0;

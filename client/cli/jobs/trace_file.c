@@ -83,7 +83,7 @@ static void put_stages(struct cli_trace_file *file, const struct fl_frame *frame
     }
     for (size_t i = 0; i < frame->stage_count; i++) {
         const struct record_stage_time *span = &frame->stages[i];
-        /* a daemon's numbers are not trusted */
+        /* A daemon's numbers are not trusted. */
         if (span->start_ns > UINT64_MAX / 4 || span->duration_ns > UINT64_MAX / 4)
             continue;
         events[count++] = (struct trace_event){

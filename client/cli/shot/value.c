@@ -251,7 +251,7 @@ static bool read_angles(const struct shot_reader *reader, const struct shot_valu
         double maximum = 0;
         for (unsigned k = 0; k < 3 && i > 0; k++)
             maximum = fmax(maximum, fabs((double)degrees[i][k] - (double)degrees[i - 1][k]));
-        /* the fourth number holds the number of steps from the previous key */
+        /* The fourth number holds the number of steps from the previous key. */
         degrees[i][3] =
             keys->interpolation == PROTOCOL_INTERPOLATION_STEP ? 1 : (float)(floor(maximum / STEP_DEGREES) + 1);
         total += i > 0 ? (size_t)degrees[i][3] : 0;

@@ -46,7 +46,7 @@ double whiteness(const reader &r, const std::vector<light_place> &lights, const 
         double distance2 = 0;
         for (size_t c = 0; c < 3; c++)
             distance2 += std::pow(one.at[c] - (around.lower[c] + around.upper[c]) / 2, 2);
-        // a light within the scene counts as a quarter of its extent away
+        // A light within the scene counts as a quarter of its extent away.
         sum += light.type == "directional" ? light.intensity : light.intensity / std::max(distance2, extent2 / 16);
     }
     return sum / pi;

@@ -204,7 +204,7 @@ std::string one_line(std::string text)
     std::replace(text.begin(), text.end(), '\n', ' ');
     while (!text.empty() && text.back() == ' ')
         text.pop_back();
-    // a data URI is unreadable, so it is cut
+    // A data URI is unreadable, so it is cut.
     const size_t data = text.find("data:");
     if (data != std::string::npos && text.size() - data > 60)
         text = text.substr(0, data + 40) + "..";

@@ -28,7 +28,7 @@ template <typename work> bool run(import_scene *scene, const char *too_large, wo
     try {
         read();
     } catch (const failed &) {
-        // reported already
+        // Reported already.
     } catch (const std::bad_alloc &) {
         import_fail(scene, nullptr, "%s", too_large);
     } catch (const std::exception &exception) {

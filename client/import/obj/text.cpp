@@ -267,7 +267,7 @@ bool scan_lines(scan &s, const char *at, const char *end)
         if (!stop)
             stop = end;
         s.line++;
-        // a lone carriage return ends a line, too
+        // A lone carriage return ends a line, too.
         for (const char *part = at; part < stop;) {
             const char *part_end = static_cast<const char *>(memchr(part, '\r', size_t(stop - part)));
             if (!part_end)

@@ -221,7 +221,7 @@ bool compare_with_library(const struct library_host *host, const struct message_
 {
     try {
         struct comparison each = {*host, *wanted, *result, {}, {}, {}};
-        OIIO::attribute("threads", 0); // all processors, since nothing else runs meanwhile
+        OIIO::attribute("threads", 0); // uses all processors, since nothing else runs
         return read_picture(*host, *a, each.a, *result) && read_picture(*host, *b, each.b, *result) &&
                compare(each);
     } catch (const std::bad_alloc &) {

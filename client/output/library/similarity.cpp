@@ -83,7 +83,7 @@ bool similarity_butteraugli(const ImageBuf &a, const ImageBuf &b, struct buttera
 {
     constexpr int edge_min = 8; // the library returns 0 for smaller pictures
     constexpr size_t pixels_max = size_t(1)
-                                  // the library needs some 300 bytes a pixel and ends the program without them
+                                  // The library needs some 300 bytes a pixel and ends the program without them.
                                   << 24;
     const size_t width = static_cast<size_t>(a.spec().width), height = static_cast<size_t>(a.spec().height);
     if (a.spec().width < edge_min || a.spec().height < edge_min || width * height > pixels_max)

@@ -50,7 +50,7 @@ void outline_mark(const uint8_t *pixels, size_t pixel_count, enum outline_by by,
         float numbers[4];
         memcpy(numbers, pixels + i * sizeof(numbers), sizeof(numbers));
         const float number = numbers[by];
-        /* invalid identifiers match no object */
+        /* Invalid identifiers match no object. */
         const uint32_t id = numbers[3] > 0 && number >= 1 && number < 4294967296.0f ? (uint32_t)number : 0;
         if (id != last)
             is_last_meant = id != 0 && bsearch(&id, ids, count, sizeof(*ids), by_number);

@@ -46,7 +46,7 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
             begin_ns = span.begin_ns < begin_ns ? span.begin_ns : begin_ns;
             end_ns = span.end_ns > end_ns ? span.end_ns : end_ns;
         }
-        /* a pause between frames would waste space */
+        /* A pause between frames would waste space. */
         const struct metrics_frame *before = metrics_frame(metrics, back + 1);
         if (!frame || !before || (double)(begin_ns - (int64_t)before->shown_ns) > TIMELINE_MIN_NS * 4)
             break;
