@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Handles events of the user or a replay. */
+/* Actions of the user or of a replay: keys, clips, cameras and what is under the pointer. */
 #include "state.h"
 #include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <string.h>
 
-#define STEP_S (1.0 / 24) /* of a clip, by key */
+#define STEP_S (1.0 / 24) /* step of a clip by key */
 
 /* ---- keys ---- */
 
@@ -21,7 +21,7 @@ void viewer_choose_clip(struct viewer *viewer, int clip)
     view->eye.moved_ns = monotonic_now_ns();
 }
 
-/* Clips that hold nothing are passed over. */
+/* Skips clips that cannot be played. */
 static void next_clip(struct viewer *viewer, int step)
 {
     struct view *view = &viewer->view;
@@ -51,7 +51,7 @@ static void next_camera(struct viewer *viewer, int step)
     view->tasks.next = TASK_CAMERA;
 }
 
-/* Asks what is under the pointer. */
+/* Starts a query for what is under the pointer. */
 static void point(struct viewer *viewer, enum view_task task)
 {
     struct view *view = &viewer->view;
@@ -59,7 +59,8 @@ static void point(struct viewer *viewer, enum view_task task)
         return;
     view->tasks.x = viewer->screen.pointer_x / viewer->screen.width;
     view->tasks.y = viewer->screen.pointer_y / viewer->screen.height;
-    /* In the view that the pointer is in; what an eye sees there is about what is seen from between them. */
+    /* The pointer's place in the view that it is in. The query is rendered for one eye between both, which sees
+     * about the same there. */
     double *along = viewer->options->view.stereo_over ? &view->tasks.y : &view->tasks.x;
     if (view->settings.stereo)
         *along = 2 * *along - (*along < 0.5 ? 0 : 1);
@@ -87,7 +88,7 @@ static void screenshot(struct viewer *viewer)
         screen_say(&viewer->screen, "%s: %s", path, error.text);
 }
 
-/* What needs the scene. */
+/* Runs an action that needs the scene. */
 static void act_on_scene(struct viewer *viewer, enum action action)
 {
     struct view *view = &viewer->view;
@@ -148,7 +149,7 @@ static void act(struct viewer *viewer, enum action action)
     }
     view->told.must_show |= change == SETTINGS_VIEW;
     if (change == SETTINGS_VIEW)
-        view->refused[0] = '\0'; /* it may be possible now */
+        view->refused[0] = '\0'; /* the new settings may be possible */
     viewer->screen.must_draw = true;
     view->heat.is_there = view->heat.is_there && view->settings.error_map;
     if (action == ACTION_QUIT && view->settings.help)
@@ -205,7 +206,7 @@ void viewer_input(struct viewer *viewer, const struct input *input)
     if (!view->eye.has_camera ||
         !controls_input(&viewer->controls, input, viewer->screen.height, &view->eye.camera))
         return;
-    view->eye.glide_begin_ns = 0; /* a hand is stronger */
+    view->eye.glide_begin_ns = 0; /* input overrides a glide */
     view->eye.followed = 0;
     view->told.must_look = true;
     view->eye.moved_ns = monotonic_now_ns();
@@ -258,7 +259,7 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
     const struct editor *edit = &viewer->edit;
     while (viewer->replaying.next < viewer->replaying.events.count && view->failure.code == FL_ERROR_NONE) {
         const struct replay_event *event = &viewer->replaying.events.events[viewer->replaying.next];
-        /* What follows an edit or a change of files finds it made; but a drag goes on meanwhile. */
+        /* An event after an edit or a reload waits until that is done, but a drag goes on. */
         if (session_reads(view->session))
             return;
         if ((edit->works || edit->choice.has_pending) && !(edit->choice.dragging && event->kind == REPLAY_INPUT))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The viewer's outputs: picture and overlay, screenshots, its state as JSON. */
+/* Outputs of the viewer: picture and overlay, screenshots, and its state as JSON. */
 #include "viewer/overlay/paint.h"
 #include "viewer/overlay/snapshot.h"
 #include "state.h"
@@ -205,7 +205,7 @@ static json_t *local_json(const struct viewer *viewer, const struct hud_state *s
     return object;
 }
 
-/* What the panel shows. */
+/* The content of the panel. */
 static json_t *edit_json(const struct editor *edit)
 {
     const struct fl_object_state *state = &edit->state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Opens scenes: that of the command line, and the file that is dropped on the window. The shown scene stays until
- * the other one is there. */
+/* Opening of scenes: from the command line, or a file dropped on the window. The present scene stays until the
+ * new one is ready. */
 #include "state.h"
 #include "options/talk.h"
 #include "lib/importer.h"
@@ -73,7 +73,7 @@ void viewer_open(struct viewer *viewer, const char *path)
     screen_say(&viewer->screen, "%s", line);
 }
 
-/* Cameras, clips and nodes that the command line names are of its model. */
+/* Forgets cameras, clips and nodes named on the command line: they belong to its model. */
 static void forget_scene(struct viewer *viewer)
 {
     struct view *view = &viewer->view;
@@ -104,7 +104,7 @@ static void replace(struct viewer *viewer)
     view->is_dropped = true;
     viewer->opening.session = NULL;
     viewer->opening.model = NULL;
-    viewer->screen.notice_ns = 0; /* that it is being opened */
+    viewer->screen.notice_ns = 0; /* ends the notice that it is being opened */
     forget_scene(viewer);
     if (viewer->screen.window)
         window_set_title(viewer->screen.window, viewer_scene_name(viewer));

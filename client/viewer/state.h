@@ -12,24 +12,24 @@ struct viewer {
     struct screen screen;
     struct view view;
     struct editor edit;
-    struct settings first; /* as they were at first */
+    struct settings first; /* initial settings */
     struct controls controls;
-    unsigned times_live; /* of the session, as of when its view was started */
-    unsigned times_read; /* likewise; what is known of cameras and clips is as of then */
-    char *model;         /* that was dropped, and is shown; NULL: that of the options */
+    unsigned times_live; /* session_times_live() when the view was started */
+    unsigned times_read; /* session_times_read() when cameras and clips were last read */
+    char *model;         /* path of a dropped model that is shown; NULL: the command line's model */
     struct {
-        struct session *session; /* that of a dropped model, until it is there; NULL: there is none */
-        char *model;             /* its path */
+        struct session *session; /* session of a dropped model until it is ready; NULL: none */
+        char *model;             /* path of that model */
     } opening;
     struct {
         struct replay events;
         size_t next;
-        uint64_t ns;       /* since when the next event is looked at */
-        uint64_t revision; /* of the scene, after the last event */
+        uint64_t ns;       /* time from which the next event's delay counts */
+        uint64_t revision; /* revision of the scene after the last event */
         struct viewer_shot {
             const char *path;
             struct pixmap picture;
-        } * shots; /* screenshots that are not written yet */
+        } * shots; /* screenshots not yet written */
         size_t shot_count;
     } replaying;
     unsigned screenshots;
@@ -39,10 +39,10 @@ struct viewer {
 
 /* ---- open.c ---- */
 
-/* Of a dropped model, whose path must live as long, or NULL: of the command line's. */
+/* Creates the session of a dropped model, whose path must outlive it, or of the command line's model (NULL). */
 struct session *viewer_open_session(struct viewer *viewer, const char *dropped, struct fl_error *error);
 const char *viewer_scene_name(const struct viewer *viewer);
-/* Begins to open a model in place of the one that is shown. */
+/* Begins to open a model that replaces the present one. */
 void viewer_open(struct viewer *viewer, const char *path);
 void viewer_step_opening(struct viewer *viewer, uint64_t now_ns);
 void viewer_abandon_opening(struct viewer *viewer);
@@ -51,17 +51,17 @@ void viewer_abandon_opening(struct viewer *viewer);
 
 void viewer_input(struct viewer *viewer, const struct input *input);
 void viewer_replay(struct viewer *viewer, uint64_t now_ns);
-/* Chooses a clip of the scene, TOUR_NONE: none. */
+/* Chooses a clip of the scene. TOUR_NONE: none. */
 void viewer_choose_clip(struct viewer *viewer, int clip);
 
 /* ---- draw.c ---- */
 
 void viewer_hud(struct viewer *viewer, struct hud_state *state);
 bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
-/* One that is written before the next state or wait, so that a replay goes on in time. The path must live until
- * then. */
+/* Takes a screenshot and writes it before the next state or wait, so that a replay keeps its timing. The path
+ * must live until then. */
 bool viewer_keep_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
-/* Of those that are kept; frees them. */
+/* Writes the screenshots that are kept, and frees them. */
 bool viewer_write_screenshots(struct viewer *viewer, struct fl_error *error);
 void viewer_print_state(struct viewer *viewer, const char *name);
 

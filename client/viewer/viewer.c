@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The viewer's loop: it opens the window and the session, then handles input, frames and reloads until it ends. */
 #include "viewer.h"
 #include "state.h"
 #include "options/complete.h"
@@ -14,14 +15,14 @@
 #include <time.h>
 #include <unistd.h>
 
-#define BUSY_WAIT_MS 2u /* while the user is active; frames end the wait, input does not */
+#define BUSY_WAIT_MS 2u /* while the user is active; a frame ends the wait, input does not */
 #define IDLE_WAIT_MS 8u
 #define BUSY_NS 1000000000ull
-#define REDRAW_NS 250000000ull /* figures go on while no frame comes */
+#define REDRAW_NS 250000000ull /* the overlay's figures are redrawn even without frames */
 
 /* ---- a scene that has become live ---- */
 
-/* What the command line names can be looked up now. */
+/* Resolves the names on the command line, now that the scene is known. */
 static bool settle(struct viewer *viewer, struct fl_error *error)
 {
     struct view *view = &viewer->view;
@@ -31,7 +32,7 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
     uint32_t clip = 0;
     tour_begin(&view->eye.tour, fl_scene_camera_count(scene), fl_scene_clip_count(scene));
     view->eye.tour.speed = options->speed;
-    if (viewer->model) /* what the command line names is of its own */
+    if (viewer->model) /* the names on the command line belong to another model */
         return cli_find_camera(job, NULL, NULL, options->has_framing, scene, error);
     if (!cli_find_camera(job, options->camera, options->framed, options->has_framing, scene, error))
         return false;
@@ -61,7 +62,8 @@ static int clip_of_name(const struct fl_scene *scene, const char *name)
     return TOUR_NONE;
 }
 
-/* A model that was loaded again may have other cameras and clips; where there are as many, names may be new. */
+/* Adapts the tour to a model that was loaded again: numbers of cameras and clips may have changed, or just
+ * their names. */
 static void fit_tour(struct viewer *viewer)
 {
     struct view *view = &viewer->view;
@@ -82,7 +84,7 @@ static void fit_tour(struct viewer *viewer)
         tour_set_duration(tour, (double)fl_scene_clip(scene, (size_t)tour->clip)->duration_s);
 }
 
-/* Of the scene that is shown: the view goes on. */
+/* Handles changed files of the scene that is shown; the view stays. */
 static void take_changes(struct viewer *viewer)
 {
     const struct fl_import_stats *stats = fl_scene_import_stats(session_scene(viewer->view.session));
@@ -113,7 +115,7 @@ static void begin_showing(struct viewer *viewer)
 
 /* ---- the loop ---- */
 
-/* What moves by itself. */
+/* Advances what moves without input: the tour and glides. */
 static void tick(struct viewer *viewer, uint64_t now_ns)
 {
     struct view *view = &viewer->view;
@@ -135,7 +137,7 @@ static void take_input(struct viewer *viewer, uint64_t now_ns)
 {
     struct input input;
     while (viewer->screen.window && window_poll(viewer->screen.window, &input))
-        /* During a replay all input but the window's closing is ignored. */
+        /* A replay ignores all input except closing the window. */
         if (!viewer->options->replay || input.kind == INPUT_QUIT || input.kind == INPUT_RESIZE)
             viewer_input(viewer, &input);
     if (viewer->options->replay)
@@ -157,7 +159,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
         return;
     }
     if (state != SESSION_LIVE) {
-        poll(NULL, 0, (int)wait_ms); /* views are made of what is there */
+        poll(NULL, 0, (int)wait_ms); /* views are still made from the last key */
         return;
     }
     if (viewer->times_live != session_times_live(view->session))
@@ -230,13 +232,13 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
             return false;
         window_size(viewer->screen.window, &viewer->screen.width, &viewer->screen.height, &viewer->screen.scale);
     }
-    /* Only after the window is open: SDL starts programs of the desktop, whose pipes a daemon that is started
-     * meanwhile must not inherit. */
+    /* The window is opened first: SDL starts programs of the desktop, and a daemon started meanwhile must not
+     * inherit their pipes. */
     viewer->view.session = viewer->edit.session = viewer_open_session(viewer, NULL, error);
     return viewer->view.session != NULL;
 }
 
-/* That it cannot be remembered is no failure of what was shown. */
+/* Saves settings and window place. Failing to save does not fail the viewer. */
 static void remember(const struct viewer *viewer)
 {
     const struct viewer_options *options = viewer->options;
@@ -255,7 +257,7 @@ static void remember(const struct viewer *viewer)
         recall.y = place.y;
     }
     recall.full_screen = place.full_screen;
-    /* A size from the command line is for once. */
+    /* A size from the command line is not saved. */
     if (!place.full_screen &&
         (place.width != (int)options->view.render.width || place.height != (int)options->view.render.height)) {
         recall.width = place.width;
@@ -268,16 +270,16 @@ static void remember(const struct viewer *viewer)
 static void close_viewer(struct viewer *viewer)
 {
     const uint64_t one = 1;
-    /* A connection that the other thread is still opening is abandoned. */
+    /* Abandons a connection that the other thread is still opening. */
     if (write(viewer->options->interrupt_fd, &one, sizeof(one)) < 0)
-        errno = 0; /* it is readable already */
+        errno = 0; /* the descriptor is readable already */
     window_destroy(viewer->screen.window);
     viewer_abandon_opening(viewer);
     editor_works(&viewer->edit, true);
     view_finish(&viewer->view);
     editor_forget(&viewer->edit);
     free(viewer->model);
-    viewer_write_screenshots(viewer, &(struct fl_error){0}); /* those that were taken before it failed */
+    viewer_write_screenshots(viewer, &(struct fl_error){0}); /* screenshots taken before a failure */
     replay_finish(&viewer->replaying.events);
 }
 

@@ -82,9 +82,8 @@ bool similarity_ssim(const ImageBuf &a, const ImageBuf &b, float &ssim)
 bool similarity_butteraugli(const ImageBuf &a, const ImageBuf &b, struct butteraugli &found)
 {
     constexpr int edge_min = 8; // the library returns 0 for smaller pictures
-    constexpr size_t pixels_max = size_t(1)
-                                  // The library needs some 300 bytes a pixel and ends the program without them.
-                                  << 24;
+    // The library needs some 300 bytes a pixel and ends the program without them.
+    constexpr size_t pixels_max = size_t(1) << 24;
     const size_t width = static_cast<size_t>(a.spec().width), height = static_cast<size_t>(a.spec().height);
     if (a.spec().width < edge_min || a.spec().height < edge_min || width * height > pixels_max)
         return false;

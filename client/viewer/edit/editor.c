@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Edits the scene: the object that was picked, its fields in a panel, and their changes to the daemon. What others
- * change is read again. */
+/* Editing of the scene: the picked object, its fields in a panel, their changes sent to the daemon, and changes
+ * that other clients make. */
 #include "editor.h"
 #include "protocol/common/clock.h"
 
@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define APPLY_PAUSE_NS 40000000ull /* between changes of a drag: the newest counts */
-#define READ_PAUSE_NS 200000000ull /* between looks at what others change */
-#define METRES_OF_EXTENT 0.01      /* a step of a length */
+#define APPLY_PAUSE_NS 40000000ull /* between changes sent in a drag; the newest value wins */
+#define READ_PAUSE_NS 200000000ull /* between checks for other clients' changes */
+#define METRES_OF_EXTENT 0.01      /* step of a length as a share of the scene's extent */
 
 static const enum protocol_object_kind kinds[EDIT_TABS] = {PROTOCOL_OBJECT_NODE, PROTOCOL_OBJECT_MATERIAL,
                                                            PROTOCOL_OBJECT_LIGHT, PROTOCOL_OBJECT_ENVIRONMENT};
@@ -18,7 +18,7 @@ static const char *const tab_names[EDIT_TABS] = {"node", "material", "light", "e
 
 static void say(struct editor *edit, const struct fl_error *refusal)
 {
-    if (refusal->code != FL_ERROR_NONE) /* else the connection is lost */
+    if (refusal->code != FL_ERROR_NONE) /* otherwise the connection is lost */
         screen_say(edit->screen, "not possible: %s", refusal->text);
 }
 
@@ -50,7 +50,7 @@ static size_t index_of(const struct editor *edit)
     return 0;
 }
 
-/* Whether colours are a display's values, which the environment says. */
+/* Asks whether colours are display values, a setting of the environment. */
 static void ask_for_colours(struct editor *edit)
 {
     struct fl_error refusal = {0};
@@ -62,7 +62,7 @@ static void ask_for_colours(struct editor *edit)
             edit->has_display_values = edit->state.fields[i].values[0] > 0;
 }
 
-/* A length that is a step in the scene. */
+/* Chooses the step of a length by the scene's size. */
 static void measure(struct editor *edit)
 {
     struct fl_scene_bounds bounds;
@@ -88,7 +88,7 @@ static void read_object(struct editor *edit)
         edit->chosen = 0;
     if (id == 0 || edit->has_state || refusal.code == FL_ERROR_NONE)
         return;
-    say(edit, &refusal); /* another client has removed it */
+    say(edit, &refusal); /* another client has removed the object */
     edit->choice.ids[edit->choice.tab] = 0;
 }
 
@@ -107,7 +107,7 @@ void editor_choose_tab(struct editor *edit, size_t tab)
     edit->chosen = 0;
     forget_objects(edit);
     ask_for_colours(edit);
-    /* What cannot be picked: the first one is there to begin with. */
+    /* Objects of these tabs cannot be picked, so the first one is chosen initially. */
     if (edit->choice.tab >= EDIT_LIGHT && edit->choice.ids[edit->choice.tab] == 0 && list_objects(edit) &&
         edit->object_count > 0)
         edit->choice.ids[edit->choice.tab] = edit->objects[0].id;
@@ -152,7 +152,7 @@ void editor_forget(struct editor *edit)
 
 /* ---- another object ---- */
 
-/* Up the hierarchy, and back down to what was picked. */
+/* Moves the choice up the hierarchy, or back down towards the picked node. */
 static void choose_node(struct editor *edit, bool up)
 {
     struct fl_error refusal = {0};
@@ -185,7 +185,7 @@ static void choose_object(struct editor *edit, int step)
     read_object(edit);
 }
 
-/* A light is moved by the node that shows it. */
+/* Chooses the node of a light, since that node moves it. */
 void editor_choose_node_of_light(struct editor *edit)
 {
     struct fl_error refusal = {0};
@@ -214,7 +214,7 @@ static void *work(void *argument)
     return NULL;
 }
 
-/* Takes the list over. */
+/* Takes ownership of the change's list. */
 static void begin_work(struct editor *edit, enum edit_way way, struct edit_change change)
 {
     edit->applied_ns = monotonic_now_ns();
@@ -345,7 +345,7 @@ const struct hud_edit *editor_hud(struct editor *edit)
     *hud = (struct hud_edit){.shown = edit->choice.shown, .tab = edit->choice.tab, .chosen = edit->chosen};
     memcpy(hud->tabs, tab_names, sizeof(hud->tabs));
     hud->hint = "Ctrl + click on it";
-    /* Of what cannot be picked the first one is chosen, if there is one. */
+    /* Objects of these tabs cannot be picked: the first one is chosen, if any. */
     if (edit->choice.tab >= EDIT_LIGHT && edit->choice.ids[edit->choice.tab] == 0) {
         snprintf(hud->title, sizeof(hud->title), "the scene has no %s", tab_names[edit->choice.tab]);
         hud->hint = edit->choice.tab == EDIT_LIGHT ? "Tab: the environment, which lights it" : "";

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The object that is edited in the window: its panel, its changes, and what undoes them. */
+/* Editor of the window: the chosen object, its panel, its changes, and their history. */
 #ifndef FARLIGHT_VIEWER_EDIT_EDITOR_H
 #define FARLIGHT_VIEWER_EDIT_EDITOR_H
 
@@ -13,34 +13,34 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#define EDIT_ROWS_MAX (HUD_EDIT_ROWS_MAX - 1) /* the first says which object it is */
+#define EDIT_ROWS_MAX (HUD_EDIT_ROWS_MAX - 1) /* the first row shows the object's name */
 
-/* The screen and the session are the owner's. */
+/* State of the editor, which owns neither the screen nor the session. */
 struct editor {
     struct screen *screen;
     struct session *session; /* the shown one */
     struct edit_choice choice;
-    uint32_t picked;           /* node; that of the choice is it, or one above it */
-    struct fl_object *objects; /* of the tab's kind; NULL: not asked for yet */
+    uint32_t picked;           /* picked node: the chosen node or a descendant of it */
+    struct fl_object *objects; /* objects of the tab's kind; NULL: not fetched yet */
     size_t object_count;
     bool has_state;
-    bool has_display_values; /* colours are a display's */
+    bool has_display_values; /* colours are display values */
     struct fl_object_state state;
     struct edit_row rows[EDIT_ROWS_MAX];
     size_t row_count, chosen; /* 0: which object; else a row counted from 1 */
-    double metre;             /* a step of a length */
+    double metre;             /* step of a length */
     uint64_t read_ns, applied_ns;
 
     bool typing;
     char typed[24];
-    /* The chosen row is dragged, on its slider or from a value on. */
-    bool slides, drag_is_noted; /* the history has what undoes the drag */
+    /* The chosen row is being dragged, on its slider or starting at a value. */
+    bool slides, drag_is_noted; /* the history has the undo of this drag */
     double drag_x, drag_from;
-    double pending;     /* a value that the daemon is not told yet .. */
-    size_t pending_row; /* .. and its row, counted from 0 */
+    double pending;     /* value not yet sent to the daemon */
+    size_t pending_row; /* row of that value, counted from 0 */
 
-    /* What the daemon is told of in a thread, as an edit waits for the frame that is being made: until it is done
-     * the connection is the thread's. */
+    /* Change being sent to the daemon. A thread sends it, since an edit waits for the frame in progress. The
+     * thread has the connection until `done`. */
     bool works;
     struct edit_work {
         pthread_t thread;
@@ -57,28 +57,29 @@ struct editor {
 
 /* Shows the object in the panel. */
 void editor_show(struct editor *edit, uint32_t node, uint32_t material);
-void editor_toggle(struct editor *edit); /* the panel */
+void editor_toggle(struct editor *edit); /* Shows or hides the panel. */
 void editor_undo(struct editor *edit, bool redo);
-/* True: the input was meant for the panel. Not while the help hides it. */
+/* Returns true if the panel consumed the input, never while the help hides it. */
 bool editor_input(struct editor *edit, const struct input *input);
 void editor_step(struct editor *edit, uint64_t now_ns);
-/* Whether the connection is in use by an edit; `wait`: until it is not. */
+/* Returns whether an edit is using the connection. With `wait`, waits until none is. */
 bool editor_works(struct editor *edit, bool wait);
-bool editor_must_wait(const struct editor *edit); /* it is in use by that, or by a file that is read again */
-void editor_forget(struct editor *edit);          /* of a scene that is gone */
-/* Its files have changed: they are the same scene, or another one, of which nothing is chosen yet. */
+bool editor_must_wait(const struct editor *edit); /* an edit or a reload of files is using the connection */
+void editor_forget(struct editor *edit);          /* forgets everything about the previous scene */
+/* Reads the object again after the scene's files have changed. Unless `is_same`, it is another scene and
+ * nothing is chosen. */
 void editor_read_again(struct editor *edit, bool is_same);
 const struct hud_edit *editor_hud(struct editor *edit);
 
-/* ---- from input to it: nothing happens while it must wait ---- */
+/* ---- called by editor_input.c; ignored while editor_must_wait() ---- */
 
 void editor_choose_tab(struct editor *edit, size_t tab);
 void editor_choose_node_of_light(struct editor *edit);
-/* The chosen row, by so many steps; in the first one another object. */
+/* Changes the chosen row by this number of steps. The first row steps through the objects. */
 void editor_turn(struct editor *edit, double steps);
-/* A row counted from 0 gets a value. `more`: of a drag, which is undone as one change. */
+/* Sets the value of a row, counted from 0. `more`: the change continues a drag, which is undone as one change. */
 void editor_apply(struct editor *edit, size_t row, double value, bool more);
 void editor_stop_typing(struct editor *edit);
-bool editor_has_field(const struct editor *edit); /* the chosen row is one */
+bool editor_has_field(const struct editor *edit); /* the chosen row is a field */
 
 #endif

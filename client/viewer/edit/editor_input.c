@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Mouse and keys in the panel in which an object is edited. */
+/* Mouse and keyboard input of the edit panel. */
 #include "editor.h"
 
 #include <string.h>
 
-#define FINE 0.1 /* of a step, with Shift */
+#define FINE 0.1 /* scale of a step with Shift */
 
 static bool has_number(const struct editor *edit)
 {
@@ -41,7 +41,7 @@ static bool press(struct editor *edit, const struct input *input)
     struct hud_edit_hit hit;
     hud_edit_find(editor_hud(edit), edit->screen->width, edit->screen->height, edit->screen->scale, input->x,
                   input->y, &hit);
-    /* What begins must wait until the daemon has the last change. */
+    /* A new action waits until the daemon has received the last change. */
     if (!hit.is_panel || input->button != INPUT_LEFT || editor_must_wait(edit) || edit->choice.has_pending)
         return hit.is_panel;
     editor_stop_typing(edit);
@@ -64,7 +64,7 @@ static bool press(struct editor *edit, const struct input *input)
     return true;
 }
 
-/* A number begins by itself: signs and dots are keys of something else. */
+/* Starts typing with a digit only: signs and dots are keys of other actions. */
 static bool take_text(struct editor *edit, const char *text)
 {
     const char c = text[0] == ',' ? '.' : text[0];
@@ -133,7 +133,7 @@ bool editor_input(struct editor *edit, const struct input *input)
             slide_to(edit, input->x);
         return edit->choice.dragging;
     case INPUT_BUTTON_UP:
-        edit->choice.dragging = false; /* the last value of it may be pending */
+        edit->choice.dragging = false; /* the drag's last value may still be pending */
         return false;
     case INPUT_WHEEL:
         if (!is_on_panel(edit, edit->screen->pointer_x, edit->screen->pointer_y))

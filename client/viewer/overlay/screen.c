@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Notices on the screen. */
 #include "screen.h"
 #include "protocol/common/clock.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is drawn on: the window or, without one, a picture of its size, and a notice over it. */
+/* Screen: the window or, without one, a picture of its size, and a notice over it. */
 #ifndef FARLIGHT_VIEWER_OVERLAY_SCREEN_H
 #define FARLIGHT_VIEWER_OVERLAY_SCREEN_H
 
@@ -9,12 +9,12 @@
 struct screen {
     struct window *window; /* NULL: headless */
     int width, height;     /* pixels */
-    double scale;          /* pixels in one of the desktop's */
+    double scale;          /* pixels per pixel of the desktop */
     double pointer_x, pointer_y;
     bool must_draw;
     uint64_t drawn_ns;
     char notice[HUD_TEXT_MAX];
-    uint64_t notice_ns; /* until then */
+    uint64_t notice_ns; /* time until which the notice is shown */
 };
 
 /* Shows a notice for a while. */

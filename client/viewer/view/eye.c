@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Camera of the view: jumps, glides, and the camera of the scene that it follows. */
 #include "eye.h"
 #include "view.h"
 #include "protocol/common/clock.h"

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Views warped locally while the camera moves: requests of key frames, and the choice of the picture that is
+ * shown. */
 #include "local.h"
 #include "view.h"
 #include "protocol/common/clock.h"
@@ -6,21 +8,22 @@
 #include <math.h>
 #include <string.h>
 
-#define MARGIN 0.1f        /* share of the picture's edges on each side */
-#define DEPTH_PIXELS 0.25f /* that the rounding of depths may move what an eye within the radius sees */
-#define HIDDEN_LAYERS                                                                                             \
-    1 /* has most of what eyes see past edges: of a class room two thirds, a second one a tenth */
-#define RADIUS_FACTOR 4 /* another distance of what is looked at is another radius, if it is so much */
-#define ROUNDS_MIN 3u   /* frames before it is decided: the first ones are of structures that are built */
-/* Between the daemon's camera and the same one here, both in floats: less than a hundredth of a pixel. */
+#define MARGIN 0.1f        /* added at each side, as a share of the picture's edge */
+#define DEPTH_PIXELS 0.25f /* largest error in pixels, due to rounded depths, for eyes within the radius */
+/* The first layer holds most surfaces that appear behind edges: two thirds in a class room. A second one adds a
+ * tenth. */
+#define HIDDEN_LAYERS 1
+#define RADIUS_FACTOR 4 /* change of the distance to the subject that needs another radius */
+#define ROUNDS_MIN 3u   /* frames before the decision; the first ones build acceleration structures */
+/* Difference in floats between the daemon's camera and the same one here: less than a hundredth of a pixel. */
 #define SAME 1e-5
 
-/* ---- whether ---- */
+/* ---- conditions ---- */
 
 bool view_has_local(const struct view *view)
 {
     const enum local_views mode = view->settings.local;
-    /* Where a clip moves the camera, only the daemon knows where it is. */
+    /* The daemon alone knows the camera's place when a clip moves it. */
     return (mode == LOCAL_ON || (mode == LOCAL_AUTO && view->local.switched.on)) && !view_follows(view);
 }
 
@@ -30,7 +33,7 @@ void view_plan_local(struct view *view, uint64_t now_ns)
     metrics_summarise(&view->frames.metrics, now_ns, &summary);
     if (view->frames.last.moving)
         plan_pace_add(&view->local.pace, view->frames.last.command_sent_ns, now_ns);
-    if (view->frames.count == 1) /* else the first drag would find no picture to make views from */
+    if (view->frames.count == 1) /* a first key, so that the first drag has a picture to warp */
         view->local.switched.on = true;
     else if (summary.round_frames >= ROUNDS_MIN)
         plan_switch(&view->local.switched, summary.round_s, now_ns);
@@ -38,7 +41,7 @@ void view_plan_local(struct view *view, uint64_t now_ns)
 
 /* ---- what the daemon is asked for ---- */
 
-/* Between both eyes; 0: there is one. */
+/* Returns the distance between both eyes; 0: one view. */
 static float baseline_of(const struct view *view)
 {
     return view->settings.stereo ? view->options->stereo_m : 0;
@@ -64,7 +67,7 @@ void view_ask_local(struct view *view, struct message_render *render)
     render->depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
     render->depth_pixels = DEPTH_PIXELS;
     render->margin = MARGIN;
-    /* Of a lens or an open shutter the daemon has none. */
+    /* The daemon has no hidden layers for a lens or an open shutter. */
     render->hidden_layers = render->aperture > 0 || render->shutter > 0 ? 0 : HIDDEN_LAYERS;
 }
 
@@ -100,9 +103,9 @@ void view_aim(const struct view *view, bool moving, uint64_t now_ns, struct view
         plan_motion_predict(&view->local.motion, now_ns, plan_pace_ahead_ns(&view->local.pace), camera);
 }
 
-/* ---- what comes ---- */
+/* ---- received pictures ---- */
 
-/* What is left without the margin. */
+/* Crops the frame's size and field of view to the part inside the margin. */
 static void leave_margin(struct fl_frame *frame)
 {
     const double inner = (double)(frame->height - 2 * frame->margin_y) / frame->height;
@@ -112,7 +115,7 @@ static void leave_margin(struct fl_frame *frame)
     frame->ortho_height *= (float)inner;
 }
 
-/* Leaves the picture to the key where it is not shown as well. */
+/* Makes the picture the new key. The key takes the pixels if the picture itself is not shown. */
 static bool give_key(struct view *view, struct fl_frame *frame, bool is_shown)
 {
     struct views_key key = {
@@ -144,11 +147,11 @@ bool view_take_picture(struct view *view, struct fl_frame *frame)
 {
     const bool has_margin = frame->margin_x > 0 || frame->margin_y > 0;
     const bool is_key = frame->depth && frame->fov_y > 0 && view_has_local(view);
-    /* Of two eyes, whose own picture has no depth. */
+    /* A key for two eyes is seen from between them; the pictures of the eyes have no depth. */
     const bool is_middle = view->settings.stereo && frame->depth;
     const bool is_shown = !is_middle;
     if (is_middle && !is_key)
-        return false; /* no view is made of it any more */
+        return false; /* no views are made any more */
     view->frames.is_live = is_shown && (!frame->moving || !is_key);
     if (is_key && !give_key(view, frame, is_shown))
         return false;
@@ -197,7 +200,7 @@ static bool same_camera(const struct view *view)
     return same;
 }
 
-/* The last frame itself shows what the camera sees. */
+/* The last frame already shows what the camera sees. */
 static bool is_newest(const struct view *view)
 {
     const bool is_asked = view->frames.last.command == view->told.command && !view->told.must_look;
@@ -235,8 +238,8 @@ static void want(struct view *view)
     view->local.wish = views_want(view->local.views, &wish);
 }
 
-/* How much else a picture of that camera shows than one of the present camera: the angle between both views, and
- * that between their eyes as seen from what is looked at. Radians, about. */
+/* Difference between a picture of that camera and one of the present camera, in radians: the angle between
+ * their directions plus the angle between their eyes as seen from the subject. Approximate. */
 static double off(const struct view *view, const float world_from_view[12])
 {
     float now[12];
@@ -249,8 +252,8 @@ static double off(const struct view *view, const float world_from_view[12])
     return acos(fmax(-1, fmin(1, along))) + aside / camera_distance(&view->eye.camera);
 }
 
-/* The view is nearer to the truth than the daemon's own last picture: hardly a hole, and no older camera. Of two
- * eyes there is no picture of the daemon's own. */
+/* The warped view is better than the daemon's last picture: almost no holes, and not an older camera. For two
+ * eyes the daemon sends no picture of its own. */
 static bool is_better(const struct view *view)
 {
     const struct views_made *made = &view->local.made_of;
@@ -269,7 +272,7 @@ static void show_view(struct view *view)
     view->screen->must_draw |= view->local.shows_made ? has_come || !was_shown : was_shown;
     if (!has_come || !view->local.shows_made)
         return;
-    /* One from a newer key is no answer to a move. */
+    /* A view of the same request from a newer key does not count as a response to a move. */
     const uint64_t moved_ns = view->local.made_of.wish != before ? view->local.made_of.moved_ns : 0;
     metrics_add_view(&view->frames.metrics, moved_ns, monotonic_now_ns());
     view->local.count++;
@@ -282,7 +285,7 @@ void view_step_local(struct view *view, uint64_t now_ns)
     if (!view->local.views)
         return;
     if (view->local.has_keys && !view_has_local(view))
-        view_forget_local(view); /* they would be old when views are made again */
+        view_forget_local(view); /* the views would be outdated when warping begins again */
     if (!view->eye.has_camera || !view->local.has_keys || is_newest(view)) {
         views_want_none(view->local.views);
         view->local.wish = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Views that are made here while the camera moves: what the daemon is asked for, and which picture is shown. */
+/* Views warped locally while the camera moves: the settings of their keys, and which picture is shown. */
 #ifndef FARLIGHT_VIEWER_VIEW_LOCAL_H
 #define FARLIGHT_VIEWER_VIEW_LOCAL_H
 
@@ -10,41 +10,41 @@ struct view;
 
 struct view_local {
     struct plan_switch switched;
-    struct plan_motion motion; /* up to .. */
+    struct plan_motion motion; /* motion up to `followed_camera` */
     struct viewer_camera followed_camera;
     struct plan_pace pace;
-    bool asked, granted; /* the stream was asked to have depths; it has had them since then */
+    bool asked, granted; /* `asked`: the stream was requested with depths; `granted`: it has had them since */
     bool has_keys;       /* views can be made */
-    uint32_t key_frame;  /* number of the frame that the last key was */
-    float radius;        /* of the sphere that their bound holds in */
-    struct views *views; /* NULL: none was needed */
+    uint32_t key_frame;  /* number of the frame that became the last key */
+    float radius;        /* radius of eye positions within which the depth's error bound holds */
+    struct views *views; /* NULL: not needed yet */
     struct views_wish wished;
-    uint64_t wish; /* its number; 0: none */
+    uint64_t wish; /* number of the request; 0: none */
     struct pixmap made;
     struct views_made made_of;
-    bool has_made;   /* since views are wanted */
-    bool shows_made; /* in place of the daemon's picture */
+    bool has_made;   /* a view was made since views are wanted */
+    bool shows_made; /* the made view is shown in place of the daemon's picture */
     uint64_t count;
 };
 
 bool view_has_local(const struct view *view); /* views are made while the camera moves */
-/* Decides it, after a frame. */
+/* Decides after a frame whether views are made while the camera moves. */
 void view_plan_local(struct view *view, uint64_t now_ns);
-/* Completes a request for a view with what is needed for them. */
+/* Adds to a view request what warping needs: depths, margin and hidden layers. */
 void view_ask_local(struct view *view, struct message_render *render);
-bool view_asks_otherwise(const struct view *view); /* than it did */
-/* Takes back what may be why the view was refused. */
+bool view_asks_otherwise(const struct view *view); /* the view needs another request than the last one */
+/* Turns off what may be the reason for the daemon's refusal of the view. */
 void view_refuse_local(struct view *view);
-/* The camera that the daemon is told: while it moves, where it will be when the picture is here. */
+/* Computes the camera to send: while it moves, its predicted place when the picture arrives. */
 void view_aim(const struct view *view, bool moving, uint64_t now_ns, struct viewer_camera *camera);
-/* What the picture of a key hides. */
+/* Takes a frame of hidden layers that belongs to the last key. */
 void view_take_hidden(struct view *view, struct fl_frame *frame);
-/* The frame that has arrived, which is without its margin afterwards. */
+/* Takes a picture that has arrived, and crops its margin. Returns whether the picture itself is shown. */
 bool view_take_picture(struct view *view, struct fl_frame *frame);
-/* Wants a view where it is needed, and shows what has been made. */
+/* Requests a view where one is needed, and shows the last one made. */
 void view_step_local(struct view *view, uint64_t now_ns);
-void view_forget_local(struct view *view); /* of a connection that is gone */
-/* The picture is of the newest camera, and the best one until another frame comes. */
+void view_forget_local(struct view *view); /* forgets all views of a lost connection */
+/* The shown picture has the newest camera, and is the best one until another frame arrives. */
 bool view_shows_camera(const struct view *view);
 
 #endif

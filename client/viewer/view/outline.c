@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Outline of the edited object over the resting picture. */
 #include "outline.h"
 #include "view.h"
 #include "viewer/overlay/outline.h"
@@ -10,14 +11,14 @@
 
 /* ---- what it is of ---- */
 
-/* Lights and the environment are seen nowhere, and an error map shows no objects. */
+/* Lights and the environment have no surface, and an error map shows no objects. */
 static bool is_wanted(const struct view *view)
 {
     const struct edit_choice *edit = view->choice;
     return edit->shown && edit->tab < EDIT_LIGHT && edit->ids[edit->tab] != 0 && !view->settings.error_map;
 }
 
-/* The picture that is shown is the daemon's, of the camera that it was told last. */
+/* Returns whether the daemon's own picture is shown, with the camera last sent. */
 static bool is_still(const struct view *view)
 {
     return view->frames.is_live && !view->local.shows_made && view->told.has_looked && !view->told.must_look &&
@@ -40,7 +41,7 @@ bool view_outline_is_asked(const struct view *view)
 bool view_outline_is_due(const struct view *view)
 {
     const struct edit_choice *edit = view->choice;
-    /* While a slider is dragged every picture is of another revision. */
+    /* Each picture has another revision while a slider is dragged. */
     return is_wanted(view) && !edit->dragging && !edit->has_pending && is_still(view) &&
            view_is_at_rest(view, 1) && !(view->outline.is_answered && view_outline_is_asked(view));
 }
@@ -65,14 +66,14 @@ void view_outline_ask(struct view *view, struct message_render *job)
     job->view_source = PROTOCOL_VIEW_SOURCE_RAYS;
 }
 
-/* A material alone, or a node with all that is below it. */
+/* Lists one material, or one node with its descendants. */
 static uint32_t *ids_of(struct view *view, size_t *count)
 {
     struct view_outline *outline = &view->outline;
     struct fl_object *nodes = NULL;
     struct fl_error refusal = {0};
     size_t node_count = 0;
-    /* Without the list it is the node alone. */
+    /* Without the list of nodes, the node alone is outlined. */
     if (outline->tab == EDIT_NODE)
         session_objects(view->session, PROTOCOL_OBJECT_NODE, &nodes, &node_count, &refusal);
     const struct fl_object alone = {.id = outline->id};
@@ -122,8 +123,8 @@ void view_outline_refuse(struct view *view)
 
 /* ---- showing ---- */
 
-/* One of an older revision stays while a material is changed, until the new one is there: surfaces stay where they
- * are. */
+/* Returns whether the outline fits the picture. An outline of an older revision remains while a material
+ * changes, since surfaces do not move. */
 static bool fits(const struct view *view)
 {
     const struct view_outline *outline = &view->outline;

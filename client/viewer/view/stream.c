@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* The view: its settings as sent to the daemon, and its frames. */
+/* Stream of the view: its settings as sent to the daemon, and its frames. */
 #include "view.h"
 #include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <string.h>
 
-#define LOOK_PAUSE_NS 4000000ull   /* between cameras: no screen shows more */
-#define REST_PAUSE_NS 120000000ull /* without movement: that was all of it */
+#define LOOK_PAUSE_NS 4000000ull   /* between cameras; no screen refreshes faster */
+#define REST_PAUSE_NS 120000000ull /* without movement, after which the view is at rest */
 #define EDGE_MIN 16u
 #define EDGE_MAX 8192u
-#define FRAMES_AT_ONCE 4u /* then people have their turn */
-/* Where a frame takes so long to come, its first parts are worth decoding by themselves, and making a key of. */
+#define FRAMES_AT_ONCE 4u /* per turn of the loop; then input is handled */
+/* Frames that take longer to arrive than this are decoded by parts, and each part becomes a key. */
 #define PARTS_NS 100000000ull
 
-/* Of `views` beside one another, each with an even edge: the chroma of a video is subsampled by 2. */
+/* Returns an edge for `views` pictures side by side, each with an even edge since video subsamples chroma by 2. */
 static uint32_t edge_of(uint32_t pixels, uint32_t views)
 {
     const uint32_t edge = (pixels / views) & ~1u, maximum = EDGE_MAX / views;
@@ -42,10 +42,11 @@ void view_use_eyes(const struct view *view, struct message_render *render)
     render->baseline = options->stereo_m;
     render->view_source = view->settings.views;
     if (render->view_source == PROTOCOL_VIEW_SOURCE_LAYERS)
-        render->ground = 0; /* pictures that are made of layers have none */
+        render->ground = 0; /* the ground is not supported in pictures made from layers */
 }
 
-/* On this machine pixels travel as they are; over a network as video while they move, and without loss at rest. */
+/* Chooses encodings. Pixels stay uncompressed on the same machine. A network gets video in motion, and lossless
+ * pictures at rest. */
 static void choose_encodings(const struct view *view, struct message_render *render)
 {
     const struct view_options *options = view->options;
@@ -85,7 +86,7 @@ static void show(struct view *view)
     view_ask_local(view, &render);
     render.moving_rate = view->options->moving_rate;
     view->told.must_show = !session_show(view->session, &render, &view->told.change);
-    view->told.must_look = true; /* frames name a camera from which on they are the new ones */
+    view->told.must_look = true; /* the new stream's frames carry the number of the camera sent after it */
 }
 
 static void look(struct view *view, bool moving, uint64_t now_ns)
@@ -106,7 +107,7 @@ static void look(struct view *view, bool moving, uint64_t now_ns)
 void view_tell(struct view *view, uint64_t now_ns)
 {
     const bool is_moving = view->eye.moved_ns + REST_PAUSE_NS > now_ns;
-    /* Another stream begins the picture at rest from new, which matters little while it has its first samples. */
+    /* Another stream restarts the accumulation at rest, which costs little while it has few samples. */
     const bool is_young = view->frames.last.samples <= view->render.pass_samples;
     if (view->told.must_show || ((is_moving || is_young) && view_asks_otherwise(view)))
         show(view);
@@ -153,7 +154,7 @@ static void take(struct view *view, struct fl_frame *frame)
     }
     if (!decode(view, frame) || !view_take_picture(view, frame))
         return;
-    if (!frame->more_follows) { /* it is one frame, whose costs come with its end */
+    if (!frame->more_follows) { /* parts count as one frame, whose last one has the costs */
         metrics_add(&view->frames.metrics, frame, monotonic_now_ns());
         take_structure(view, frame);
         session_deliver_parts(view->session, frame->receive_ns > PARTS_NS);
@@ -167,7 +168,7 @@ static void take(struct view *view, struct fl_frame *frame)
     view->frames.last.depth = NULL;
     view->frames.last.normals = NULL;
     view->frames.last.pixels = NULL;
-    if (view_follows(view)) /* for a hand to begin there */
+    if (view_follows(view)) /* so that input continues from there */
         camera_from_frame(&view->eye.camera, frame, camera_distance(&view->eye.camera));
     view->taken = view->settings;
     view->screen->must_draw = true;
@@ -183,7 +184,7 @@ void view_refuse_scene(struct view *view, const struct fl_error *refusal)
     view->screen->must_draw = true;
 }
 
-/* A change that the daemon refuses is reverted. */
+/* Reverts a change that the daemon refuses. */
 static void refuse(struct view *view, const struct fl_error *refusal)
 {
     if (view->frames.count == 0) {
@@ -193,7 +194,7 @@ static void refuse(struct view *view, const struct fl_error *refusal)
     screen_say(view->screen, "not possible: %s", refusal->text);
     view->settings = view->taken;
     view_refuse_local(view);
-    view->eye.followed = 0; /* somebody may have taken its node away */
+    view->eye.followed = 0; /* another client may have removed the node */
     view->told.must_show = true;
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Jobs beside the view: cameras of the scene, picks, focus, and the comparison with the reference. */
 #include "tasks.h"
 #include "view.h"
 #include "protocol/common/clock.h"
@@ -7,8 +8,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define COMPARED_SAMPLES 4u /* of a pixel: the reference may take long */
-#define NEAR_SHARE 0.05     /* of the scene's diagonal: nearer to the eye its middle is nothing to turn about */
+#define COMPARED_SAMPLES 4u /* samples per pixel; more would take the reference tracer long */
+/* Share of the scene's diagonal; a scene whose middle is nearer to the eye is not orbited */
+#define NEAR_SHARE 0.05
 
 uint32_t view_primary(const struct view *view)
 {
@@ -17,9 +19,9 @@ uint32_t view_primary(const struct view *view)
     return view->settings.tracer == PROTOCOL_TRACER_REFERENCE ? PROTOCOL_PRIMARY_TRACE : PROTOCOL_PRIMARY_RASTER;
 }
 
-/* ---- asking ---- */
+/* ---- requests ---- */
 
-/* One ray through the centre of one pixel, which returns its hit point. */
+/* Fills a probe: one ray through a pixel's centre, which returns its hit point. */
 static void fill_probe(const struct view *view, struct message_render *job)
 {
     *job = view->render;
@@ -58,7 +60,7 @@ static void use_key(struct message_render *job, struct record_camera_key *key)
     job->keys_count = 1;
 }
 
-/* The frame at the job's time 0 is that at the tour's time. */
+/* Maps the job's time 0 to the tour's time in the clip. */
 static void use_clip(const struct view *view, struct message_render *job, struct record_clip_use *use)
 {
     const struct tour *tour = &view->eye.tour;
@@ -85,7 +87,7 @@ static void aim(const struct view *view, struct record_camera_key *key)
     fill_key(&camera, key);
 }
 
-/* That of the view. */
+/* Uses the camera of the view. */
 static void use_camera(const struct view *view, struct message_render *job, struct record_camera_key *key)
 {
     fill_key(&view->eye.camera, key);
@@ -95,7 +97,7 @@ static void use_camera(const struct view *view, struct message_render *job, stru
         use_key(job, key);
 }
 
-/* All but the tracer as in the view. */
+/* Fills the job of the reference picture: everything except the tracer as in the view. */
 static void fill_reference(const struct view *view, struct message_render *job, struct record_camera_key *key)
 {
     *job = view->render;
@@ -107,9 +109,9 @@ static void fill_reference(const struct view *view, struct message_render *job, 
     job->integrator = view->settings.integrator;
     job->tone_map = view->settings.tone_map;
     job->exposure_stops += (float)view->settings.exposure_thirds / 3;
-    job->accumulate = PROTOCOL_ACCUMULATION_ON; /* with the random numbers of a view */
+    job->accumulate = PROTOCOL_ACCUMULATION_ON; /* the same random numbers as in a view */
     view_use_eyes(view, job);
-    job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* what layers lack is an error, too */
+    job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* an error of layers must show in the comparison */
     job->encoding = session_is_local(view->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     use_camera(view, job, key);
 }
@@ -117,7 +119,7 @@ static void fill_reference(const struct view *view, struct message_render *job, 
 static void ask_for_ids(struct message_render *job)
 {
     job->layers = 1u << PROTOCOL_LAYER_ID;
-    job->tracer = PROTOCOL_TRACER_BVH; /* sampled tracers do not know nodes */
+    job->tracer = PROTOCOL_TRACER_BVH; /* sampled tracers have no node identifiers */
 }
 
 static bool ask(struct view *view, enum view_task task, struct fl_error *refusal)
@@ -161,7 +163,7 @@ static bool ask(struct view *view, enum view_task task, struct fl_error *refusal
 
 /* ---- answers ---- */
 
-/* Three numbers of what the ray met; false: nothing. */
+/* Reads the hit point of a probe. Returns false on a miss. */
 static bool met(const struct fl_frame *frame, double numbers[3])
 {
     float values[4];
@@ -176,7 +178,7 @@ static double from_eye(const struct fl_frame *frame, int axis, double place)
     return place - (double)frame->world_from_view[axis * 4 + 3];
 }
 
-/* Along the view, to the middle of the scene; 0: it is not in front of the eye, or one node of it is framed. */
+/* Returns the depth of the scene's middle along the view; 0: behind the eye, or a single node is framed. */
 static double depth_of_scene(const struct view *view, const struct fl_frame *frame)
 {
     struct fl_scene_bounds bounds = {.empty = true};
@@ -193,9 +195,7 @@ static double depth_of_scene(const struct view *view, const struct fl_frame *fra
     return depth > NEAR_SHARE * diagonal ? depth : 0;
 }
 
-/* The distance of what the view turns about: the middle of the scene, else the surface in the middle of the
- * picture.
- */
+/* Returns the distance to orbit at: of the scene's middle, else of the surface in the picture's middle. */
 static double distance_from(const struct view *view, const struct fl_frame *frame)
 {
     const double depth = depth_of_scene(view, frame);
@@ -248,7 +248,7 @@ static void take_reference(struct view *view, struct fl_frame *frame)
     if (!pixmap_resize(&view->heat.map, compared->width, compared->height, &view->failure))
         return;
     struct pixmap reference = {0};
-    pixmap_take(&reference, frame); /* over black, as the other */
+    pixmap_take(&reference, frame); /* over black, like the other picture */
     heat_map(compared->pixels, reference.pixels, (size_t)compared->width * (size_t)compared->height, HEAT_TOP,
              view->heat.map.pixels, &view->heat.figures);
     pixmap_finish(&reference);
@@ -316,7 +316,7 @@ static enum view_task next_task(struct view *view)
 void view_step_tasks(struct view *view)
 {
     struct fl_error refusal = {0};
-    /* An answer for another picture is discarded. */
+    /* Discards an answer for another picture. */
     if (view->tasks.current == TASK_OUTLINE && !view_outline_is_asked(view)) {
         session_give_up(view->session);
         view->tasks.current = TASK_NONE;
