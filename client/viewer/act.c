@@ -17,7 +17,7 @@ void viewer_choose_clip(struct viewer *viewer, int clip)
         clip != TOUR_NONE ? fl_scene_clip(session_scene(view->session), (size_t)clip) : NULL;
     tour_set_duration(&view->eye.tour, info ? (double)info->duration_s : 0);
     snprintf(view->eye.clip_name, sizeof(view->eye.clip_name), "%s", info ? info->name : "");
-    view->told.must_show = true;
+    view->sent.must_send_view = true;
     view->eye.moved_ns = monotonic_now_ns();
 }
 
@@ -128,7 +128,7 @@ static void act_on_scene(struct viewer *viewer, enum action action)
         break;
     case ACTION_STEP_BACK:
     case ACTION_STEP_ON:
-        view->told.must_look |= tour_seek(&view->eye.tour, action == ACTION_STEP_ON ? STEP_S : -STEP_S);
+        view->sent.must_send_camera |= tour_seek(&view->eye.tour, action == ACTION_STEP_ON ? STEP_S : -STEP_S);
         break;
     default:
         break;
@@ -147,7 +147,7 @@ static void act(struct viewer *viewer, enum action action)
         screen_say(&viewer->screen, "%s: %s", fault.field, fault.text);
         return;
     }
-    view->told.must_show |= change == SETTINGS_VIEW;
+    view->sent.must_send_view |= change == SETTINGS_VIEW;
     if (change == SETTINGS_VIEW)
         view->refused[0] = '\0'; /* the new settings may be possible */
     viewer->screen.must_draw = true;
@@ -180,7 +180,8 @@ void viewer_input(struct viewer *viewer, const struct input *input)
         viewer->quit = true;
         return;
     case INPUT_RESIZE:
-        view->told.must_show |= viewer->screen.width != input->width || viewer->screen.height != input->height;
+        view->sent.must_send_view |=
+            viewer->screen.width != input->width || viewer->screen.height != input->height;
         viewer->screen.width = input->width;
         viewer->screen.height = input->height;
         viewer->screen.scale = input->scale;
@@ -208,7 +209,7 @@ void viewer_input(struct viewer *viewer, const struct input *input)
         return;
     view->eye.glide_begin_ns = 0; /* input overrides a glide */
     view->eye.followed = 0;
-    view->told.must_look = true;
+    view->sent.must_send_camera = true;
     view->eye.moved_ns = monotonic_now_ns();
 }
 

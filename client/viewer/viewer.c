@@ -76,7 +76,7 @@ static void fit_tour(struct viewer *viewer)
         tour->camera_count = cameras;
         tour->clip_count = clips;
         view->eye.followed = 0;
-        view->told.must_show = true;
+        view->sent.must_send_view = true;
     }
     if (tour->clip == TOUR_NONE)
         tour_stop(tour);
@@ -107,9 +107,9 @@ static void begin_showing(struct viewer *viewer)
     viewer->times_read = session_times_read(view->session);
     view_drop_tasks(view);
     view->frames.metrics = (struct metrics){0}; /* another daemon has another clock */
-    view->told.has_looked = view->told.moving = false;
+    view->sent.has_sent_camera = view->sent.moving = false;
     view->frames.last.command = 0;
-    view->told.must_show = true;
+    view->sent.must_send_view = true;
     view_forget_local(view);
 }
 
@@ -129,7 +129,7 @@ static void tick(struct viewer *viewer, uint64_t now_ns)
         moved = true;
     }
     moved = tour_advance(&view->eye.tour, seconds) || moved;
-    view->told.must_look = view->told.must_look || moved;
+    view->sent.must_send_camera = view->sent.must_send_camera || moved;
     view->eye.moved_ns = moved ? now_ns : view->eye.moved_ns;
 }
 
@@ -168,7 +168,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
         take_changes(viewer);
     if (view->failure.code != FL_ERROR_NONE)
         return;
-    view_tell(view, now_ns);
+    view_send(view, now_ns);
     view_receive(view, wait_ms);
     view_step_tasks(view);
     const struct view_picked picked = view->tasks.picked;

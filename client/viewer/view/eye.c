@@ -30,7 +30,7 @@ void view_go(struct view *view, const struct viewer_camera *camera, uint32_t nod
         eye->glide_begin_ns = monotonic_now_ns();
     }
     eye->has_camera = true;
-    view->told.must_look = true;
+    view->sent.must_send_camera = true;
     eye->moved_ns = monotonic_now_ns();
 }
 

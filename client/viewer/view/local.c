@@ -183,7 +183,7 @@ void view_forget_local(struct view *view)
 {
     view->screen->must_draw |= view->local.shows_made;
     view->local.has_keys = view->local.has_made = view->local.shows_made = false;
-    view->local.wish = 0;
+    view->local.request = 0;
     if (view->local.views)
         views_forget_keys(view->local.views);
 }
@@ -203,44 +203,44 @@ static bool same_camera(const struct view *view)
 /* The last frame already shows what the camera sees. */
 static bool is_newest(const struct view *view)
 {
-    const bool is_asked = view->frames.last.command == view->told.command && !view->told.must_look;
+    const bool is_asked = view->frames.last.command == view->sent.command && !view->sent.must_send_camera;
     return view->frames.is_live && ((is_asked && !view->frames.last.moving) || same_camera(view));
 }
 
-static struct views_wish wish_of(const struct view *view)
+static struct views_request request_of(const struct view *view)
 {
-    struct views_wish wish = {.holes = view->settings.holes,
-                              .baseline = baseline_of(view),
-                              .over = view->options->stereo_over,
-                              .frame_ns =
-                                  view->screen->window ? window_frame_ns(view->screen->window) : PLAN_FRAME_NS,
-                              .moved_ns = view->eye.moved_ns};
-    view_render_size(view, &wish.width, &wish.height);
-    camera_pose(&view->eye.camera, wish.camera.world_from_view);
-    wish.camera.fov_y = (float)view->eye.camera.fov_y;
-    return wish;
+    struct views_request request = {.holes = view->settings.holes,
+                                    .baseline = baseline_of(view),
+                                    .over = view->options->stereo_over,
+                                    .frame_ns = view->screen->window ? window_frame_ns(view->screen->window)
+                                                                     : PLAN_FRAME_NS,
+                                    .moved_ns = view->eye.moved_ns};
+    view_render_size(view, &request.width, &request.height);
+    camera_pose(&view->eye.camera, request.camera.world_from_view);
+    request.camera.fov_y = (float)view->eye.camera.fov_y;
+    return request;
 }
 
-static bool is_wanted(const struct view *view, const struct views_wish *wish)
+static bool is_wanted(const struct view *view, const struct views_request *request)
 {
-    const struct views_wish *before = &view->local.wished;
-    return view->local.wish != 0 && memcmp(&wish->camera, &before->camera, sizeof(wish->camera)) == 0 &&
-           wish->width == before->width && wish->height == before->height && wish->holes == before->holes &&
-           (wish->baseline > 0) == (before->baseline > 0);
+    const struct views_request *before = &view->local.requested;
+    return view->local.request != 0 && memcmp(&request->camera, &before->camera, sizeof(request->camera)) == 0 &&
+           request->width == before->width && request->height == before->height &&
+           request->holes == before->holes && (request->baseline > 0) == (before->baseline > 0);
 }
 
-static void want(struct view *view)
+static void start_views(struct view *view)
 {
-    const struct views_wish wish = wish_of(view);
-    if (is_wanted(view, &wish))
+    const struct views_request request = request_of(view);
+    if (is_wanted(view, &request))
         return;
-    view->local.wished = wish;
-    view->local.wish = views_want(view->local.views, &wish);
+    view->local.requested = request;
+    view->local.request = views_start(view->local.views, &request);
 }
 
 /* Difference between a picture of that camera and one of the present camera, in radians: the angle between
  * their directions plus the angle between their eyes as seen from the subject. Approximate. */
-static double off(const struct view *view, const float world_from_view[12])
+static double difference(const struct view *view, const float world_from_view[12])
 {
     float now[12];
     double along = 0, aside = 0;
@@ -259,12 +259,12 @@ static bool is_better(const struct view *view)
     const struct views_made *made = &view->local.made_of;
     return view->settings.stereo ||
            (views_unseen(made) <= (float)PLAN_UNSEEN_MAX &&
-            off(view, made->camera.world_from_view) <= off(view, view->frames.last.world_from_view));
+            difference(view, made->camera.world_from_view) <= difference(view, view->frames.last.world_from_view));
 }
 
 static void show_view(struct view *view)
 {
-    const uint64_t before = view->local.has_made ? view->local.made_of.wish : 0;
+    const uint64_t before = view->local.has_made ? view->local.made_of.request : 0;
     const bool has_come = views_take(view->local.views, &view->local.made, &view->local.made_of),
                was_shown = view->local.shows_made;
     view->local.has_made |= has_come;
@@ -273,7 +273,7 @@ static void show_view(struct view *view)
     if (!has_come || !view->local.shows_made)
         return;
     /* A view of the same request from a newer key does not count as a response to a move. */
-    const uint64_t moved_ns = view->local.made_of.wish != before ? view->local.made_of.moved_ns : 0;
+    const uint64_t moved_ns = view->local.made_of.request != before ? view->local.made_of.moved_ns : 0;
     metrics_add_view(&view->frames.metrics, moved_ns, monotonic_now_ns());
     view->local.count++;
 }
@@ -287,13 +287,13 @@ void view_step_local(struct view *view, uint64_t now_ns)
     if (view->local.has_keys && !view_has_local(view))
         view_forget_local(view); /* the views would be outdated when warping begins again */
     if (!view->eye.has_camera || !view->local.has_keys || is_newest(view)) {
-        views_want_none(view->local.views);
-        view->local.wish = 0;
+        views_stop(view->local.views);
+        view->local.request = 0;
         view->screen->must_draw |= view->local.shows_made;
         view->local.has_made = view->local.shows_made = false;
         return;
     }
-    want(view);
+    start_views(view);
     show_view(view);
     if (views_take_error(view->local.views, &why))
         screen_say(view->screen, "no view can be made: %s %s", why.field, why.text);
@@ -301,8 +301,9 @@ void view_step_local(struct view *view, uint64_t now_ns)
 
 bool view_shows_camera(const struct view *view)
 {
-    const struct views_wish wish = wish_of(view);
+    const struct views_request request = request_of(view);
     if (view->local.shows_made)
-        return is_wanted(view, &wish) && views_is_best(view->local.views, &view->local.made_of, view->local.wish);
+        return is_wanted(view, &request) &&
+               views_is_best(view->local.views, &view->local.made_of, view->local.request);
     return view->frames.count > 0 && is_newest(view);
 }

@@ -18,8 +18,8 @@ struct view_local {
     uint32_t key_frame;  /* number of the frame that became the last key */
     float radius;        /* radius of eye positions within which the depth's error bound holds */
     struct views *views; /* NULL: not needed yet */
-    struct views_wish wished;
-    uint64_t wish; /* number of the request; 0: none */
+    struct views_request requested;
+    uint64_t request; /* number of the request; 0: none */
     struct pixmap made;
     struct views_made made_of;
     bool has_made;   /* a view was made since views are wanted */

@@ -21,15 +21,16 @@ static bool is_wanted(const struct view *view)
 /* Returns whether the daemon's own picture is shown, with the camera last sent. */
 static bool is_still(const struct view *view)
 {
-    return view->frames.is_live && !view->local.shows_made && view->told.has_looked && !view->told.must_look &&
-           !view->told.must_show && !view->told.moving && view->frames.last.command == view->told.command &&
-           view->frames.last.change == view->told.change && !view->frames.last.moving;
+    return view->frames.is_live && !view->local.shows_made && view->sent.has_sent_camera &&
+           !view->sent.must_send_camera && !view->sent.must_send_view && !view->sent.moving &&
+           view->frames.last.command == view->sent.command && view->frames.last.change == view->sent.change &&
+           !view->frames.last.moving;
 }
 
 static bool is_of_picture(const struct view *view)
 {
     const struct view_outline *outline = &view->outline;
-    return outline->command == view->told.command && outline->change == view->told.change &&
+    return outline->command == view->sent.command && outline->change == view->sent.change &&
            outline->tab == view->choice->tab && outline->id == view->choice->ids[outline->tab];
 }
 
@@ -53,8 +54,8 @@ void view_outline_ask(struct view *view, struct message_render *job)
     struct view_outline *outline = &view->outline;
     const struct edit_choice *edit = view->choice;
     view_outline_forget(view);
-    outline->command = view->told.command;
-    outline->change = view->told.change;
+    outline->command = view->sent.command;
+    outline->change = view->sent.change;
     outline->revision = view->frames.last.revision;
     outline->tab = edit->tab;
     outline->id = edit->ids[edit->tab];

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define LOOK_PAUSE_NS 4000000ull   /* between cameras; no screen refreshes faster */
+#define CAMERA_PAUSE_NS 4000000ull /* between cameras; no screen refreshes faster */
 #define REST_PAUSE_NS 120000000ull /* without movement, after which the view is at rest */
 #define EDGE_MIN 16u
 #define EDGE_MAX 8192u
@@ -61,7 +61,7 @@ static void choose_encodings(const struct view *view, struct message_render *ren
     render->parts = !is_local;
 }
 
-static void show(struct view *view)
+static void send_view(struct view *view)
 {
     struct message_render render = view->render;
     const struct settings *settings = &view->settings;
@@ -85,38 +85,38 @@ static void show(struct view *view)
     }
     view_ask_local(view, &render);
     render.moving_rate = view->options->moving_rate;
-    view->told.must_show = !session_show(view->session, &render, &view->told.change);
-    view->told.must_look = true; /* the new stream's frames carry the number of the camera sent after it */
+    view->sent.must_send_view = !session_show(view->session, &render, &view->sent.change);
+    view->sent.must_send_camera = true; /* the new stream's frames carry the number of the camera sent after it */
 }
 
-static void look(struct view *view, bool moving, uint64_t now_ns)
+static void send_camera(struct view *view, bool moving, uint64_t now_ns)
 {
     struct fl_view_camera camera = {.time_s = (float)view->eye.tour.time_s, .moving = moving};
     struct viewer_camera aimed;
     view_aim(view, moving, now_ns, &aimed);
     camera_export(&aimed, &camera);
     camera.node = view_follows(view) ? view->eye.followed : 0;
-    if (!session_look(view->session, &camera, &view->told.command))
+    if (!session_look(view->session, &camera, &view->sent.command))
         return;
-    view->told.must_look = false;
-    view->told.has_looked = true;
-    view->told.moving = moving;
-    view->told.looked_ns = now_ns;
+    view->sent.must_send_camera = false;
+    view->sent.has_sent_camera = true;
+    view->sent.moving = moving;
+    view->sent.camera_ns = now_ns;
 }
 
-void view_tell(struct view *view, uint64_t now_ns)
+void view_send(struct view *view, uint64_t now_ns)
 {
     const bool is_moving = view->eye.moved_ns + REST_PAUSE_NS > now_ns;
     /* Another stream restarts the accumulation at rest, which costs little while it has few samples. */
     const bool is_young = view->frames.last.samples <= view->render.pass_samples;
-    if (view->told.must_show || ((is_moving || is_young) && view_asks_otherwise(view)))
-        show(view);
+    if (view->sent.must_send_view || ((is_moving || is_young) && view_asks_otherwise(view)))
+        send_view(view);
     if (!view->eye.has_camera)
         return;
-    if (view->told.must_look && now_ns >= view->told.looked_ns + LOOK_PAUSE_NS)
-        look(view, is_moving, now_ns);
-    else if (view->told.moving && !is_moving)
-        look(view, false, now_ns);
+    if (view->sent.must_send_camera && now_ns >= view->sent.camera_ns + CAMERA_PAUSE_NS)
+        send_camera(view, is_moving, now_ns);
+    else if (view->sent.moving && !is_moving)
+        send_camera(view, false, now_ns);
 }
 
 /* ---- frames ---- */
@@ -195,7 +195,7 @@ static void refuse(struct view *view, const struct fl_error *refusal)
     view->settings = view->taken;
     view_refuse_local(view);
     view->eye.followed = 0; /* another client may have removed the node */
-    view->told.must_show = true;
+    view->sent.must_send_view = true;
 }
 
 void view_receive(struct view *view, unsigned timeout_ms)
@@ -221,10 +221,10 @@ bool view_is_at_rest(const struct view *view, unsigned samples)
 {
     const unsigned maximum = view->render.samples, enough = samples > 0 && samples < maximum ? samples : maximum;
     const struct fl_scene *scene = session_scene(view->session);
-    return view->eye.has_camera && view->told.has_looked && !view->told.must_show && !view->told.must_look &&
-           (!scene || view->frames.last.revision >= fl_scene_revision(scene)) && !view->told.moving &&
-           view->eye.glide_begin_ns == 0 && view->frames.count > 0 &&
-           view->frames.last.command == view->told.command && view->frames.last.change == view->told.change &&
+    return view->eye.has_camera && view->sent.has_sent_camera && !view->sent.must_send_view &&
+           !view->sent.must_send_camera && (!scene || view->frames.last.revision >= fl_scene_revision(scene)) &&
+           !view->sent.moving && view->eye.glide_begin_ns == 0 && view->frames.count > 0 &&
+           view->frames.last.command == view->sent.command && view->frames.last.change == view->sent.change &&
            !view->frames.last.moving && !view->frames.last.more_follows &&
            view_has_samples(view, &view->frames.last, enough);
 }

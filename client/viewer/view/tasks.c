@@ -149,8 +149,8 @@ static bool ask(struct view *view, enum view_task task, struct fl_error *refusal
     case TASK_REFERENCE:
         if (!pixmap_copy(&view->heat.compared, &view->frames.live, refusal))
             return false;
-        view->heat.command = view->told.command;
-        view->heat.change = view->told.change;
+        view->heat.command = view->sent.command;
+        view->heat.change = view->sent.change;
         view->heat.revision = view->frames.last.revision;
         fill_reference(view, &job, &key);
         break;
@@ -164,7 +164,7 @@ static bool ask(struct view *view, enum view_task task, struct fl_error *refusal
 /* ---- answers ---- */
 
 /* Reads the hit point of a probe. Returns false on a miss. */
-static bool met(const struct fl_frame *frame, double numbers[3])
+static bool read_hit(const struct fl_frame *frame, double numbers[3])
 {
     float values[4];
     memcpy(values, frame->pixels, sizeof(values));
@@ -202,7 +202,7 @@ static double distance_from(const struct view *view, const struct fl_frame *fram
     double place[3], square = 0;
     if (depth > 0)
         return depth;
-    if (!met(frame, place))
+    if (!read_hit(frame, place))
         return view->eye.has_camera ? camera_distance(&view->eye.camera) : 1;
     for (int i = 0; i < 3; i++)
         square += pow(from_eye(frame, i, place[i]), 2);
@@ -224,7 +224,7 @@ static void take_focus(struct view *view, const struct fl_frame *frame)
 {
     double place[3];
     struct viewer_camera camera = view->eye.camera;
-    if (!met(frame, place)) {
+    if (!read_hit(frame, place)) {
         screen_say(view->screen, "there is no surface to focus on");
         return;
     }
@@ -236,7 +236,7 @@ static void take_focus(struct view *view, const struct fl_frame *frame)
 static void take_pick(struct view *view, const struct fl_frame *frame)
 {
     double numbers[3];
-    if (met(frame, numbers))
+    if (read_hit(frame, numbers))
         view->tasks.picked = (struct view_picked){true, (uint32_t)numbers[0], (uint32_t)numbers[1]};
     else
         screen_say(view->screen, "there is no surface");
@@ -293,7 +293,7 @@ static void refuse(struct view *view, enum view_task task, const struct fl_error
 
 static bool is_compared(const struct view *view)
 {
-    return view->heat.command == view->told.command && view->heat.change == view->told.change &&
+    return view->heat.command == view->sent.command && view->heat.change == view->sent.change &&
            view->heat.revision == view->frames.last.revision;
 }
 

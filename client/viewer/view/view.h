@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* View of a scene: requests to the daemon, its frames, and pictures made from them. Owners of the parts:
- * stream.c (told, frames), eye.c, local.c, tasks.c (tasks, heat), outline.c. */
+ * stream.c (sent, frames), eye.c, local.c, tasks.c (tasks, heat), outline.c. */
 #ifndef FARLIGHT_VIEWER_VIEW_VIEW_H
 #define FARLIGHT_VIEWER_VIEW_VIEW_H
 
@@ -24,10 +24,10 @@ struct view_options {
 };
 
 /* The last request to the daemon. */
-struct view_told {
-    bool must_show, must_look;
-    uint64_t change, command, looked_ns;
-    bool moving, has_looked;
+struct view_sent {
+    bool must_send_view, must_send_camera;
+    uint64_t change, command, camera_ns;
+    bool moving, has_sent_camera;
 };
 
 struct view_frames {
@@ -50,7 +50,7 @@ struct view {
     const struct edit_choice *choice;
     struct settings settings, taken; /* `taken`: settings of the last frame */
     struct view_eye eye;
-    struct view_told told;
+    struct view_sent sent;
     struct view_frames frames;
     struct view_local local;
     struct view_tasks tasks;
@@ -61,7 +61,7 @@ struct view {
     struct fl_error failure;    /* reason for which the viewer ends */
 };
 
-void view_tell(struct view *view, uint64_t now_ns); /* sends view and camera where they changed */
+void view_send(struct view *view, uint64_t now_ns); /* sends view and camera where they changed */
 void view_receive(struct view *view, unsigned timeout_ms);
 /* The frame has at least that many samples, or an error below the target. */
 bool view_has_samples(const struct view *view, const struct fl_frame *frame, unsigned enough);

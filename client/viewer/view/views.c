@@ -35,10 +35,10 @@ struct views {
     uint64_t first_key;  /* first key that is not dropped */
     bool is_prepared;    /* `next` shall become `current` */
     bool wants;
-    struct views_wish wish;
-    atomic_uint_fast64_t wishes; /* number of `wish`; also read without the lock */
-    uint64_t wished_ns;
-    uint64_t first_wish; /* first request since which views have been wanted without a pause */
+    struct views_request request;
+    atomic_uint_fast64_t requests; /* number of `request`; also read without the lock */
+    uint64_t requested_ns;
+    uint64_t first_request; /* first request since which views have been wanted without a pause */
     struct pixmap made_picture;
     struct views_made made;
     bool has_made; /* a view is ready */
@@ -66,11 +66,11 @@ static void drop_layers(struct views *views)
 
 /* ---- in the view thread, without the lock ---- */
 
-static bool reserve(struct views *views, const struct views_wish *wish, struct fl_warp_error *error)
+static bool reserve(struct views *views, const struct views_request *request, struct fl_warp_error *error)
 {
     struct fl_error ignored;
-    const size_t bytes = (size_t)wish->width * wish->height;
-    bool good = pixmap_resize(&views->picture, (int)wish->width, (int)wish->height, &ignored);
+    const size_t bytes = (size_t)request->width * request->height;
+    bool good = pixmap_resize(&views->picture, (int)request->width, (int)request->height, &ignored);
     if (bytes > views->mask_bytes) {
         uint8_t *mask = realloc(views->mask, bytes);
         views->mask = mask ? mask : views->mask;
@@ -85,7 +85,7 @@ static bool reserve(struct views *views, const struct views_wish *wish, struct f
 static bool is_overtaken(const void *context)
 {
     const struct views *views = context;
-    return atomic_load(&views->wishes) != views->making;
+    return atomic_load(&views->requests) != views->making;
 }
 
 /* Adds an eye's counts, which cover `share` of all pixels. */
@@ -102,12 +102,12 @@ static void add_counts(struct fl_warp_counts *sum, const struct fl_warp_counts *
 }
 
 /* Makes the view of one of `count` eyes in its part of the picture. */
-static bool make_eye(struct views *views, const struct views_wish *wish, unsigned eye, unsigned count,
+static bool make_eye(struct views *views, const struct views_request *request, unsigned eye, unsigned count,
                      struct fl_warp_view view, struct fl_warp_error *error)
 {
-    const float right = count > 1 ? wish->baseline * ((float)eye - 0.5f) : 0;
-    const size_t first = (size_t)eye * (wish->over ? (size_t)view.height * wish->width : view.width);
-    struct fl_warp_picture picture = {.stride = wish->width,
+    const float right = count > 1 ? request->baseline * ((float)eye - 0.5f) : 0;
+    const size_t first = (size_t)eye * (request->over ? (size_t)view.height * request->width : view.width);
+    struct fl_warp_picture picture = {.stride = request->width,
                                       .colours = (uint32_t *)(void *)views->picture.pixels + first,
                                       .mask = views->mask + first};
     for (int row = 0; row < 3; row++)
@@ -120,11 +120,11 @@ static bool make_eye(struct views *views, const struct views_wish *wish, unsigne
 
 /* Pixels of the made picture along a side for each requested one; more than the key's texels would show nothing
  * more. */
-static double density_of(const struct views *views, const struct views_wish *wish, uint32_t eye_height)
+static double density_of(const struct views *views, const struct views_request *request, uint32_t eye_height)
 {
     const double of_key = views->current.height / tan((double)views->current.key.camera.fov_y / 2);
-    const double of_wish = eye_height / tan((double)wish->camera.fov_y / 2);
-    return of_key < of_wish ? of_key / of_wish : 1;
+    const double of_request = eye_height / tan((double)request->camera.fov_y / 2);
+    return of_key < of_request ? of_key / of_request : 1;
 }
 
 static uint32_t fewer(uint32_t pixels, double density)
@@ -134,38 +134,38 @@ static uint32_t fewer(uint32_t pixels, double density)
 }
 
 /* The request with the size that is made. */
-static struct views_wish sized(const struct views *views, const struct views_wish *wish, unsigned eyes)
+static struct views_request sized(const struct views *views, const struct views_request *request, unsigned eyes)
 {
-    const uint32_t across = wish->over ? 1 : eyes, down = wish->over ? eyes : 1;
-    const double density = density_of(views, wish, wish->height / down);
-    struct views_wish made = *wish;
-    made.width = across * fewer(wish->width / across, density);
-    made.height = down * fewer(wish->height / down, density);
+    const uint32_t across = request->over ? 1 : eyes, down = request->over ? eyes : 1;
+    const double density = density_of(views, request, request->height / down);
+    struct views_request made = *request;
+    made.width = across * fewer(request->width / across, density);
+    made.height = down * fewer(request->height / down, density);
     return made;
 }
 
 /* Makes a view in `picture` and `last`. `may_end`: it is cancelled for a newer request. */
-static bool make(struct views *views, const struct views_wish *wanted, enum fl_warp_quality quality, bool may_end,
-                 struct fl_warp_error *error)
+static bool make(struct views *views, const struct views_request *wanted, enum fl_warp_quality quality,
+                 bool may_end, struct fl_warp_error *error)
 {
     const unsigned eyes = wanted->baseline > 0 ? 2 : 1;
-    const struct views_wish wish = sized(views, wanted, eyes);
-    if (!reserve(views, &wish, error))
+    const struct views_request request = sized(views, wanted, eyes);
+    if (!reserve(views, &request, error))
         return false;
-    const struct fl_warp_view view = {.width = wish.over ? wish.width : wish.width / eyes,
-                                      .height = wish.over ? wish.height / eyes : wish.height,
-                                      .camera = wish.camera,
+    const struct fl_warp_view view = {.width = request.over ? request.width : request.width / eyes,
+                                      .height = request.over ? request.height / eyes : request.height,
+                                      .camera = request.camera,
                                       .quality = quality,
-                                      .holes = wish.holes,
+                                      .holes = request.holes,
                                       .is_given_up = may_end ? is_overtaken : NULL,
                                       .given_up_context = views};
     const uint64_t begin_ns = monotonic_now_ns();
     views->last.counts = (struct fl_warp_counts){0};
     for (unsigned eye = 0; eye < eyes; eye++)
-        if (!make_eye(views, &wish, eye, eyes, view, error))
+        if (!make_eye(views, &request, eye, eyes, view, error))
             return false;
     views->begun_ns = begin_ns;
-    views->last.moved_ns = wish.moved_ns;
+    views->last.moved_ns = request.moved_ns;
     views->last.key_came_ns = views->current.key.came_ns;
     views->last.quality = quality;
     views->last.took_ns = monotonic_now_ns() - begin_ns;
@@ -192,7 +192,7 @@ static bool keeps_key(const struct views *views)
     const struct views_key *key = &views->current.key;
     return views->given.is_moving && key->is_final && views->current.number != 0 &&
            views->last.key == views->current.number &&
-           distance(&views->wish.camera, &key->camera) <= key->radius &&
+           distance(&views->request.camera, &key->camera) <= key->radius &&
            views_unseen(&views->last) <= (float)PLAN_UNSEEN_LITTLE;
 }
 
@@ -207,7 +207,8 @@ static bool wants_key(const struct views *views)
 
 static bool is_of_now(const struct views *views, const struct views_made *made)
 {
-    return made->wish == views->wishes && made->key == views->current.number && made->layers == views->key_layers;
+    return made->request == views->requests && made->key == views->current.number &&
+           made->layers == views->key_layers;
 }
 
 static bool wants_layer(const struct views *views)
@@ -225,7 +226,7 @@ static bool wants_view(const struct views *views)
 /* A view that was made in time is made again in the best quality, if no other is requested for a while. */
 static uint64_t due_ns(const struct views *views)
 {
-    const uint64_t next_ns = views->begun_ns + views->wish.frame_ns, still_ns = views->wished_ns + STILL_NS;
+    const uint64_t next_ns = views->begun_ns + views->request.frame_ns, still_ns = views->requested_ns + STILL_NS;
     return is_of_now(views, &views->last) && still_ns > next_ns ? still_ns : next_ns;
 }
 
@@ -271,18 +272,18 @@ static void take_layer(struct views *views)
         views->error = error;
 }
 
-static void take_wish(struct views *views)
+static void take_request(struct views *views)
 {
-    const struct views_wish wish = views->wish;
-    const uint64_t number = views->wishes;
+    const struct views_request request = views->request;
+    const uint64_t number = views->requests;
     struct fl_warp_error error = {0};
     const bool again = is_of_now(views, &views->last);
     const enum fl_warp_quality quality = again ? FL_WARP_TREE : views->rung.quality;
     pthread_mutex_unlock(&views->lock);
     views->making = number;
-    const bool done = make(views, &wish, quality, again, &error);
+    const bool done = make(views, &request, quality, again, &error);
     if (done && !again)
-        plan_rung(&views->rung, views->last.took_ns, wish.frame_ns, monotonic_now_ns());
+        plan_rung(&views->rung, views->last.took_ns, request.frame_ns, monotonic_now_ns());
     pthread_mutex_lock(&views->lock);
     if (error.code == FL_WARP_ERROR_GIVEN_UP)
         return;
@@ -292,12 +293,12 @@ static void take_wish(struct views *views)
         views->error = error;
         return;
     }
-    views->last.wish = number;
-    views->last.camera = wish.camera;
+    views->last.request = number;
+    views->last.camera = request.camera;
     views->last.key = views->current.number;
     views->last.layers = views->key_layers;
     pthread_cond_broadcast(&views->changed); /* holes of the view may be the reason to take another key */
-    if (number < views->first_wish)          /* another motion's */
+    if (number < views->first_request)       /* another motion's */
         return;
     pixmap_exchange(&views->made_picture, &views->picture);
     views->made = views->last;
@@ -343,7 +344,7 @@ static void *make_views(void *argument)
         else if (monotonic_now_ns() < due_ns(views))
             wait_until(views, due_ns(views));
         else
-            take_wish(views);
+            take_request(views);
     }
     pthread_mutex_unlock(&views->lock);
     return NULL;
@@ -388,21 +389,21 @@ void views_forget_keys(struct views *views)
     views_key_finish(&outdated);
 }
 
-uint64_t views_want(struct views *views, const struct views_wish *wish)
+uint64_t views_start(struct views *views, const struct views_request *request)
 {
     pthread_mutex_lock(&views->lock);
-    const uint64_t number = ++views->wishes;
+    const uint64_t number = ++views->requests;
     if (!views->wants)
-        views->first_wish = number;
-    views->wish = *wish;
-    views->wished_ns = monotonic_now_ns();
+        views->first_request = number;
+    views->request = *request;
+    views->requested_ns = monotonic_now_ns();
     views->wants = true;
     pthread_cond_broadcast(&views->changed);
     pthread_mutex_unlock(&views->lock);
     return number;
 }
 
-void views_want_none(struct views *views)
+void views_stop(struct views *views)
 {
     pthread_mutex_lock(&views->lock);
     views->wants = views->has_made = false;
@@ -422,11 +423,11 @@ bool views_take(struct views *views, struct pixmap *picture, struct views_made *
     return has_made;
 }
 
-bool views_is_best(struct views *views, const struct views_made *made, uint64_t wish)
+bool views_is_best(struct views *views, const struct views_made *made, uint64_t request)
 {
     pthread_mutex_lock(&views->lock);
     const bool is_newest = made->key == views->keys || (views->given.depth && keeps_key(views));
-    const bool is_best = made->wish == wish && is_newest && made->layers == views->key_layers &&
+    const bool is_best = made->request == request && is_newest && made->layers == views->key_layers &&
                          !wants_layer(views) && !views->is_adding && made->quality == FL_WARP_TREE;
     pthread_mutex_unlock(&views->lock);
     return is_best;

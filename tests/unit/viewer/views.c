@@ -55,15 +55,16 @@ static int end(void **state)
 
 EACH_TEST(begin, end)
 
-static uint64_t want_of(uint32_t width, uint32_t height, float x)
+static uint64_t start_of_size(uint32_t width, uint32_t height, float x)
 {
-    const struct views_wish wish = {.width = width, .height = height, .camera = camera_at(x), .frame_ns = 1000000};
-    return views_want(views, &wish);
+    const struct views_request request = {
+        .width = width, .height = height, .camera = camera_at(x), .frame_ns = 1000000};
+    return views_start(views, &request);
 }
 
-static uint64_t want(float x)
+static uint64_t start(float x)
 {
-    return want_of(EDGE, EDGE, x);
+    return start_of_size(EDGE, EDGE, x);
 }
 
 static void wait_for_one(void)
@@ -81,10 +82,10 @@ static int grey(void)
 }
 
 /* A picture that comes may make the last view the best without another one. */
-static void wait_for_best(uint64_t wish)
+static void wait_for_best(uint64_t request)
 {
     const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
-    while (views_take(views, &picture, &made) || !views_is_best(views, &made, wish)) {
+    while (views_take(views, &picture, &made) || !views_is_best(views, &made, request)) {
         assert_true(monotonic_now_ns() < end_ns);
         poll(NULL, 0, 1);
     }
@@ -93,7 +94,7 @@ static void wait_for_best(uint64_t wish)
 TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
 {
     struct views_key key = some_key(100);
-    const uint64_t first = want(0);
+    const uint64_t first = start(0);
     assert_false(views_take(views, &picture, &made)); /* of what? */
     key.sticking = malloc(EDGE * EDGE);
     assert_non_null(key.sticking);
@@ -101,12 +102,12 @@ TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
     views_give_key(views, &key);
     assert_true(!key.depth && !key.sticking && !key.picture.pixels); /* taken over */
     wait_for_best(first);
-    assert_true(made.wish == first && made.quality == FL_WARP_TREE);
+    assert_true(made.request == first && made.quality == FL_WARP_TREE);
     assert_true(picture.width == EDGE && picture.height == EDGE && grey() == 100);
     assert_true(made.counts.known > 0.99f);
     assert_float_equal(made.counts.sticking, 0.2f, 0.01f);
     /* A newer camera, a newer picture: each makes another view, at last of both. */
-    const uint64_t second = want(0.1f);
+    const uint64_t second = start(0.1f);
     key = some_key(50);
     views_give_key(views, &key);
     assert_false(views_is_best(views, &made, first));
@@ -129,8 +130,8 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     for (int i = 0; i < EDGE * EDGE; i++)
         key.depth[i] = is_post(i) ? 0.5f : 2;
     views_give_key(views, &key);
-    const uint64_t wish = want(0.05f);
-    wait_for_best(wish);
+    const uint64_t request = start(0.05f);
+    wait_for_best(request);
     assert_true(made.layers == 1 && made.counts.behind > 0.01f);
     /* The wall behind the post. */
     struct views_key like = some_key(200);
@@ -139,8 +140,8 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
         layer.depth[i] = is_post(i) ? 2 : 0;
     views_give_layer(views, &layer);
     assert_true(!layer.depth && !layer.picture.pixels);
-    assert_false(views_is_best(views, &made, wish));
-    wait_for_best(wish);
+    assert_false(views_is_best(views, &made, request));
+    wait_for_best(request);
     assert_true(made.layers == 2 && made.counts.behind == 0 && made.counts.deeper > 0.01f);
     /* A second one, of half the size: one of its pixels for two by two. */
     like = some_key(200);
@@ -149,7 +150,7 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     for (int i = 0; i < EDGE / 2 * (EDGE / 2); i++)
         layer.depth[i] = 3;
     views_give_layer(views, &layer);
-    wait_for_best(wish);
+    wait_for_best(request);
     assert_int_equal(made.layers, 3);
     /* A new key has none; one of another size is not of it. */
     key = some_key(100);
@@ -158,7 +159,7 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     layer = (struct views_layer){like.picture, like.depth};
     layer.picture.width /= 2;
     views_give_layer(views, &layer);
-    wait_for_best(wish);
+    wait_for_best(request);
     assert_int_equal(made.layers, 1);
 }
 
@@ -199,13 +200,13 @@ TEST(both_eyes_are_those_of_views_half_the_distance_aside)
     key = varied_key();
     views_give_key(views, &key);
     for (int over = 0; over < 2; over++) {
-        const struct views_wish wish = {.width = EDGE,
-                                        .height = EDGE,
-                                        .camera = camera_at(0.01f),
-                                        .baseline = 0.1f,
-                                        .over = over,
-                                        .frame_ns = 1000000};
-        const uint64_t number = views_want(views, &wish);
+        const struct views_request request = {.width = EDGE,
+                                              .height = EDGE,
+                                              .camera = camera_at(0.01f),
+                                              .baseline = 0.1f,
+                                              .over = over,
+                                              .frame_ns = 1000000};
+        const uint64_t number = views_start(views, &request);
         wait_for_best(number);
         const uint32_t width = over ? EDGE : EDGE / 2, height = over ? EDGE / 2 : EDGE;
         const float left = expect_eye(alike.warp, 0, 0, width, height, 0.01f - 0.05f);
@@ -221,17 +222,17 @@ TEST(a_final_picture_stays_the_key_until_its_views_have_holes)
 {
     struct views_key key = some_key(100);
     views_give_key(views, &key);
-    wait_for_best(want(0.01f));
+    wait_for_best(start(0.01f));
     key = some_key(50);
     key.is_moving = true;
     key.is_final = false;
     views_give_key(views, &key);
-    const uint64_t near = want(0.02f);
+    const uint64_t near = start(0.02f);
     wait_for_best(near);
     assert_int_equal(grey(), 100);
     assert_true(views_unseen(&made) > 0 && views_unseen(&made) < 0.03f);
     /* Farther aside more than PLAN_UNSEEN_LITTLE is unseen. */
-    wait_for_best(want(0.15f));
+    wait_for_best(start(0.15f));
     assert_int_equal(grey(), 50);
 }
 
@@ -239,9 +240,9 @@ TEST(a_view_has_no_more_pixels_than_its_key_shows)
 {
     struct views_key key = some_key(100);
     views_give_key(views, &key);
-    wait_for_best(want_of(4 * EDGE, 2 * EDGE, 0));
+    wait_for_best(start_of_size(4 * EDGE, 2 * EDGE, 0));
     assert_true(picture.width == 2 * EDGE && picture.height == EDGE);
-    wait_for_best(want_of(EDGE / 2, EDGE / 2, 0));
+    wait_for_best(start_of_size(EDGE / 2, EDGE / 2, 0));
     assert_true(picture.width == EDGE / 2 && picture.height == EDGE / 2);
 }
 
@@ -250,17 +251,17 @@ TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
     struct views_key key = some_key(100);
     views_give_key(views, &key);
     for (int motion = 0; motion < 20; motion++) {
-        want(0.05f);
+        start(0.05f);
         poll(NULL, 0, motion % 4); /* it is made, or it is not */
-        views_want_none(views);
+        views_stop(views);
         assert_false(views_take(views, &picture, &made));
-        const uint64_t wish = want(-0.05f);
+        const uint64_t request = start(-0.05f);
         wait_for_one();
-        assert_true(made.wish == wish);
-        views_want_none(views);
+        assert_true(made.request == request);
+        views_stop(views);
     }
     views_forget_keys(views);
-    want(0);
+    start(0);
     poll(NULL, 0, 5);
     assert_false(views_take(views, &picture, &made));
 }
@@ -270,7 +271,7 @@ TEST(a_picture_of_which_no_view_can_be_made_is_reported_and_the_next_one_helps)
     struct fl_warp_error why = {0};
     struct views_key key = some_key(100);
     key.camera.world_from_view[0] = NAN;
-    want(0);
+    start(0);
     views_give_key(views, &key);
     const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
     while (!views_take_error(views, &why) && monotonic_now_ns() < end_ns)
