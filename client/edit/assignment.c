@@ -197,7 +197,7 @@ static bool read_numbers(const struct fl_field *field, const char *text, struct 
             return true;
         break;
     }
-    fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not what %s takes", text, field->name);
+    fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a valid value of %s", text, field->name);
     if (field->count == 1)
         return fl_error_remedy(error, "give a number");
     return fl_error_remedy(error, "give %u numbers, with commas in between%s%s", field->count,

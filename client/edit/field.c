@@ -122,7 +122,7 @@ static size_t node_fields(struct fl_field fields[FL_FIELDS_MAX])
 {
     fields[0] = made("translate", EDIT_TRANSLATE, 3, COORDINATE_MAX);
     fields[0].unit = "metres";
-    fields[0].doc = "from the place of what is above it";
+    fields[0].doc = "from the place of its parent";
     fields[1] = made("rotate", EDIT_ROTATE, 3, ANGLE_MAX);
     fields[1].unit = "degrees";
     fields[1].doc = "about x, then y, then z";

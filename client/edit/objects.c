@@ -332,7 +332,8 @@ bool edit_object_read(struct fl_scene *scene, enum protocol_object_kind kind, ui
         !fl_connection_answer(connection, request, type, &received, until_ns, error))
         return false;
     if (id_in(&received.message) != id)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, message_type_text(type), "it is not object %u", id);
+        return fl_error_set(error, FL_ERROR_PROTOCOL, message_type_text(type),
+                            "the answer is for another object than %u", id);
     if (!keep_message(object, &received.message, error) ||
         !fl_connection_answer(connection, request, MESSAGE_OK, &received, until_ns, error))
         return false;

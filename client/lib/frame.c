@@ -91,7 +91,7 @@ static bool check_attachments(const struct fl_assembly *assembly, const struct m
                             (unsigned long long)begin->normal_bytes);
     return (has_sticking == (begin->sticking_bytes > 0) && begin->sticking_bytes <= maximum) ||
            fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.sticking_bytes",
-                        "%llu bytes cannot say what sticks", (unsigned long long)begin->sticking_bytes);
+                        "the sticking map cannot have %llu bytes", (unsigned long long)begin->sticking_bytes);
 }
 
 static bool is_expected_size(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)

@@ -115,7 +115,7 @@ bool fl_scene_find_camera(const struct fl_scene *scene, const char *which, uint3
     }
     fl_error_set(error, FL_ERROR_ARGUMENT, "--camera", "the model has no camera '%s'", which);
     if (scene->camera_count == 0)
-        return fl_error_remedy(error, "it has no cameras; use --eye and --look-at");
+        return fl_error_remedy(error, "the scene has no cameras; use --eye and --look-at");
     return fl_error_remedy(error, "it has %zu; 'farlight info' lists them", scene->camera_count);
 }
 

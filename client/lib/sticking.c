@@ -16,8 +16,8 @@ uint8_t *fl_sticking_decode(const uint8_t *encoded, uint64_t encoded_bytes, uint
     if (!good)
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     else if (ZSTD_decompress(blocks, count, encoded, (size_t)encoded_bytes) != count)
-        good = fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "what sticks does not decompress to %zu blocks",
-                            count);
+        good = fl_error_set(error, FL_ERROR_PROTOCOL, "frame",
+                            "the sticking map does not decompress to %zu blocks", count);
     else if (!sticking_restore(blocks, width, height, shares))
         good = fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "more than all of a block sticks");
     free(blocks);

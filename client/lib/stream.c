@@ -222,8 +222,8 @@ static bool report_broken_seal(const struct fl_stream *stream, const struct deco
                               &ignored) == HANDSHAKE_CONSUMED &&
         fl_stream_is_turned_away(&reply, error))
         return false;
-    return fl_error_set(error, FL_ERROR_PROTOCOL, "", "the data is not what %s has sealed: %s: %s", stream->peer,
-                        why->field, why->text);
+    return fl_error_set(error, FL_ERROR_PROTOCOL, "", "the data differs from the data that %s sealed: %s: %s",
+                        stream->peer, why->field, why->text);
 }
 
 /* Moves opened bytes from the link to the message buffer as far as they fit. */

@@ -249,7 +249,7 @@ static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *erro
     if (!frame || frame->frame != number || (frame->moving && frame->hidden_layer == 0) ||
         frame->encoding == PROTOCOL_ENCODING_H264)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end.abandoned",
-                            "frame %u ended incomplete, which is allowed only at rest and for what is hidden",
+                            "frame %u ended incomplete, which is allowed only at rest and for hidden layers",
                             number);
     fl_assembly_finish(&view->assembly);
     return true;

@@ -134,7 +134,7 @@ static bool check_frame(const struct fl_y4m *y4m, const struct fl_frame *frame, 
         return true;
     fl_error_set(error, FL_ERROR_ARGUMENT, "size", "frame %u has %ux%u pixels, but the video has %ux%u",
                  frame->frame, frame->width, frame->height, y4m->converter.width, y4m->converter.height);
-    return fl_error_remedy(error, "all frames of a video have the size of its first");
+    return fl_error_remedy(error, "all frames of a video must have the size of the first");
 }
 
 bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_error *error)

@@ -86,7 +86,7 @@ static const struct argp_option special[] = {
     {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", CLI_GROUP_OUTPUT},
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", CLI_GROUP_OUTPUT},
     {"exr-compression", KEY_EXR_COMPRESSION, "zip|dwaa", 0,
-     "EXR without loss (default), or smaller: colours lose what is hardly seen, other layers nothing",
+     "EXR without loss (default), or smaller files: colours lose barely visible detail, other layers nothing",
      CLI_GROUP_OUTPUT},
     {"colour-space", KEY_COLOUR_SPACE, "NAME", 0,
      "Colours of an EXR file: ACEScg, ACES2065-1, Linear Rec.2020, Linear P3-D65, or a space of --ocio (default: "
@@ -97,7 +97,7 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"ocio", KEY_OCIO, "FILE", 0, "Configuration of OpenColorIO (default: $OCIO)", CLI_GROUP_OUTPUT},
     {"metadata", KEY_METADATA, "stable|full", 0,
-     "What files say of themselves: what is the same for the same request (default), or times and paths, too",
+     "Metadata of files: only data that is the same for the same request (default), or times and paths, too",
      CLI_GROUP_OUTPUT},
     {"server", KEY_SERVER, "ADDRESS", 0,
      "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: a private daemon for this command)",
@@ -139,7 +139,7 @@ static const struct argp_option special[] = {
      "Show the shadows of the model on a ground beneath it, which is not seen itself; also over no background",
      CLI_GROUP_OUTPUT},
     {"studio", KEY_STUDIO, "on|off", 0,
-     "Add what a model lacks for a picture: a ground where it has no light, else a sky beside its lights, but in "
+     "Complete a model for a picture: a ground where it has no light, else a sky beside its lights, except in "
      "rooms (default on)",
      CLI_GROUP_OUTPUT},
     {"denoise", KEY_DENOISE, "on|off|auto", OPTION_ARG_OPTIONAL,
@@ -147,20 +147,20 @@ static const struct argp_option special[] = {
      "files, --crop and comparisons)",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
-     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown, "
+     "Layers of an EXR file: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown, "
      "crypto-object and crypto-material (Cryptomatte, with names), motion (vectors to the next frame and the one "
      "before); light: the parts that add up to the beauty",
      CLI_GROUP_OUTPUT},
     {"light-group", KEY_LIGHT_GROUP, "NAME=NODE,..", 0,
-     "Give an EXR file the layer light_NAME: the light of these nodes and what is below them, lights and surfaces "
-     "that glow, and of `environment`; * stands for any characters. May be repeated: up to 7 groups, which add up "
+     "Give an EXR file the layer light_NAME: the light of these nodes and their descendants, lights and glowing "
+     "surfaces, and of `environment`; * stands for any characters. May be repeated: up to 7 groups, which add up "
      "to the picture with light_rest, all other light",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",
      CLI_GROUP_OUTPUT},
     {"eye", KEY_EYE, "X,Y,Z", 0, "Place of the camera; needs --look-at", CLI_GROUP_OUTPUT},
-    {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "What is in the middle of the picture", CLI_GROUP_OUTPUT},
+    {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "Place in the middle of the picture", CLI_GROUP_OUTPUT},
     {"up", KEY_UP, "X,Y,Z|x|y|z", 0,
      "Upward direction (default y); without --eye models are turned that were made with such an axis up",
      CLI_GROUP_OUTPUT},
@@ -169,7 +169,7 @@ static const struct argp_option special[] = {
     {"view", KEY_VIEW, "NAME", 0,
      "See all from the front (+z), back, left (-x), right (+x), top, bottom, or iso: from the front right above",
      CLI_GROUP_OUTPUT},
-    {"frame", KEY_FRAME, "NODE", 0, "See all of this node and what is below it ('farlight info' lists them)",
+    {"frame", KEY_FRAME, "NODE", 0, "Frame this node and its descendants ('farlight info' lists them)",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Several views in one picture, each of --size:", CLI_GROUP_VIEWS},
     {"stereo", KEY_VIEWS, "METRES", 0, "Two views, from eyes this far apart, such as 0.065", CLI_GROUP_OUTPUT},
@@ -184,7 +184,7 @@ static const struct argp_option special[] = {
      "but with --denoise and layers of motion or light)",
      CLI_GROUP_OUTPUT},
     {"lens", KEY_VIEWS + 5, "rays|quadtree", 0,
-     "What rays through the lens of --aperture meet: the scene (default), or depth layers of a sharp picture",
+     "Trace rays through the lens of --aperture in the scene (default), or in depth layers of a sharp picture",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Clips of the model ('farlight info' lists them):", CLI_GROUP_CLIPS},
     {"clip", KEY_CLIP, "NAME|INDEX", 0,
@@ -526,7 +526,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return 0;
     case KEY_CLIP:
         if (job->clips.count == CLI_CLIPS_MAX)
-            return cli_usage(job, field, "more than %d clips cannot be played at once", CLI_CLIPS_MAX);
+            return cli_usage(job, field, "at most %d clips can be played at once", CLI_CLIPS_MAX);
         job->clips.list[job->clips.count++] = (struct cli_clip){.which = value};
         return 0;
     case KEY_CLIP_ONCE:

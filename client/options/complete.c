@@ -65,7 +65,7 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
                   : job->series.digests  ? "--digests"
                   : job->series.is_chunk ? "--chunk"
                                          : "--shard",
-                  "a video is made of all frames at once");
+                  "a video needs all frames in one command");
         return fl_error_remedy(&job->error,
                                "write images, such as 'frames/%%04d.png', and a video of all of them");
     }
@@ -113,7 +113,7 @@ static bool complete_layers(struct cli_job *job)
         return fl_error_remedy(&job->error, "choose raw, zstd or predicted");
     }
     if (bytes * (unsigned)__builtin_popcount(wanted->layers) > FRAME_BYTES_MAX) {
-        cli_usage(job, "--layers", "so many layers of %ux%u pixels are more than a frame can have", wanted->width,
+        cli_usage(job, "--layers", "the number of layers of %ux%u pixels exceeds a frame's limit", wanted->width,
                   wanted->height);
         return fl_error_remedy(&job->error, "render some of them at a time, or a smaller --size");
     }
@@ -157,12 +157,12 @@ static bool complete_pixels(struct cli_job *job)
         has[job->output.list[i].image] = true;
         if (is_linear(job->output.list[i].image) != is_linear(job->output.list[0].image)) {
             cli_usage(job, job->output.list[i].path,
-                      "8-bit pictures and linear light cannot come of one rendering");
+                      "one rendering cannot produce both 8-bit pictures and linear light");
             return fl_error_remedy(&job->error, "render once for EXR and HDR, and once for all else");
         }
     }
     if (job->output.float_pixels && job->output.half_pixels)
-        return cli_usage(job, "--float", "cannot go with --half") == 0;
+        return cli_usage(job, "--float", "cannot be combined with --half") == 0;
     if ((job->output.float_pixels && !has[CLI_IMAGE_EXR] && !has[CLI_IMAGE_HDR]) ||
         (job->output.half_pixels && !has[CLI_IMAGE_EXR]))
         return cli_usage(job, job->output.float_pixels ? "--float" : "--half", "%s files do not have such pixels",
@@ -269,16 +269,16 @@ static bool complete_camera(struct cli_job *job)
         return cli_usage(job, job->camera.has_eye ? "--eye" : "--look-at", "needs %s as well",
                          job->camera.has_eye ? "--look-at" : "--eye") == 0;
     if (has_key && job->camera.name)
-        return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
+        return cli_usage(job, "--camera", "cannot be combined with --eye and --look-at") == 0;
     if (!has_key && job->camera.has_up && !cli_turn_models(job))
         return false;
     if (job->camera.has_framing && (has_key || job->camera.name))
-        return cli_usage(
-                   job, job->camera.name ? "--camera" : "--eye",
-                   "cannot go with --view, --azimuth, --elevation, --frame, --zoom or --margin, which place the "
-                   "camera, too") == 0;
+        return cli_usage(job, job->camera.name ? "--camera" : "--eye",
+                         "cannot be combined with --view, --azimuth, --elevation, --frame, --zoom or --margin, "
+                         "which place the "
+                         "camera, too") == 0;
     if (job->camera.has_fov && job->camera.name)
-        return cli_usage(job, "--fov", "cannot go with --camera, which has its own") == 0;
+        return cli_usage(job, "--fov", "cannot be combined with --camera, which has its own") == 0;
     if (!has_key) {
         if (job->camera.has_fov)
             job->options.auto_fov = (float)((double)job->camera.key.fov_y / RADIANS_PER_DEGREE);
@@ -460,19 +460,20 @@ static bool complete_scene(struct cli_job *job)
     if (!job->input.scene)
         return job->input.model || cli_usage(job, "MODEL", "no model file is named") == 0;
     if (job->input.model)
-        return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other",
+        return cli_usage(job, "--scene", "cannot be combined with the model %s: it is one or the other",
                          job->input.model) == 0;
     if (job->light_groups.count > 0) {
-        cli_usage(job, "--light-group", "cannot go with --scene: it would change the scene of all its clients");
+        cli_usage(job, "--light-group",
+                  "cannot be combined with --scene: it would change the scene of all its clients");
         return fl_error_remedy(&job->error, "'farlight edit' sets light_group of its nodes, and --layers "
                                             "beauty,light_group has all of them");
     }
     if (job->input.edit_count > 0) {
-        cli_usage(job, "--edit", "cannot go with --scene: it would change the scene of all its clients");
+        cli_usage(job, "--edit", "cannot be combined with --scene: it would change the scene of all its clients");
         return fl_error_remedy(&job->error, "'farlight edit' does that");
     }
     if (job->input.environment)
-        return cli_usage(job, "--environment", "cannot go with --scene: that has its light already") == 0;
+        return cli_usage(job, "--environment", "cannot be combined with --scene: that has its light already") == 0;
     if (job->daemon.server)
         return true;
     cli_usage(job, "--scene", "no address of a daemon is given, and a shared scene is on one");
@@ -487,7 +488,7 @@ static bool complete_noise(struct cli_job *job)
         wanted->views_across * wanted->views_down > 1 || wanted->aperture > 0 || wanted->upsample > 1;
     if (!(wanted->noise > 0.0f) || wanted->view_source != PROTOCOL_VIEW_SOURCE_LAYERS || !is_made)
         return true;
-    cli_usage(job, "--noise", "pictures that are made of depth layers have a number of samples");
+    cli_usage(job, "--noise", "pictures made from depth layers have a fixed number of samples");
     return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
 }
 
@@ -496,7 +497,7 @@ static bool complete_ground(struct cli_job *job)
 {
     if (job->options.ground == 0 || job->options.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
         return true;
-    cli_usage(job, "--ground", "pictures that are made of depth layers show none");
+    cli_usage(job, "--ground", "pictures made from depth layers show no ground");
     return fl_error_remedy(&job->error, "render them as they are: --views rays, --lens rays");
 }
 
@@ -509,7 +510,7 @@ static bool complete_crop(struct cli_job *job)
         wanted->crop_y + wanted->crop_height > wanted->height) {
         cli_usage(job, "--crop", "%ux%u pixels from (%u, %u) on are not in a picture of %ux%u", wanted->crop_width,
                   wanted->crop_height, wanted->crop_x, wanted->crop_y, wanted->width, wanted->height);
-        return fl_error_remedy(&job->error, "--size is that of the whole picture");
+        return fl_error_remedy(&job->error, "--size gives the size of the whole picture");
     }
     const char *other = wanted->noise > 0.0f                                 ? "--noise"
                         : wanted->denoise != PROTOCOL_DENOISE_OFF            ? "--denoise"
@@ -519,7 +520,7 @@ static bool complete_crop(struct cli_job *job)
                                                                              : NULL;
     if (!other)
         return true;
-    cli_usage(job, "--crop", "cannot go with %s, which looks at pixels around", other);
+    cli_usage(job, "--crop", "cannot be combined with %s, which looks at pixels around", other);
     return fl_error_remedy(&job->error, "leave out one of them");
 }
 

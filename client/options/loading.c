@@ -127,7 +127,8 @@ static bool check_loaded(const struct fl_scene *scene, struct fl_error *error)
 {
     if (fl_scene_revision(scene) > 0)
         return true;
-    fl_error_set(error, FL_ERROR_REFUSED, "--scene", "nothing is in it yet; try again once its model is loaded");
+    fl_error_set(error, FL_ERROR_REFUSED, "--scene",
+                 "the scene is still empty; try again once its model is loaded");
     error->retryable = true;
     return false;
 }

@@ -26,7 +26,7 @@ error_t cli_set_model(struct cli_job *job, const char *path)
         if (strcmp(job->input.models[i].path, "-") == 0)
             return cli_usage(job, "MODEL", "standard input can be read only once");
     if (job->input.count == FL_MODELS_MAX)
-        return cli_usage(job, path, "more than %d models cannot be shown at once", FL_MODELS_MAX);
+        return cli_usage(job, path, "at most %d models can be shown at once", FL_MODELS_MAX);
     job->input.models[job->input.count++] = (struct fl_model){.path = path};
     job->input.model = job->input.models[0].path;
     return 0;
@@ -69,7 +69,7 @@ error_t cli_set_place(struct cli_job *job, const char *field, const char *value)
     placed.path = last->path;
     /* A further place adds another instance of the model. */
     if (last->is_placed && job->input.count == FL_MODELS_MAX)
-        return cli_usage(job, field, "more than %d models cannot be shown at once", FL_MODELS_MAX);
+        return cli_usage(job, field, "at most %d models can be shown at once", FL_MODELS_MAX);
     if (last->is_placed)
         last = &job->input.models[job->input.count++];
     *last = placed;
@@ -87,8 +87,10 @@ bool cli_turn_models(struct cli_job *job)
             axis = i;
     if (axis < 0 || job->input.count == 0) {
         cli_usage(job, "--up",
-                  axis < 0 ? "is no axis, and there is no --eye" : "turns model files, and none is named");
-        return fl_error_remedy(&job->error, "x, y, z, -x, -y or -z, or any direction with --eye and --look-at");
+                  axis < 0 ? "is no axis, and there is no --eye"
+                           : "this option turns model files, and no model file is given");
+        return fl_error_remedy(&job->error,
+                               "use x, y, z, -x, -y or -z, or any direction with --eye and --look-at");
     }
     for (size_t i = 0; i < job->input.count; i++) {
         struct fl_model *model = &job->input.models[i];

@@ -106,14 +106,14 @@ static bool complete_eyes(struct cli_job *job)
     const struct cli_views *views = &job->views;
     struct message_render *wanted = &job->options;
     if (views->has_stereo && views->has_light_field)
-        return refuse(job, "--stereo", "cannot go with --light-field", "leave out one of them");
+        return refuse(job, "--stereo", "cannot be combined with --light-field", "leave out one of them");
     if (views->has_layout && !views->has_stereo)
         return refuse(job, "--stereo-layout", "there are not two views", "add --stereo 0.065");
     if (views->has_light_field && !views->has_baseline)
-        return refuse(job, "--light-field", "the distance of its eyes is not given", "add --baseline 0.1");
+        return refuse(job, "--light-field", "the distance between its eyes is missing", "add --baseline 0.1");
     if (views->has_baseline && !views->has_light_field)
         return refuse(job, "--baseline", "there is no light field",
-                      "add --light-field 5x5; the distance of two eyes is that of --stereo");
+                      "add --light-field 5x5; --stereo gives the distance between two eyes");
     if (views->has_light_field) {
         wanted->views_across = views->across;
         wanted->views_down = views->down;
@@ -154,10 +154,10 @@ static bool complete_source(struct cli_job *job)
         wanted->view_source = has_views && (!is_rendered || wanted->upsample > 1) ? PROTOCOL_VIEW_SOURCE_LAYERS
                                                                                   : PROTOCOL_VIEW_SOURCE_RAYS;
     if (wanted->view_source == PROTOCOL_VIEW_SOURCE_RAYS && wanted->upsample > 1)
-        return refuse(job, "--upsample", "frames between those that are rendered are not made of rays",
+        return refuse(job, "--upsample", "frames between rendered frames are not made of rays",
                       views->has_views ? "add --views quadtree" : "leave out --lens rays");
     if (wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS && is_filtered)
-        return refuse(job, "--denoise", "pictures that are made of depth layers are not filtered",
+        return refuse(job, "--denoise", "pictures made from depth layers are not denoised",
                       wanted->upsample > 1 ? "leave out --denoise or --upsample"
                       : has_views          ? "leave it out, or add --views rays"
                                            : "leave it out, or add --lens rays");

@@ -198,9 +198,7 @@ int main(int argc, char **argv)
         {"fd", KEY_FD, "N", 0, "Connected stream socket to speak over (needed)", 0},
         {"folder", KEY_FOLDER, "DIR", 0, "The one folder that may be written to", 0},
         {"format", KEY_FORMAT, "NAME", 0,
-         "What is written: png, jpeg, exr, hdr, webp, tiff or gif, only (default: any, which takes longer to "
-         "start)",
-         0},
+         "Formats: png, jpeg, exr, hdr, webp, tiff or gif, only (default: any, which takes longer to start)", 0},
         {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
         {"merge", KEY_MERGE, NULL, 0, "The files FILE.. are parts of a picture that becomes one file", 0},
         {"text", KEY_TEXT, NULL, 0, "Text may be drawn into pictures", 0},
@@ -212,7 +210,7 @@ int main(int argc, char **argv)
         {"colour-space", KEY_COLOUR_SPACE, "NAME", 0, "Convert the colours of EXR files to this space", 0},
         {"display-view", KEY_DISPLAY_VIEW, "VIEW", 0, "Make pictures of 8 bits by this view of a display", 0},
         {"full-metadata", KEY_FULL_METADATA, NULL, 0,
-         "Store what differs from run to run, too: date, times of stages, revision", 0},
+         "Store metadata that differs between runs, too: date, times of stages, revision", 0},
         {0}};
     static const struct argp argp = {.options = rows,
                                      .parser = parse,

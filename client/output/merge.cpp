@@ -102,7 +102,7 @@ void read_name(part &one)
     if (!take_number(one.device, one.number, '/') || !take_number(one.device, one.parts, ' ') ||
         !take_number(one.device, one.digest, ' ', 16) || one.number < 1 || one.number > one.parts ||
         one.parts > SQUARES_PARTS_MAX)
-        throw refusal(one.path, "does not say of what it is a part");
+        throw refusal(one.path, "does not say which picture it belongs to");
 }
 
 void read_rays(part &one)
@@ -216,7 +216,7 @@ std::vector<part> sorted(std::vector<part> parts)
         throw refusal("",
                       listed(missing) + " of " + std::to_string(count) + (missing.size() == 1 ? " is" : " are") +
                           " missing",
-                      "render what is missing, and name the files of all parts");
+                      "render the missing parts, and name the files of all parts");
     return all;
 }
 

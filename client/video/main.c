@@ -84,7 +84,7 @@ int main(int argc, char **argv)
     static const struct argp_option rows[] = {
         {"fd", KEY_FD, "N", 0, "Connected stream socket to speak over (needed)", 0},
         {"folder", KEY_FOLDER, "DIR", 0, "The one folder that may be written to (needed)", 0},
-        {"gif", KEY_GIF, NULL, 0, "Load what GIF files need", 0},
+        {"gif", KEY_GIF, NULL, 0, "Load the libraries for GIF files", 0},
         {0}};
     static const struct argp argp = {
         .options = rows, .parser = parse, .doc = "Write videos for farlight, which starts this program."};

@@ -81,7 +81,7 @@ static bool plan_film(struct video_plan *plan, const struct message_video_begin 
     if (!chosen)
         return false;
     if (chosen->lossless && strcmp(plan->container, "mp4") == 0)
-        return video_fail(failure, "lossless", "use the ending .mkv", "an MP4 file does not hold FFV1");
+        return video_fail(failure, "lossless", "use the ending .mkv", "an MP4 file cannot contain FFV1");
     if (wanted->quality > FACTOR_MAX)
         return video_fail(failure, "quality", NULL, "a video has 1 (best) to %d", FACTOR_MAX);
     plan->encoder = chosen->encoder;
@@ -123,7 +123,7 @@ bool video_plan(struct video_plan *plan, const struct message_video_begin *wante
     const struct container *container = container_of(wanted->path, wanted->format);
     if (!container)
         return video_fail(failure, "path", "use the ending .mp4, .mkv, .webp or .gif",
-                          "the ending is not that of a video format that can be written");
+                          "the ending belongs to no supported video format");
     *plan = (struct video_plan){.container = container->name, .lossless = wanted->lossless != 0};
     return container->encoder ? plan_moving_picture(plan, container, wanted, failure)
                               : plan_film(plan, wanted, failure);

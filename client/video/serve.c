@@ -89,7 +89,7 @@ static bool check_frame(const struct session *session, const struct message_fram
     if (begin->layers != 1u << PROTOCOL_LAYER_BEAUTY)
         return video_fail(failure, "layers", "render without layers", "a video can store only the picture");
     if (session->frames > 0 && (begin->width != session->width || begin->height != session->height))
-        return video_fail(failure, "size", "all frames of a video have the size of its first",
+        return video_fail(failure, "size", "all frames of a video must have the size of the first",
                           "frame %u has %ux%u pixels, but the video has %ux%u", begin->frame, begin->width,
                           begin->height, session->width, session->height);
     return video_plan_allows(&session->plan, begin->width, begin->height, failure);

@@ -84,9 +84,9 @@ static const struct argp_option options[] = {
      "(auto, the default: where the daemon and the link take longer than a frame of the display)",
      -2},
     {"holes", KEY_HOLES, "fill|pattern", 0,
-     "Fill what no picture shows yet from what lies around it (default), or mark it", -2},
+     "Fill areas that no picture shows yet from their surroundings (default), or mark them", -2},
     {"state", KEY_STATE, "FILE|none", 0,
-     "Remember the window's place and what keys choose in this file (default: farlight/viewer.json in "
+     "Save the window's place and the settings chosen by keys in this file (default: farlight/viewer.json in "
      "$XDG_STATE_HOME or ~/.local/state; with --replay none)",
      -2},
     {"replay", KEY_REPLAY, "INPUT.json", 0, "Read timed input events from this file; exit after the last", -2},
@@ -154,7 +154,7 @@ static error_t set_choice(struct command_line *line, const char *option, const c
             *choice = i;
             return 0;
         }
-    return cli_usage(&line->job, option, "'%s' is none of its values, see --help", value);
+    return cli_usage(&line->job, option, "'%s' is not one of its values, see --help", value);
 }
 
 static error_t set_views(struct command_line *line, const char *value)

@@ -57,9 +57,9 @@ static const struct argp_option options[] = {
      -2},
     {"insecure", KEY_INSECURE, NULL, 0,
      "Let --listen be beyond this machine: who can read the network's traffic gets the link and the pictures", -2},
-    {"viewers", KEY_VIEWERS, "N", 0, "Let N browsers look at once, 1 to 64 (default 8)", -2},
+    {"viewers", KEY_VIEWERS, "N", 0, "Serve at most N browsers at a time, 1 to 64 (default 8)", -2},
     {"allow-edit", KEY_ALLOW_EDIT, NULL, 0,
-     "Print a second link: who has it may edit the scene, for all who look at it", -2},
+     "Print a second link, whose users may edit the scene for all who view it", -2},
     {"watch", KEY_WATCH, NULL, 0, "Load the model again when it, or a file that it names, has changed", -2},
     {"samples", KEY_SAMPLES, "N", 0, "Render N samples per pixel while nothing moves (default 64)", -2},
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
@@ -167,7 +167,7 @@ static bool check_listens(const struct command_line *line, struct fl_error *erro
             "%s is beyond this machine, where all traffic, the link with its token included, is unencrypted",
             address->host);
         return fl_error_remedy(error,
-                               "keep 127.0.0.1 and come by 'ssh -L %d:127.0.0.1:%d HOST' or through a TLS "
+                               "keep 127.0.0.1 and connect by 'ssh -L %d:127.0.0.1:%d HOST' or through a TLS "
                                "proxy on this machine; --insecure listens there nevertheless",
                                address->port, address->port);
     }
@@ -327,13 +327,10 @@ int main(int argc, char **argv)
         .parser = parse,
         .args_doc = "MODEL [--at PLACE] [MODEL [--at PLACE]]... [-- OPTION OF FARLIGHTD...]\n"
                     "--server ADDRESS --scene NAME",
-        .doc =
-            "Show a model, or a shared scene of a daemon, in browsers: prints a link, and serves who has it until "
-            "Ctrl-C.\v"
-            "The link has a random token; who has it can look, and change nothing; --allow-edit prints another "
-            "one. Each browser has a view of its "
-            "own. Without --server a daemon is started, which ends with the command; arguments after -- are its "
-            "options.",
+        .doc = "Show a model, or a shared scene of a daemon, in browsers: prints a link, and serves its users "
+               "until Ctrl-C.\vThe link has a random token; its users can view the scene, but not change it; "
+               "--allow-edit prints another one. Each browser has its own view. Without --server the command "
+               "starts a daemon, which ends with it; arguments after -- are the daemon's options.",
         .children = children};
     static struct command_line line;
     struct fl_error error = {0};

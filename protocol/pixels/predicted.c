@@ -217,7 +217,7 @@ struct predicted_result predicted_decode(const struct predicted_form *form, cons
     if (residuals && zeros) {
         size_t made = ZSTD_decompress(residuals, bytes, encoded, encoded_bytes);
         result = ZSTD_isError(made) ? failed(ZSTD_getErrorName(made))
-                 : made != bytes    ? failed("it has not as many bytes as the picture")
+                 : made != bytes    ? failed("its number of bytes differs from the picture's")
                                     : (struct predicted_result){.bytes = encoded_bytes};
         if (result.status == PREDICTED_DONE)
             add_predictions(form, residuals, zeros, pixels);

@@ -29,7 +29,7 @@ static bool check(int fd, const char *path, struct decode_error *error)
         return invalid(error, path, strerror(errno));
     }
     if (!S_ISREG(status.st_mode)) {
-        return invalid(error, path, "is no file that could hold a key");
+        return invalid(error, path, "is not a regular file, so it cannot hold a key");
     }
     if (status.st_uid != geteuid()) {
         return denied(error, path, "belongs to another user");

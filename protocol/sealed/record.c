@@ -50,7 +50,7 @@ enum sealed_result sealed_open(struct sealed *sealed, const uint8_t *bytes, size
     }
     *consumed_bytes = *plain_bytes = 0;
     if (sealed->stage != STAGE_OPEN || (sealed->opened_last && count > 0)) {
-        return sealed_fatal(sealed, error, "record", "none is to come");
+        return sealed_fatal(sealed, error, "record", "no record is expected");
     }
     if (count < LENGTH_BYTES) {
         return SEALED_NEED_MORE;
@@ -68,7 +68,7 @@ enum sealed_result sealed_open(struct sealed *sealed, const uint8_t *bytes, size
     uint8_t tag = 0;
     if (crypto_secretstream_xchacha20poly1305_pull(&sealed->receiving, plain, NULL, &tag, bytes + LENGTH_BYTES,
                                                    sealed_bytes, bytes, LENGTH_BYTES) != 0) {
-        return sealed_fatal(sealed, error, "record", "is not what was sealed: it was changed on the way");
+        return sealed_fatal(sealed, error, "record", "is not authentic: it was changed on the way");
     }
     const size_t opened_bytes = sealed_bytes - TAG_BYTES;
     if (tag != (opened_bytes == 0 ? crypto_secretstream_xchacha20poly1305_TAG_FINAL

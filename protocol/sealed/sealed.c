@@ -176,7 +176,7 @@ static enum sealed_result get_head(struct sealed *sealed, const uint8_t *bytes, 
         if (i != 5 && bytes[i] != wanted[i]) {
             return sealed_fatal(sealed, error, "head",
                                 i < 4 ? "these bytes begin no sealed connection"
-                                      : "this is not the message that was to come");
+                                      : "this is not the expected message");
         }
     }
     *third = count > 5 ? bytes[5] : 0;
@@ -284,7 +284,7 @@ static enum sealed_result take_client_proof(struct sealed *sealed, const uint8_t
     unsigned zero = 0;
     enum sealed_result result = get_head(sealed, bytes, count, 3, &zero, error);
     if (result == SEALED_CONSUMED && zero != 0) {
-        return sealed_fatal(sealed, error, "head", "this is not the message that was to come");
+        return sealed_fatal(sealed, error, "head", "this is not the expected message");
     }
     if (result != SEALED_CONSUMED) {
         return result;
@@ -350,7 +350,7 @@ static enum sealed_result take(struct sealed *sealed, const uint8_t *bytes, size
     if (sealed->stage == STAGE_PROOF) {
         return take_client_proof(sealed, bytes, count, out, out_bytes, error);
     }
-    return sealed_fatal(sealed, error, "head", "no message of the handshake is to come any more");
+    return sealed_fatal(sealed, error, "head", "no further message of the handshake is expected");
 }
 
 enum sealed_result sealed_handshake(struct sealed *sealed, const uint8_t *bytes, size_t count,

@@ -288,8 +288,8 @@ class Things(Case):
         node = tree.nodes.new("ShaderNodeWireframe")
         tree.links.new(node.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
         grid("ground", 8, odd)
-        self.assertIn("odd: Base Color comes from Wireframe, which is not known: its own value is used", self.told())
-        self.assertIn("odd: Base Color comes from Wireframe, which is not known: its own value is used", self.told(), "again")
+        self.assertIn("odd: Base Color comes from the unsupported node Wireframe: its own value is used", self.told())
+        self.assertIn("odd: Base Color comes from the unsupported node Wireframe: its own value is used", self.told(), "again")
 
     def test_procedural_textures_are_baked_and_are_those_of_cycles(self):
         self.from_above()
@@ -307,7 +307,7 @@ class Things(Case):
         add_light("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
         self.assert_like_cycles(0.01, 0.05)
         with unittest.mock.patch.object(bake.Surface, "picture") as baked:
-            self.assertEqual(self.told(), [f"made {place}: what its nodes say is baked into pictures of 1024 x 1024 texels" for place in range(6)])
+            self.assertEqual(self.told(), [f"made {place}: the result of its nodes is baked into pictures of 1024 x 1024 texels" for place in range(6)])
         baked.assert_not_called()  # nothing has changed
 
     def test_a_checker_is_baked_for_each_mesh_that_has_it(self):
@@ -327,7 +327,7 @@ class Things(Case):
         bare = grid("bare", 4, procedural("Checker", Scale=8, Color1=(0.8, 0.2, 0, 1), Color2=(0, 0.4, 0.6, 1)))
         bare.data.uv_layers.remove(bare.data.uv_layers[0])
         add_light("SUN", math.pi, angle=0)
-        self.assertIn("diffuse: a mesh without a UV map has the mean of what its nodes say", self.told())
+        self.assertIn("diffuse: a mesh without a UV map has the mean of its nodes' result", self.told())
         np.testing.assert_allclose(self.picture[36, 48, :3], (0.4, 0.3, 0.3), atol=0.02)  # three deviations of 4096 samples
 
     def test_bumps_of_noise(self):
@@ -379,7 +379,7 @@ class Things(Case):
         grid("ground", 8, mixture("Mix", ("BsdfDiffuse", {"Color": self.RED}), ("BsdfToon", {}), share=0.5))
         ball("ball", mixture("Add", ("BsdfPrincipled", {}), ("BsdfGlass", {})))
         self.assertEqual(sorted(self.told()), ["mixture.001: Add Shader adds Principled and Glass: Principled alone is shown",
-                                               "mixture: the node Toon BSDF is not known, and is left out of Mix Shader"])
+                                               "mixture: the node Toon BSDF is unsupported and is left out of Mix Shader"])
 
     def paint(self):
         """A group that is Lambert's, of a colour that it darkens."""

@@ -133,8 +133,8 @@ class Sides(OneDaemon):
 
     def test_what_contradicts_itself_is_refused_with_a_remedy(self):
         for options, words in ((["--view", "sideways"], "front, back, left"), (["--frame", "lid"], "box.obj"),
-                               (["--view", "top", "--eye", "1,2,3", "--look-at", "0,0,0"], "cannot go with"),
-                               (["--zoom", "2", "--camera", "0"], "cannot go with"), (["--margin", "0.6"], "0.45")):
+                               (["--view", "top", "--eye", "1,2,3", "--look-at", "0,0,0"], "cannot be combined with"),
+                               (["--zoom", "2", "--camera", "0"], "cannot be combined with"), (["--margin", "0.6"], "0.45")):
             with self.subTest(options=options):
                 result = farlight("render", self.box, "-o", self.folder / "x.png", *options)
                 self.assertNotEqual(result.returncode, 0)

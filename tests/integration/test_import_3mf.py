@@ -82,7 +82,7 @@ class ThreeMf(importer.Written):
         for element in ("m:texture2dgroup", "m:compositematerials", "m:multiproperties"):
             with self.subTest(element):
                 result = self.read(model(f'<{element} id="7"/>' + quad(triangles('pid="7" p1="0"'))))
-                self.assertIn("textures and mixtures of 3MF files are not shown", result.text())
+                self.assertIn("textures and mixtures of 3MF files are not supported", result.text())
                 self.assertEqual(self.names(result), [("default", 0, 2)])
 
     def test_components_share_their_mesh_and_stand_where_they_are_put(self):

@@ -148,7 +148,7 @@ class Gltf(importer.Written):
                                                               {"extensions": {"KHR_lights_punctual": {"light": 7}}}]})
         self.assert_has(result.of(SET_CAMERA), [{"fov_y": 0.7}])
         for wanted in ("cameras[1]: the camera is left out: yfov", "cameras[2]: the camera is left out: ymag",
-                       "nodes[4]: the camera is left out: there is no", "nodes[5]: the light is left out: there is no"):
+                       "nodes[4]: the camera is left out: no camera", "nodes[5]: the light is left out: no light"):
             self.assertIn(wanted, result.text())
 
     def test_percent_signs_in_names_stand_for_themselves_or_for_characters(self):

@@ -138,7 +138,7 @@ class Parts(PartsCase, OneDaemon):
                 self.assertIn("--part", result.stderr)
                 self.assertIn(words, result.stderr)
         result = farlight("render", "--scene", "x", "--part", "1/2", "-o", self.folder / "x.exr")
-        self.assertIn("--part: cannot go with --scene", self.expect(result, 2).stderr)
+        self.assertIn("--part: cannot be combined with --scene", self.expect(result, 2).stderr)
         result = farlight("render", "-", "--part", "1/2", "-o", self.folder / "x.exr", input="")
         self.assertIn("standard input", self.expect(result, 2).stderr)
 

@@ -83,7 +83,7 @@ BEYOND_THE_SCHEMA = [
     ("stills", ("output",), "%d/0001.exr", "output: '%d/0001.exr': the frame's number may only be in the file's"),
     ("dolly", ("depth",), 2, "contradicts"),
     ("furnished", ("models",), ["-", {"model": "-"}], "models[1].model: standard input can be read only once"),
-    ("movie", ("outputs", 0), "movie.webm", "outputs[0]: the ending is not that of a known format"),
+    ("movie", ("outputs", 0), "movie.webm", "outputs[0]: the ending belongs to no known format"),
 ]
 
 

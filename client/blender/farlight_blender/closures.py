@@ -158,7 +158,7 @@ class Closures:
             try:
                 return shading.value(fed, points)
             except shading.Unknown as unknown:
-                self._note(f"{name} comes from {unknown}, which is not known: its own value is used")
+                self._note(f"{name} comes from the unsupported node {unknown}: its own value is used")
                 return constant(fixed).at(points)
         if shading.is_constant(socket):
             first = at(shading.nowhere())[0]
@@ -243,7 +243,7 @@ class Closures:
             if part is not None:
                 made.append(part)
             elif start is not None:
-                self._note(f"the node {start.node.name} is not known, and is left out of {node.name}")
+                self._note(f"the node {start.node.name} is unsupported and is left out of {node.name}")
         return made
 
     def _mixture(self, node: nodes.Node) -> Optional[Closure]:

@@ -130,7 +130,7 @@ class Reader:
             reading.values.update(base_colour=(0, 0, 0, 1), specular=0.0)  # no shader: black, as in Cycles
         else:
             if shader is not None:
-                self._note(reading, f"the node {shader.name} is not known: the material's viewport colour is used")
+                self._note(reading, f"the node {shader.name} is unsupported: the material's viewport colour is used")
             reading.values.update(base_colour=_in_range((*material.diffuse_color[:3], 1)), metallic=material.metallic,
                                   roughness=material.roughness)
         if volume is not None:
@@ -180,7 +180,7 @@ class Reader:
         """Reduces a value to one number or colour."""
         if value.constant is not None:
             return value.constant
-        self._note(reading, f"the mean of what its nodes say is its {name}")
+        self._note(reading, f"its {name} is the mean of its nodes' result")
         made = value.at(self._points(reading)).mean(axis=0)
         return tuple(float(one) for one in made) if made.ndim else float(made)
 
@@ -199,12 +199,12 @@ class Reader:
             return picture and (*pack(*(picture.filled(value.at(picture.points)) for value in values)), picture.transform, self._mirror.notes[before:])
         made = self._mirror.remembered(key, told, make)
         if made is None:
-            self._note(reading, "a mesh without a UV map has the mean of what its nodes say")
+            self._note(reading, "a mesh without a UV map has the mean of its nodes' result")
             return None
         texels, left, transform, notes = made
         for note in notes:
             self._mirror.note(note)
-        self._note(reading, f"what its nodes say is baked into pictures of {size} x {size} texels")
+        self._note(reading, f"the result of its nodes is baked into pictures of {size} x {size} texels")
         number = self._mirror.number(ObjectKind.TEXTURE, ("baked", *key))
         self._mirror.scene.add_texture(texels, srgb=place in {BASE_COLOUR, EMISSION}, texture=number, wrap_u=Wrap.CLAMP, wrap_v=Wrap.CLAMP)
         reading.textures[place] = TextureUse(number, 0, transform, 1)
@@ -311,7 +311,7 @@ class Reader:
         elif node.type == "BUMP":
             self._bump(reading, node)
             return
-        self._note(reading, f"{socket.name} comes from {start.node.name}, which is not known: its own value is used")
+        self._note(reading, f"{socket.name} comes from the unsupported node {start.node.name}: its own value is used")
 
     def _bump(self, reading: _Reading, node: nodes.Node) -> None:
         strength = nodes.number(node.inputs["Strength"]) * nodes.number(node.inputs["Distance"]) * (-1 if node.invert else 1)

@@ -37,15 +37,15 @@ class FarlightSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
     server: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Daemon", description="unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] for this scene; empty: the preferences' one")
     integrator: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Integrator", items=_choices(Integrator), default="path", description="How light is followed")
+        name="Integrator", items=_choices(Integrator), default="path", description="Method that traces light")
     tracer: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Tracer", items=_choices(Tracer), default="bvh", description="The acceleration structure")
     samples: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Samples", default=64, min=1, max=65536, description="Rays for each pixel; a multiple of the number of steps")
     step_samples: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Samples a step", default=16, min=1, max=4096, description="The picture is shown after so many")
+        name="Samples a step", default=16, min=1, max=4096, description="Samples between two updates of the picture")
     view_samples: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Viewport samples", default=32, min=1, max=4096, description="In the viewport, once it rests")
+        name="Viewport samples", default=32, min=1, max=4096, description="Samples in the viewport at rest")
     depth: bpy.props.IntProperty(name="Bounces", default=8, min=0, max=32)  # type: ignore[valid-type]
     use_auto_clamp: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Clamp by samples", default=True, description="Clamp indirect light at 10, below 64 samples at less, down to 1.25")
@@ -54,8 +54,8 @@ class FarlightSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
     denoise: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Denoise", items=_choices(Denoise), default="auto", description="auto: up to 64 samples")
     motion_steps: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Motion steps", default=16, min=1, max=256, description="A picture with motion blur in which the camera or a light moves "
-        "is the mean of so many frames, at most one a sample; other things blur without steps")
+        name="Motion steps", default=16, min=1, max=256, description="Frames averaged for a picture with motion blur in which the camera or a "
+        "light moves, at most one per sample; other things blur without steps")
     use_pass_albedo: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Denoising albedo", description="Base colours, as the pass Denoising Albedo")
 

@@ -56,5 +56,5 @@ def update(mirror: Mirror, scene: bpy.types.Scene) -> None:
             return
     colour, is_known = nodes.colour(background.inputs["Color"])
     if not is_known:
-        mirror.note("the world's colour comes from nodes that are not known")
+        mirror.note("the world's colour comes from unsupported nodes")
     mirror.scene.set_environment(tuple(one * strength for one in colour), light_group=group)

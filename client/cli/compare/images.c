@@ -196,21 +196,18 @@ int cli_compare(int argc, char **argv)
         .args_doc = "IMAGE IMAGE\nMODEL --tracers A,B\nMODEL --stereo METRES|--light-field NxM|--lens "
                     "quadtree|--upsample N",
         .doc = "Measure the difference of two images of one size, of two tracers on a model, ray by ray, or of "
-               "pictures "
-               "that are made of depth layers and rendered ones.\v"
-               "Options of the second form: 'farlight compare --tracers bvh,reference --help', of the third: "
-               "'farlight compare --stereo 0.065 --help'. "
-               "Images are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as a "
-               "screen shows them, 0 to 1. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared."};
+               "pictures made from depth layers and rendered ones.\vOptions of the second form: 'farlight compare "
+               "--tracers bvh,reference --help', of the third: 'farlight compare --stereo 0.065 --help'. Images "
+               "are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as a screen "
+               "shows them, 0 to 1. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared."};
     struct comparing comparing = {0};
     if (cli_parse(&argp, argc, argv, 0, &comparing) != 0)
         return cli_trouble(&comparing.job.error);
     if (comparing.operand_count < 2) {
         cli_usage(&comparing.job, "IMAGE", "two image files are needed");
-        fl_error_remedy(
-            &comparing.job.error,
-            "name them, or compare tracers on a model with --tracers bvh,reference, or what is made of "
-            "depth layers with --stereo 0.065");
+        fl_error_remedy(&comparing.job.error,
+                        "name them, or compare tracers on a model with --tracers bvh,reference, or pictures made "
+                        "from depth layers with --stereo 0.065");
         return cli_trouble(&comparing.job.error);
     }
     return compare_images(&comparing);

@@ -21,7 +21,7 @@ enum key { KEY_PICTURE = 'o', KEY_TIME = 0x600, KEY_THRESHOLD, KEY_HEAT_TOP, KEY
 static const struct argp_option options[] = {
     {"time", KEY_TIME, "SECONDS", 0, "Compare at this time of the clips (default 0)", 0},
     {"output", KEY_PICTURE, "PICTURE", 0,
-     "Write the reference, what is compared with it and the errors side by side, PNG or JPEG", 0},
+     "Write the reference, the compared picture and the errors side by side, PNG or JPEG", 0},
     {"heat-top", KEY_HEAT_TOP, "ERROR", 0,
      "Set the error that gets the brightest colour (default: the maximum error, at most 1)", 0},
     {"threshold", KEY_THRESHOLD, "ERROR", 0, "Count a pixel as beyond if a channel differs by more (default 0.01)",
@@ -87,7 +87,7 @@ bool cli_pair_complete(struct cli_pair *pair, bool is_series)
 {
     struct cli_job *job = &pair->job;
     if (job->clips.time_s != 0 && (is_series || job->clips.count == 0)) {
-        cli_usage(job, "--time", is_series ? "every frame has a time of its own" : "no clip is played");
+        cli_usage(job, "--time", is_series ? "every frame has its own time" : "no clip is played");
         return fl_error_remedy(&job->error, "%s", is_series ? "use --clip-start" : "add --clip NAME");
     }
     job->output.path = "picture";

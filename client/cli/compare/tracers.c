@@ -185,7 +185,7 @@ static void print_text(const struct tracer_comparison *comparison)
     if (agreement < comparison->min_agreement)
         printf("  over the limit: agree %.6g %%, at least %.6g %%\n", agreement * 100,
                comparison->min_agreement * 100);
-    printf("\nthe picture of %s and that of %s\n", reference, tracer);
+    printf("\nthe pictures of %s and %s\n", reference, tracer);
     cli_comparison_print(stdout, &comparison->figures, &comparison->pair.limits);
 }
 

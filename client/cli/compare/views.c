@@ -50,7 +50,7 @@ static const struct argp_option options[] = {
      "above "
      "the value (0.1%); else as for images, see 'farlight compare --help'. May be repeated",
      0},
-    {NULL, 0, NULL, 0, "Frames, of which --upsample makes some from others:", -2},
+    {NULL, 0, NULL, 0, "Frames, some of which --upsample makes from others:", -2},
     {0}};
 
 /* ---- command line ---- */
@@ -108,12 +108,12 @@ static bool complete(struct views_comparison *comparison)
     if (!cli_pair_complete(pair, comparison->is_series))
         return false;
     if (job->options.view_source != PROTOCOL_VIEW_SOURCE_LAYERS) {
-        cli_usage(job, job->views.has_lens ? "--lens" : "--views", "nothing is made of depth layers");
+        cli_usage(job, job->views.has_lens ? "--lens" : "--views", "no picture is made from depth layers");
         return fl_error_remedy(&job->error,
                                "use the source quadtree: the rendered picture is compared with it anyway");
     }
     pair->labels[CLI_PAIR_REFERENCE] = "rendered";
-    pair->labels[CLI_PAIR_COMPARED] = "made of depth layers";
+    pair->labels[CLI_PAIR_COMPARED] = "made from depth layers";
     return check_picture(comparison);
 }
 
@@ -243,8 +243,9 @@ static void print_text(const struct views_comparison *comparison)
         printf(", %ux%u views of", wanted->views_across, wanted->views_down);
     else
         putchar(',');
-    printf(" %ux%u, %u sample%s a pixel, %s: rendered, and made of depth layers\n", wanted->width, wanted->height,
-           wanted->samples, wanted->samples == 1 ? "" : "s", protocol_integrator_text(wanted->integrator));
+    printf(" %ux%u, %u sample%s a pixel, %s: rendered, and made from depth layers\n", wanted->width,
+           wanted->height, wanted->samples, wanted->samples == 1 ? "" : "s",
+           protocol_integrator_text(wanted->integrator));
     for (uint32_t i = 0; i < comparison->frame_count; i++)
         print_frame(comparison, &comparison->frames[i]);
     if (!comparison->is_series)
@@ -298,12 +299,10 @@ int cli_compare_views(int argc, char **argv)
         .parser = parse,
         .args_doc = "MODEL --stereo METRES\nMODEL --light-field NxM --baseline METRES\n"
                     "MODEL --aperture METRES --lens quadtree\nMODEL --frames A-B --upsample N",
-        .doc = "Make pictures of depth layers, render the same ones, and measure their difference and the share "
-               "that no "
-               "layer shows.\v"
-               "With --upsample each frame of a series is compared, and in the name of the pictures %d or %04d "
-               "stands "
-               "for its number. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared.",
+        .doc = "Make pictures from depth layers, render the same ones, and measure their difference and the share "
+               "that no layer shows.\vWith --upsample each frame of a series is compared, and in the name of the "
+               "pictures %d or %04d stands for its number. Exit status: 0 within all limits, 1 beyond a limit, 2 "
+               "not compared.",
         .children = children};
     /* Displayed colours are compared: in linear light a lamp displaced by a pixel would outweigh everything
      * else. Coverage is 1 where a layer has a surface, and is not compared. */

@@ -37,8 +37,8 @@ struct editing {
 static const struct argp_option options[] = {
     {"scene", KEY_SCENE, "NAME", 0, "Edit this scene ('farlight scenes' lists them)", 0},
     {"from", KEY_FROM, "FILE", 0, "Read assignments from this file, one a line; '-' is standard input", 0},
-    {"list", KEY_LIST, NULL, 0, "List what can be edited, or the fields and values of the objects that are named",
-     0},
+    {"list", KEY_LIST, NULL, 0,
+     "List the objects that can be edited, or the fields and values of the named objects", 0},
     {"json", KEY_JSON, NULL, 0, "With --list: print one JSON object per line", 0},
     {"print-undo", KEY_PRINT_UNDO, NULL, 0, "Print assignments that undo the edit, for --from", 0},
     {0}};
@@ -151,7 +151,7 @@ static bool read_assignments(struct editing *editing, struct fl_error *error)
     if (editing->assignment_count > 0)
         return true;
     fl_error_set(error, FL_ERROR_ARGUMENT, editing->from ? editing->from : "", "there is nothing to change");
-    return fl_error_remedy(error, "write material.Steel.roughness=0.2 or hide=Roof; --list shows what there is");
+    return fl_error_remedy(error, "write material.Steel.roughness=0.2 or hide=Roof; --list shows all objects");
 }
 
 static bool edit(const struct editing *editing, struct fl_scene *scene, struct fl_error *error)

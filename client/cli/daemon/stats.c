@@ -36,9 +36,9 @@ static const struct argp_option options[] = {
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {"limits", KEY_LIMITS, NULL, 0, "Show the daemon's limits too (JSON always contains them)", 0},
     {"watch", KEY_WATCH, "SECONDS", OPTION_ARG_OPTIONAL,
-     "Show them again after so many seconds (default 2), until Ctrl-C; write --watch=10", 0},
+     "Repeat at this interval in seconds (default 2) until Ctrl-C; write --watch=10", 0},
     {"prometheus", KEY_PROMETHEUS, "FILE", OPTION_ARG_OPTIONAL,
-     "Print what Prometheus reads, or replace FILE by it, as node_exporter reads it; write --prometheus=FILE", 0},
+     "Print statistics for Prometheus, or replace FILE by them for node_exporter; write --prometheus=FILE", 0},
     {0},
 };
 
@@ -345,7 +345,7 @@ int cli_stats(int argc, char **argv)
         return cli_report(&wanted.job.error);
     struct fl_error error = {0};
     if (wanted.json && wanted.prometheus) {
-        fl_error_set(&error, FL_ERROR_ARGUMENT, "--prometheus", "cannot be had together with --json");
+        fl_error_set(&error, FL_ERROR_ARGUMENT, "--prometheus", "cannot be combined with --json");
         return cli_report(&error);
     }
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight stats", true, &error);

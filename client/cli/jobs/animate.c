@@ -40,7 +40,7 @@ struct animation {
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Animation:", -2},
     {"script", KEY_SCRIPT, "SHOT.json", 0,
-     "Read what to render from a file (farlight-shot(5)); options of the command line override it", 0},
+     "Read the settings from a shot file (farlight-shot(5)); options of the command line override it", 0},
     {"scene", KEY_SCENE, "NAME", 0,
      "Use a shared scene at --server in place of MODEL ('farlight scenes' lists them)", 0},
     {"dry-run", KEY_DRY_RUN, NULL, 0, "Check options and script without rendering", 0},
@@ -50,8 +50,7 @@ static const struct argp_option options[] = {
     {"chunk", KEY_CHUNK, "K/N", 0, "Render only the K-th of N runs of neighbouring frames", 0},
     {"resume", KEY_RESUME, NULL, 0, "Skip frames whose files exist, are complete and have the requested size", 0},
     {"digests", KEY_DIGESTS, NULL, 0,
-     "Write FILE.sha256 beside each picture, for 'farlight verify'; --resume then renders again what differs from "
-     "it",
+     "Write FILE.sha256 beside each picture, for 'farlight verify'; --resume then renders changed pictures again",
      0},
     {0}};
 
@@ -59,7 +58,7 @@ static error_t set_part(struct cli_job *job, const char *value, bool is_chunk)
 {
     const char *option = is_chunk ? "--chunk" : "--shard";
     if (job->series.shard_parts > 0 && job->series.is_chunk != is_chunk)
-        return cli_usage(job, option, "cannot go with %s", is_chunk ? "--shard" : "--chunk");
+        return cli_usage(job, option, "cannot be combined with %s", is_chunk ? "--shard" : "--chunk");
     job->series.is_chunk = is_chunk;
     if (fl_text_shard(value, &job->series.shard_part, &job->series.shard_parts, &job->error))
         return 0;

@@ -65,7 +65,7 @@ bool cli_picture_part_complete(struct cli_job *job)
         return fl_error_remedy(&job->error, "-o part.exr; 'farlight merge' joins all parts");
     }
     if (other) {
-        cli_usage(job, "--part", "cannot go with %s, %s", other, why);
+        cli_usage(job, "--part", "cannot be combined with %s, %s", other, why);
         return fl_error_remedy(&job->error, "leave out one of them");
     }
     const struct squares squares = squares_of(wanted->width, wanted->height, job->part.count);

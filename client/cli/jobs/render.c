@@ -35,8 +35,7 @@ static const struct argp_option options[] = {
      -1},
     {"resume", KEY_RESUME, NULL, 0, "Render no part whose file exists, and is of the same picture", -1},
     {"watch", KEY_WATCH, NULL, 0,
-     "Render again when the model, or a file that it names, has changed, until Ctrl-C; only what is new is sent",
-     -1},
+     "Render again when the model, or a file that it names, has changed, until Ctrl-C; only changes are sent", -1},
     {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)

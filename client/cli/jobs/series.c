@@ -105,7 +105,7 @@ bool cli_series_complete(struct cli_job *job)
         return cli_usage(job, "--keys", "cannot be combined with --orbit, --camera or --eye") == 0;
     if (job->camera.is_orbit && job->camera.name)
         return cli_usage(job, "--orbit",
-                         "cannot be combined with --camera; it can begin at --eye and --look-at") == 0;
+                         "cannot be combined with --camera; use --eye and --look-at to place its beginning") == 0;
     if (job->camera.keys_file)
         return load_keys(job);
     /* Without motion of the camera or anything else, all frames would be equal. */

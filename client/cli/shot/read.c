@@ -131,7 +131,7 @@ bool shot_name(const struct shot_reader *reader, const struct shot_value *at, co
     }
     const double number = json_number_value(at->value);
     if (!json_is_number(at->value) || number < 0 || number > UINT32_MAX || floor(number) != number)
-        return shot_wrong(reader, at, "'farlight info' lists what a model has",
+        return shot_wrong(reader, at, "'farlight info' lists the contents of a model",
                           "must be a name, or a number counted from 0");
     char *text = shot_allocate(reader, 24, 1);
     if (!text)

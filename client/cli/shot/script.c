@@ -161,7 +161,7 @@ static bool apply_output(const struct shot_reader *reader, const struct shot_val
     if (output->image == CLI_IMAGE_UNKNOWN && !to_stdout)
         return shot_wrong(
             reader, at, "known: .png .jpg .jpeg .exr .hdr .webp .tiff .tif .gif .mp4 .mkv .y4m, or say \"format\"",
-            "the ending is not that of a known format");
+            "the ending belongs to no known format");
     output->image = cli_image_of_series(output->image, written);
     if (!to_stdout && !cli_image_is_video(output->image)) {
         if (!fl_pattern_parse(written, &pattern, &why))

@@ -28,7 +28,7 @@ namespace
 // ---- what the library says
 
 const char *const too_large =
-    "the file asks for more memory than a model may have: it is broken, or should be made of parts";
+    "the file needs more memory than a model may have: it is broken, or should be split into parts";
 
 bool begins(const char *words, const char *with)
 {

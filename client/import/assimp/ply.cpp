@@ -443,7 +443,7 @@ std::string mend_ply(reader &r, const unsigned char *bytes, size_t size_bytes)
     for (const element &one : from.elements)
         write_element(r, w, one, rows);
     if (w.has_ended && w.vertex_count == 0 && w.vertices.empty())
-        fail(r, "", "it is cut off before the end of its first vertex");
+        fail(r, "", "the file ends before the end of its first vertex");
     return written_head(w) + w.vertex_bytes + w.face_bytes;
 }
 

@@ -131,7 +131,7 @@ attachment camera_of(reader &r, const aiCamera &from)
     if (std::fabs(width - lost) < 1e-6 && !(from.mAspect > 0)) {
         width = 2 * std::atan(std::tan(pi / 8) * aspect);
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(),
-                    "the library does not tell this camera's field of view; 45 degrees are taken");
+                    "the library does not give this camera's field of view; 45 degrees are used");
     }
     set.name = name.c_str();
     set.near = cut(double(from.mClipPlaneNear) * r.metres, 0, 1e12);

@@ -86,7 +86,7 @@ void note_unknown_extensions(reader &r)
         list += (list.empty() ? "" : ", ") + name;
     if (!names.empty())
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "extensionsUsed",
-                    "what these extensions describe is not shown: %.400s", list.c_str());
+                    "these extensions are not supported: %.400s", list.c_str());
 }
 
 const tinygltf::Value *extension(const tinygltf::ExtensionMap &extensions, const char *name)

@@ -77,7 +77,7 @@ uint32_t light_id(reader &r, int index, const std::string &where)
 {
     if (index < 0 || size_t(index) >= r.model.lights.size()) {
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
-                    "the light is left out: there is no light of its number");
+                    "the light is left out: no light has its number");
         return 0;
     }
     const tinygltf::Light &light = r.model.lights[size_t(index)];

@@ -219,8 +219,9 @@ void check_buffers(reader &r)
         const char *kind = nullptr;
         if (!buffer.uri.empty() && buffer.uri.compare(0, 5, "data:") != 0 &&
             !files_is_buffer(buffer.data.data(), buffer.data.size(), &kind))
-            fail(r, place("buffers", i), "'%.200s' is %s; a buffer holds vertices and the like in binary form",
-                 buffer.uri.c_str(), kind);
+            fail(r, place("buffers", i),
+                 "'%.200s' is %s; a buffer must hold vertices and other data in binary form", buffer.uri.c_str(),
+                 kind);
     }
 }
 

@@ -32,7 +32,7 @@ uint32_t camera_id(reader &r, int index, const std::string &where)
     };
 
     if (size_t(index) >= r.model.cameras.size())
-        return leave_out(where, "there is no camera of its number");
+        return leave_out(where, "no camera has its number");
     const tinygltf::Camera &camera = r.model.cameras[size_t(index)];
     const std::string here = place("cameras", size_t(index));
     message_set_camera set = {};

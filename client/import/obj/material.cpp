@@ -144,7 +144,7 @@ void relief_maps(building &b, const tinyobj::material_t &m, const texcoord_sets 
     uses[at].strength =
         float(std::min(std::max(strength, -1e3), 1e3) * (at == PROTOCOL_MATERIAL_BUMP ? bump_height_m : 1));
     if (at == PROTOCOL_MATERIAL_NORMAL)
-        import_note(b.scene, PROTOCOL_SEVERITY_INFO, m.bump_texname.c_str(), "a bump map that holds normals");
+        import_note(b.scene, PROTOCOL_SEVERITY_INFO, m.bump_texname.c_str(), "a bump map with normals");
 }
 
 void note_unused(building &b, const tinyobj::material_t &m)
@@ -176,7 +176,7 @@ uint32_t add_material(building &b, const tinyobj::material_t &m, const texcoord_
         set.emission[c] = m.emission[c] > 0 ? std::min(m.emission[c], 1e6f) : 0;
     if (set.alpha_mode == PROTOCOL_ALPHA_BLEND && set.base_colour[3] <= 0 && m.alpha_texname.empty())
         import_note(b.scene, PROTOCOL_SEVERITY_WARNING, m.name.c_str(),
-                    "a material is wholly transparent (d 0 or Tr 1): nothing is seen of what has it");
+                    "a material is wholly transparent (d 0 or Tr 1): objects with it are invisible");
     surface_maps(b, m, sets, set, uses);
     relief_maps(b, m, sets, uses);
     note_unused(b, m);

@@ -157,7 +157,7 @@ std::string main_model(reader &r, unzFile zip, const std::vector<std::string> &m
     if (models.empty())
         fail(r, "", "it is no 3MF file: there is no model in it");
     if (models.size() > 1)
-        fail(r, "", "the 3MF file cannot be read: its relations name none of its %zu models", models.size());
+        fail(r, "", "the 3MF file cannot be read: its relationships name none of its %zu models", models.size());
     return models[0];
 }
 

@@ -195,7 +195,7 @@ class model_file
             read_unit();
         } else if (is("texture2dgroup") || is("compositematerials") || is("multiproperties")) {
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, place().c_str(),
-                        "textures and mixtures of 3MF files are not shown: what has them is grey");
+                        "textures and mixtures of 3MF files are not supported: objects with them are grey");
         } else if (is("beamlattice")) {
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, place().c_str(), "beams of 3MF files are not shown");
         }
@@ -250,7 +250,7 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 
 extern "C" bool threemf_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes)
 {
-    const char *too_large = "the file asks for more memory than a model may have: it should be made of parts";
+    const char *too_large = "the file needs more memory than a model may have: split it into parts";
     return reading::run(scene, too_large, [&] {
         threemf::reader r = {{scene}};
         threemf::import(r, bytes, size_bytes);

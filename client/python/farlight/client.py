@@ -146,7 +146,7 @@ class Client:
         if self._process == os.getpid():
             return
         self._process = os.getpid()
-        self._core.fail(ConnectionLost("the connection is that of the process which forked this one", retryable=False))
+        self._core.fail(ConnectionLost("the connection belongs to the process which forked this one", retryable=False))
         self._core = self._options.core(None)
         self._selector.close()
         self._selector = selectors.DefaultSelector()

@@ -195,8 +195,8 @@ class Core(Connection):
         answer, came = yield from self.ask(messages.ObjectGet(state.scene, thing.kind, thing.number),
                                            extra=READABLE[thing.kind])
         if came is None:
-            self.fail(ProtocolError("the object did not come", field="object_get"))
-            raise ProtocolError("the object did not come", field="object_get")
+            self.fail(ProtocolError("the answer has no object", field="object_get"))
+            raise ProtocolError("the answer has no object", field="object_get")
         return came, answer.revision
 
     def objects(self, scene: Scene, kind: messages.ObjectKind | str,

@@ -161,8 +161,8 @@ class Frame:
             is_node = thing.kind == ObjectKind.NODE
             nodes, materials = self.known.below({thing.number}) if is_node else set(), set() if is_node else {thing.number}
         else:
-            raise InvalidValue(f"{thing!r:.80} is no node or material", field="mask", remedy="give a name, or what an add_ function, find() "
-                               "or objects() of the scene returned")
+            raise InvalidValue(f"{thing!r:.80} is no node or material", field="mask", remedy="give a name, or a result of an add_ function, find() "
+                               "or objects() of the scene")
         ids = self.ids
         is_there: Array = np.isin(ids[..., 0], list(nodes)) if nodes else np.isin(ids[..., 1], list(materials))
         return is_there

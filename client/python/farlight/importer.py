@@ -126,7 +126,7 @@ def _run(link: address.Link, work: _Import, timeout: float, names: str) -> None:
         try:
             work.receive(data)
         except (ProtocolError, InvalidValue) as why:
-            raise ImportFailed(f"the importer sent what is not valid: {why}", field=names) from None
+            raise ImportFailed(f"the importer sent invalid data: {why}", field=names) from None
     if work.complaint:
         raise work.complaint
 

@@ -53,11 +53,11 @@ class Job:
         if self.came >= self.credit:
             raise ProtocolError(f"frame {self.came + 1} of a job with a credit of {self.credit}", field="frame_begin")
         if pixels > width * height or (not self.is_view and (begin.width, begin.height) != (width, height)):
-            raise ProtocolError(f"a picture of {begin.width}x{begin.height} where {width}x{height} was asked for",
+            raise ProtocolError(f"a picture of {begin.width}x{begin.height} where {width}x{height} was requested",
                                 field="frame_begin.width")
         encodings = {render.encoding, render.still_encoding} if self.is_view else {render.encoding}
         if begin.encoding not in encodings or (begin.format, begin.layers) != (render.format, render.layers or 1):
-            raise ProtocolError(f"{begin.encoding!r}, {begin.format!r}, layers {begin.layers}: not what was asked for",
+            raise ProtocolError(f"{begin.encoding!r}, {begin.format!r}, layers {begin.layers}: differs from the request",
                                 field="frame_begin.encoding")
         most = decode.encoded_bytes_max(begin, pixels_bytes(begin))
         attached = begin.depth_bytes + begin.normal_bytes + begin.sticking_bytes
@@ -79,11 +79,11 @@ class Job:
         if self.is_abandoned:
             return None
         if self.begun is None:
-            raise ProtocolError("comes without a frame_begin", field=message.NAME)
+            raise ProtocolError("arrives without a frame_begin", field=message.NAME)
         if isinstance(message, messages.FrameData):
             if message.offset_bytes != len(self.data) or len(self.data) + len(message.data) > self.begun.size_bytes:
                 raise ProtocolError(f"{len(message.data)} bytes at {message.offset_bytes}, where {len(self.data)} of "
-                                    f"{self.begun.size_bytes} have come", field="frame_data.offset_bytes")
+                                    f"{self.begun.size_bytes} have arrived", field="frame_data.offset_bytes")
             self.data += message.data
             return None
         assert isinstance(message, messages.FrameEnd)

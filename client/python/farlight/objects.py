@@ -157,7 +157,7 @@ class Objects:
         if not isinstance(thing, Object) or thing.kind not in kinds:
             wanted = "object" if kinds is ObjectKind else " or ".join(kind.word for kind in kinds)
             raise InvalidValue(f"{thing!r:.80} is no {wanted} of the scene", field=field,
-                               remedy="give what an add_ function, find() or objects() returned")
+                               remedy="give a result of an add_ function, find() or objects()")
         if thing not in self._objects and not self.is_attached and thing != ENVIRONMENT:
             raise InvalidValue(f"{thing.kind.word} {thing.number} is not in this scene", field=field)
         return thing.number
@@ -168,8 +168,8 @@ class Objects:
         if thing in self._objects:
             return copy.copy(self._objects[thing][1])
         if self.is_attached:
-            raise InvalidValue(f"what others made of {thing.kind.word} {thing.number} is not known here", field="object",
-                               remedy="read() it with the client, and set() what comes")
+            raise InvalidValue(f"other clients' changes of {thing.kind.word} {thing.number} are unknown here", field="object",
+                               remedy="read() it with the client, and set() the result")
         return messages.SetEnvironment()
 
     @takes(messages.change_keywords)

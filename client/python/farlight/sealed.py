@@ -48,7 +48,7 @@ def read_key(path: str | os.PathLike[str]) -> bytes:
         with open(os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise FileFailed("is no file that could hold a key", field=name)
+                raise FileFailed("is not a regular file, so it cannot hold a key", field=name)
             if status.st_uid != os.geteuid():
                 raise FileFailed("belongs to another user", field=name, remedy="run 'chown'")
             if status.st_mode & 0o077:
@@ -103,7 +103,7 @@ class Seal:
         for i, byte in enumerate(begun):
             if i != 5 and byte != wanted[i]:
                 raise ProtocolError("these bytes begin no sealed connection" if i < 4 else
-                                    "this is not the message that was to come", field="sealed")
+                                    "this is not the expected message", field="sealed")
         if len(begun) == HEAD_BYTES and begun[5]:
             if begun[5] not in REFUSALS:
                 raise ProtocolError(f"status {begun[5]} is unknown", field="sealed")

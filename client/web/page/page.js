@@ -92,7 +92,7 @@ function takeScene(told) {
   canvas.setAttribute("aria-label", `Picture of ${told.name}`);
   if (isNew) {
     editing.begin(told.edit);
-    say(isClipGone ? "the clip is gone: choose another one, if there is one" : lastFrame ? "" : FIRST);
+    say(isClipGone ? "the clip was removed: choose another one, if any" : lastFrame ? "" : FIRST);
   }
   isNew = isClipGone = false;
   editing.list();

@@ -407,7 +407,7 @@ TEST(an_unwritable_output_is_reported_before_the_first_frame)
     } rows[] = {
         {"missing/a.mp4", {0}, "No such file", "", NULL},
         {"", {.format = "mp4"}, "Is a directory", "", NULL},
-        {"a.avi", {0}, "the ending is not that of a video format", ".mp4, .mkv, .webp or .gif", NULL},
+        {"a.avi", {0}, "the ending belongs to no supported video format", ".mp4, .mkv, .webp or .gif", NULL},
         {"a.mp4", {.lossless = true}, "an MP4 file does not hold FFV1", ".mkv", NULL},
         {"a.mkv", {.lossless = true, .codec = "h264"}, "h264 is not lossless, which is asked", "leave", NULL},
         {"a.mkv", {.codec = "ffv1"}, "ffv1 is lossless, which is not asked for", "ask for lossless", NULL},
