@@ -209,8 +209,8 @@ static void print_manual_setting(const struct cli_field *setting)
 /* Prints items of the list of options: all tracers, then settings. */
 static void print_manual(void)
 {
-    printf(".It Fl -tracer Ar NAME\nWhat finds intersections; the default is\n.Cm %s .\n"
-           ".Bl -tag -width reference -compact\n",
+    printf(".It Fl -tracer Ar NAME\nAlgorithm that finds intersections; the default is\n.Cm %s .\n.Bl -tag -width "
+           "reference -compact\n",
            tracer_descs[0].name);
     for (size_t i = 0; i < tracer_desc_count; i++)
         printf(".It Cm %s\n%s%s%s\n", tracer_descs[i].name, tracer_descs[i].doc,

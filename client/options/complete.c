@@ -520,7 +520,7 @@ static bool complete_crop(struct cli_job *job)
                                                                              : NULL;
     if (!other)
         return true;
-    cli_usage(job, "--crop", "cannot be combined with %s, which looks at pixels around", other);
+    cli_usage(job, "--crop", "cannot be combined with %s, which reads neighbouring pixels", other);
     return fl_error_remedy(&job->error, "leave out one of them");
 }
 

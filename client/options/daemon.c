@@ -14,11 +14,11 @@ enum { KEY_KEY = 0x400, KEY_RETRY_FOR, KEY_LOST_AFTER };
 static const struct argp_option options[] = {
     {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
     {"key", KEY_KEY, "FILE", 0,
-     "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
+     "Key shared with the daemon, which seals the connection (default for tcp: FARLIGHT_KEY)", 0},
     {"retry-for", KEY_RETRY_FOR, "DURATION", 0,
-     "Wait for a daemon that is not there for this long, in seconds or as 5m or 2h (default 0)", 0},
+     "Wait this long for a daemon that is not running, in seconds or as 5m or 2h (default 0)", 0},
     {"lost-after", KEY_LOST_AFTER, "DURATION", 0,
-     "Give up a daemon that answers nothing for this long, not even a ping (default 1m)", 0},
+     "Regard a daemon as lost if it answers nothing for this long, not even a ping (default 1m)", 0},
     {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)

@@ -128,7 +128,7 @@ bool cli_check_models(const struct cli_job *job, struct fl_error *error)
 bool cli_check_watch(struct cli_job *job)
 {
     return !job->input.watch || (!job->input.scene && !cli_has_input(job)) ||
-           cli_usage(job, "--watch", "%s does not change as a file does",
+           cli_usage(job, "--watch", "%s cannot be watched like a file",
                      job->input.scene ? "a shared scene" : "standard input") == 0;
 }
 

@@ -144,7 +144,7 @@ static bool complete_source(struct cli_job *job)
     if (views->has_lens && !has_lens)
         return refuse(job, "--lens", "everything is sharp", "add --aperture 0.05");
     if (views->has_views && views->has_lens && views->views != views->lens)
-        return refuse(job, "--lens", "all of a picture has one source: --views says another one",
+        return refuse(job, "--lens", "a picture has a single source, and --views gives another one",
                       "leave out one of them");
     if (views->has_views)
         wanted->view_source = views->views;

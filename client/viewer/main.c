@@ -64,9 +64,8 @@ static const struct argp_option options[] = {
      -2},
     {"scale", KEY_SCALE, "N", 0, "Show a rendered pixel as NxN pixels of the window: 1 (default), 2, 4, 8", -2},
     {"encoding", KEY_ENCODING, "NAME", 0,
-     "How pixels travel while something moves: raw, h264, jpeg, predicted, zstd (default: raw on this machine, "
-     "else "
-     "h264)",
+     "Encoding of pixels while something moves: raw, h264, jpeg, predicted, zstd (default: raw on this machine, "
+     "else h264)",
      -2},
     {"still-encoding", KEY_STILL_ENCODING, "NAME", 0,
      "Encode pixels like this while nothing moves: raw, predicted, zstd, jpeg (default: raw on this machine, else "
@@ -80,8 +79,8 @@ static const struct argp_option options[] = {
     {"eyes", KEY_EYES, "rays|quadtree", 0,
      "Render both eyes of --stereo, or make them on the daemon from depth layers (default)", -2},
     {"views", KEY_VIEWS, "off|auto|on", 0,
-     "Make views here while the camera moves, from a picture and its depths, at the display's rate "
-     "(auto, the default: where the daemon and the link take longer than a frame of the display)",
+     "Warp the last picture by its depths while the camera moves, at the display's rate (auto, the default: where "
+     "the daemon and the link take longer than a frame of the display)",
      -2},
     {"holes", KEY_HOLES, "fill|pattern", 0,
      "Fill areas that no picture shows yet from their surroundings (default), or mark them", -2},

@@ -112,7 +112,7 @@ static bool read_kind(const char *name, enum protocol_object_kind *kind, struct 
         (*kind == PROTOCOL_OBJECT_NODE || *kind == PROTOCOL_OBJECT_MATERIAL || *kind == PROTOCOL_OBJECT_LIGHT ||
          *kind == PROTOCOL_OBJECT_ENVIRONMENT))
         return true;
-    return refuse(error, "kind", "is nothing that can be edited");
+    return refuse(error, "kind", "cannot be edited");
 }
 
 static bool read_list(json_t *json, struct fl_assignment *wanted, struct fl_error *error)
@@ -176,7 +176,7 @@ static bool read_editing(const char *name, json_t *value, struct web_request *re
     const bool is_redo = strcmp(name, "redo") == 0;
     request->kind = is_redo ? WEB_REDO : WEB_UNDO;
     return ((is_redo || strcmp(name, "undo") == 0) && json_is_true(value)) ||
-           refuse(error, "message", "nothing that a page sends");
+           refuse(error, "message", "not a request of a page");
 }
 
 static bool read_one(const char *name, json_t *value, struct web_request *request, struct fl_error *error)

@@ -96,7 +96,7 @@ void metrics_print(FILE *out, const struct message_stats_reply *reply)
     print_count(out, "host_memory_limit_bytes", "gauge", "Its limit.", reply->host_limit_bytes);
     print_count(out, "device_memory_bytes", "gauge", "Memory on the GPU.", reply->device_bytes);
     print_count(out, "device_memory_limit_bytes", "gauge", "Its limit.", reply->device_limit_bytes);
-    print_count(out, "device_objects", "gauge", "Live OpenGL objects but programs.", reply->device_objects);
+    print_count(out, "device_objects", "gauge", "Live OpenGL objects except programs.", reply->device_objects);
     print_count(out, "blobs", "gauge", "Blobs held.", reply->blobs);
     print_count(out, "blob_bytes", "gauge", "Their size.", reply->blob_bytes);
     print_stages(out, reply);

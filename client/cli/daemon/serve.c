@@ -54,7 +54,7 @@ static const struct argp_option options[] = {
     {"name", KEY_NAME, "NAME", 0, "Set the scene's name for other clients (default: the model's file name)", 0},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Light the scene with this equirectangular image (HDR or EXR)", 0},
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
-     "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
+     "Turn the environment about +y by -360 to 360 (default 0: its middle column is +x)", 0},
     {"at", KEY_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
      "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; again: one more of it",
      0},

@@ -33,7 +33,7 @@ static const struct argp_option options[] = {
     {"part", KEY_PART, "K/N", 0,
      "Render only the K-th of N parts of the picture, for 'farlight merge'; EXR files, with a number of samples",
      -1},
-    {"resume", KEY_RESUME, NULL, 0, "Render no part whose file exists, and is of the same picture", -1},
+    {"resume", KEY_RESUME, NULL, 0, "Skip a part whose file exists and belongs to the same picture", -1},
     {"watch", KEY_WATCH, NULL, 0,
      "Render again when the model, or a file that it names, has changed, until Ctrl-C; only changes are sent", -1},
     {0}};

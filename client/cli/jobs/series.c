@@ -22,7 +22,7 @@ static const struct argp_option options[] = {
     {"keys", KEY_KEYS, "FILE.json", 0,
      "Read camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", GROUP},
     {"upsample", KEY_UPSAMPLE, "N", 0,
-     "Render every N-th frame, up to 64, and make those between from the depth layers of the nearest (default 1)",
+     "Render every N-th frame, up to 64, and make frames between from the depth layers of the nearest (default 1)",
      GROUP},
     {0}};
 

@@ -116,8 +116,7 @@ static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *e
         return true;
     if (!by_clips && !by_orbit && keys_s <= 0) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "--frames",
-                     "no range of frames is given, and nothing says how long "
-                     "this takes");
+                     "no range of frames is given, and the duration is unknown");
         return fl_error_remedy(error, "--frames 1-120");
     }
     if (!(frames < FRAME_MAX)) {

@@ -27,9 +27,9 @@ struct verifying {
 };
 
 static const struct argp_option options[] = {
-    {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "These must be there; needs a pattern", 0},
+    {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "Frames that must exist; needs a pattern", 0},
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
-    {"quiet", KEY_QUIET, NULL, 0, "Print nothing: the exit status tells", 0},
+    {"quiet", KEY_QUIET, NULL, 0, "Print nothing; the exit status gives the result", 0},
     {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)

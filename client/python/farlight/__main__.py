@@ -109,7 +109,7 @@ def _parser() -> argparse.ArgumentParser:
                         help="any other field of the message render: --set denoise=on --set seed=7")
     render.add_argument("--server", metavar="ADDRESS", help="unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] "
                         "(default: FARLIGHT_SERVER, else a daemon of its own)")
-    render.add_argument("--key", metavar="FILE", help="key that the daemon has as well: the connection is sealed")
+    render.add_argument("--key", metavar="FILE", help="key shared with the daemon, which seals the connection")
     render.add_argument("--retry-for", type=float, default=0.0, metavar="SECONDS",
                         help="wait so long for a daemon that is lost or has no place")
     return parser
