@@ -13,10 +13,10 @@ enum cli_progress_form {
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
-/* What a command says while it works and of its work, as typed. */
+/* Output of a command about its work, as typed. */
 struct cli_talk {
     bool quiet;
-    bool has_progress; /* else by whether there is a terminal */
+    bool has_progress; /* set by an option; else a terminal decides */
     enum cli_progress_form progress;
     enum cli_timings_form timings;
     const char *trace_file; /* NULL: none */

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The viewer: one loop over input (user or replay), frames and losses of the connection, with or without a
- * window. */
+/* The viewer: one loop over input (user or replay), frames and connection losses, with or without a window. */
 #ifndef FARLIGHT_VIEWER_VIEWER_H
 #define FARLIGHT_VIEWER_VIEWER_H
 

@@ -206,9 +206,8 @@ static bool complete(struct command_line *line, struct fl_error *error)
         return fl_error_remedy(error, job->daemon.server ? "'farlight scenes' lists the daemon's scenes"
                                                          : "farlight-web model.glb");
     }
-    if (job->input.watch &&
-        /* The scene keeps its name when edits reload it */
-        !cli_watch_can_edit_again(job->input.edits, job->input.edit_count))
+    /* A reload keeps the scene and applies the edits again. */
+    if (job->input.watch && !cli_watch_can_edit_again(job->input.edits, job->input.edit_count))
         cli_usage(job, "--watch", "an --edit that adds or multiplies would do so each time: assign a value");
     if (job->error.code != FL_ERROR_NONE || !cli_check_watch(job) || !cli_job_complete_view(job) ||
         !cli_check_models(job, &job->error)) {

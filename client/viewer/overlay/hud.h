@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The overlay: what is drawn over the picture and where, as boxes and texts. Knows no window: whoever paints it
- * says how wide a text is. */
+/* The overlay over the picture, as a list of boxes and texts with places. Independent of the window: its
+ * painter measures texts. */
 #ifndef FARLIGHT_VIEWER_OVERLAY_HUD_H
 #define FARLIGHT_VIEWER_OVERLAY_HUD_H
 
@@ -11,41 +11,41 @@
 #include "viewer/input/settings.h"
 #include "viewer/input/tour.h"
 
-#define HUD_STRUCTURE_MAX 4u /* parts */
+#define HUD_STRUCTURE_MAX 4u /* number of parts */
 #define HUD_STRUCTURE_TEXT_MAX 256u
 
 enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST, HUD_REFUSED };
 
-/* Views that are made here. */
+/* Views made in the client. */
 struct hud_local {
-    bool on, shown; /* they are made; one is what is seen */
-    double age_s;   /* of the picture that it was made from */
+    bool on, shown; /* the client makes views; the shown picture is one */
+    double age_s;   /* age of the picture that the view was made from */
     double bound_pixels, unseen, sticking;
-    double view_s;        /* that it took */
-    uint64_t depth_bytes; /* of the last frame's bytes */
+    double view_s;        /* duration of making the view */
+    uint64_t depth_bytes; /* size of the last frame's depth */
     enum fl_warp_quality quality;
 };
 
-/* What it tells of. */
+/* The state that the overlay shows. */
 struct hud_state {
-    double width, height, scale; /* of the window, pixels; pixels of it in one of the desktop's */
+    double width, height, scale; /* size of the window in pixels; its pixels in one of the desktop's */
     enum hud_status status;
     double progress;         /* HUD_LOADING: share, 0: unknown */
-    const char *status_text; /* what is being done, or what went wrong */
-    const char *notice;      /* for a while; empty: none */
+    const char *status_text; /* current activity, or the fault */
+    const char *notice;      /* a temporary notice; empty: none */
     const char *scene, *server;
     const char *camera, *clip; /* names; empty: none */
     const struct settings *settings;
     double exposure_stops;
-    double stereo_m; /* between both eyes, where there are two */
+    double stereo_m; /* distance between the eyes, for two views */
     const struct tour *tour;
     const struct metrics *metrics;
     uint64_t now_ns;
     uint32_t picture_width, picture_height, samples, samples_wanted;
-    uint32_t depth, depth_less; /* bounces that were asked for, and how many fewer there are */
+    uint32_t depth, depth_less; /* requested bounces, and how many fewer the frame has */
     bool moving;
-    uint64_t revision, wire_bytes;            /* of the last frame */
-    const char *structure[HUD_STRUCTURE_MAX]; /* what its tracer says of its parts; NULL: no more */
+    uint64_t revision, wire_bytes;            /* the last frame's */
+    const char *structure[HUD_STRUCTURE_MAX]; /* reports on the tracer's parts; NULL ends the list */
     enum protocol_encoding encoding;
     unsigned quality;
     struct hud_local local;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Views that are made here: a thread that makes pictures of the newest camera from the newest picture with depths.
- * Its calls are for one other thread, and never wait for a picture. */
+/* Views made in the client: a thread makes pictures of the newest camera from the newest picture with depths.
+ * All calls come from one other thread, and never wait for a picture. */
 #ifndef FARLIGHT_VIEWER_VIEW_VIEWS_H
 #define FARLIGHT_VIEWER_VIEW_VIEWS_H
 
@@ -10,30 +10,30 @@
 
 struct views;
 
-/* What is wanted. */
-struct views_wish {
-    uint32_t width, height; /* of the picture, all eyes; it comes smaller where its key shows no more */
+/* A request for views. */
+struct views_request {
+    uint32_t width, height; /* size of the whole picture, all eyes; made smaller if its key has no more detail */
     struct fl_warp_camera camera;
-    float baseline; /* metres between both eyes, which the camera is in the middle of; 0: it is the only one */
-    bool over;      /* the left one above the other, not beside it */
+    float baseline; /* metres between both eyes, around the camera; 0: a single eye */
+    bool over;      /* the left eye is above the right one, not beside it */
     enum fl_warp_holes holes;
-    uint64_t frame_ns; /* of the display: at most one view is made in it */
-    uint64_t moved_ns; /* when it was moved there */
+    uint64_t frame_ns; /* display frame, in which at most one view is made */
+    uint64_t moved_ns; /* time of the camera's motion */
 };
 
-/* Of the last view. */
+/* The last view. */
 struct views_made {
-    uint64_t wish, key; /* their numbers, counted from 1 */
+    uint64_t request, key; /* numbers, counted from 1 */
     struct fl_warp_camera camera;
-    uint32_t layers; /* of the key, with which it was made */
+    uint32_t layers; /* layers of the key that it was made with */
     uint64_t moved_ns, key_came_ns;
     enum fl_warp_quality quality;
     struct fl_warp_counts counts;
-    uint64_t took_ns, build_ns; /* it, from beginning to end; the work on its key, of all threads */
+    uint64_t took_ns, build_ns; /* duration of the view; processor time of all threads on its key */
 };
 
-/* The share of its pixels that no picture shows. What the iteration has not found behind others may well be seen.
- */
+/* The share of pixels that no picture shows. Pixels that the iteration has not found behind others may well be
+ * visible. */
 static inline float views_unseen(const struct views_made *made)
 {
     return made->counts.outside + (made->quality == FL_WARP_TREE ? made->counts.behind : 0);
@@ -42,22 +42,22 @@ static inline float views_unseen(const struct views_made *made)
 struct views *views_create(struct fl_error *error);
 void views_destroy(struct views *views);
 
-/* Takes over the picture's pixels and the depths; what came before is outdated. Views go on to be made from a
- * final picture while they are within its radius and no more than PLAN_UNSEEN_LITTLE of them is unseen. */
+/* Takes over the picture's pixels and depths, which replace earlier ones. Views continue to be made from a
+ * final picture while they are within its radius and at most PLAN_UNSEEN_LITTLE of them is unseen. */
 void views_give_key(struct views *views, struct views_key *key);
-/* Of the last key that was given; likewise. One that does not fit it is dropped. That of a picture at rest, which
- * takes longest, waits while views are wanted. */
+/* Takes over a layer of the last key; one that does not fit is dropped. The layer of a picture at rest, which
+ * takes longest, waits while views are made. */
 void views_give_layer(struct views *views, struct views_layer *layer);
-void views_forget_keys(struct views *views); /* of a connection that is gone */
-/* Views of it are made until another is wanted or none: one for each key; first one in time, then the best.
- * Returns its number. */
-uint64_t views_want(struct views *views, const struct views_wish *wish);
-void views_want_none(struct views *views);
-/* The newest view, once, in exchange for the memory of an older one. False: none since the last call. */
+void views_forget_keys(struct views *views); /* drops the keys of a lost connection */
+/* Requests views until the next call or views_stop: one for each key, first one in time, then the best. Returns
+ * the request's number. */
+uint64_t views_start(struct views *views, const struct views_request *request);
+void views_stop(struct views *views);
+/* Takes the newest view, once, in exchange for the memory of an older one. False: none since the last call. */
 bool views_take(struct views *views, struct pixmap *picture, struct views_made *made);
-/* It is of the newest key and the wish of that number, and will not become better. */
-bool views_is_best(struct views *views, const struct views_made *made, uint64_t wish);
-/* Why no view could be made since the last call; false: there is no reason. */
+/* True if the view has the newest key and this request, and will not improve. */
+bool views_is_best(struct views *views, const struct views_made *made, uint64_t request);
+/* Takes the reason of a failure since the last call; false: there was none. */
 bool views_take_error(struct views *views, struct fl_warp_error *error);
 
 #endif
