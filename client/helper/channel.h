@@ -25,7 +25,7 @@ bool channel_send(const struct channel *channel, uint32_t request, const struct 
 struct channel_failure {
     const char *field, *reason;
     const char *remedy; /* may be NULL */
-    bool retryable;     /* the same request may succeed later */
+    bool retryable;     /* a later request may succeed */
 };
 /* Answers with an error. The texts are shortened to fit into a message. */
 bool channel_send_failure(const struct channel *channel, uint32_t request, const struct channel_failure *failure);

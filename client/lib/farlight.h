@@ -58,7 +58,7 @@ enum fl_error_code {
 struct fl_error {
     enum fl_error_code code;
     enum protocol_error_code server_code; /* the daemon's code, for FL_ERROR_REFUSED */
-    bool retryable;                       /* the same call may succeed later */
+    bool retryable;                       /* a later call may succeed */
     uint32_t retry_after_ms;              /* 0: unknown */
     char field[160];                      /* option, file or field at fault; may be empty */
     char text[640];                       /* a sentence for people: the fault, with the value */
@@ -805,8 +805,8 @@ struct fl_comparison {
     /* Peak signal-to-noise ratio, 20 log10(1 / rms_error): the peak is white, 1, in both spaces; INFINITY
      * without error. */
     double psnr_db;
-    /* The same ratio for red, green and blue as shown on a screen: linear files through the tone map and the
-     * sRGB curve, so that no highlight exceeds the peak. */
+    /* Peak signal-to-noise ratio of red, green and blue as shown on a screen: linear files through the tone map
+     * and the sRGB curve, so that no highlight exceeds the peak. */
     double shown_psnr_db;
     double mean_error, rms_error, max_error;
     uint32_t max_error_x, max_error_y, max_error_channel; /* position from the top left; all count from 0 */

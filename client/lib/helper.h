@@ -25,7 +25,7 @@ void fl_helper_finish(struct fl_helper *helper);
 
 /* Appends the message to the queue. */
 bool fl_helper_send(struct fl_helper *helper, const struct message *message, struct fl_error *error);
-/* The same for a whole frame, raw. */
+/* Appends a whole frame with raw pixels to the queue. */
 bool fl_helper_send_frame(struct fl_helper *helper, const struct fl_frame *frame, struct fl_error *error);
 /* Waits until the kernel has everything, so that the program can work while the caller continues. */
 bool fl_helper_flush(struct fl_helper *helper, struct fl_error *error);

@@ -5,9 +5,10 @@
 
 #include "options/job.h"
 
-/* After the command line: settings that depend on several options. `is_series`: output is a pattern. */
+/* Completes settings that depend on several options, after the command line was read. `is_series`: the output is a
+ * pattern of paths. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
-/* The same for a window: there is no output. */
+/* Completes the settings of a window, which has no output. */
 bool cli_job_complete_view(struct cli_job *job);
 bool cli_writes_to_stdout(const struct cli_job *job);
 /* Shows a ground beneath models that bring no light, in pictures to look at, unless a camera of theirs is used. */

@@ -16,7 +16,7 @@ void painter_draw(struct painter *painter, int width, int height, const struct p
                   const struct hud_state *state);
 void painter_destroy(struct painter *painter);
 
-/* The same in software, into `made`, independent of the window's renderer. */
+/* Draws a window of this size in software, into `made`, independent of the window's renderer. */
 bool paint_in_memory(int width, int height, const struct pixmap *picture, const struct hud_state *state,
                      struct pixmap *made, struct fl_error *error);
 

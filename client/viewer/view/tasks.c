@@ -109,7 +109,7 @@ static void fill_reference(const struct view *view, struct message_render *job, 
     job->integrator = view->settings.integrator;
     job->tone_map = view->settings.tone_map;
     job->exposure_stops += (float)view->settings.exposure_thirds / 3;
-    job->accumulate = PROTOCOL_ACCUMULATION_ON; /* the same random numbers as in a view */
+    job->accumulate = PROTOCOL_ACCUMULATION_ON; /* uses the random numbers of a view */
     view_use_eyes(view, job);
     job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* an error of layers must show in the comparison */
     job->encoding = session_is_local(view->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
