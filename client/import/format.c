@@ -137,7 +137,7 @@ struct format format_of(const char *name, const unsigned char *bytes, size_t siz
     return format_of_name(model);
 }
 
-/* ---- what is not read ---- */
+/* ---- unsupported content ---- */
 
 #define AS_GLTF "write it as glTF "
 

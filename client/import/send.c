@@ -35,7 +35,7 @@ void sender_finish(struct sender *sender)
     sender->out = sender->in = NULL;
 }
 
-/* ---- what comes in ---- */
+/* ---- received messages ---- */
 
 static bool peer_gone(struct sender *sender)
 {
@@ -142,7 +142,7 @@ static bool receive(struct sender *sender)
     return parse_input(sender);
 }
 
-/* ---- what goes out ---- */
+/* ---- sent messages ---- */
 
 /* Waits until bytes could be sent (if there are some) or have been received. Reading while sending keeps two
  * full sockets from waiting for each other. */

@@ -118,7 +118,7 @@ static bool decode_pixels(struct fl_frame *frame, const struct fl_encoded *encod
     return true;
 }
 
-/* ---- what is attached ---- */
+/* ---- attachments ---- */
 
 /* The result is malloc'ed; NULL on failure. */
 static void *decode_attachment(const struct fl_frame *frame, const uint8_t *encoded, uint64_t bytes,

@@ -23,7 +23,7 @@ void fl_parts_init(struct fl_parts *parts, const struct message_frame_begin *beg
     add(parts, PROTOCOL_FRAME_PART_STICKING, begin->sticking_bytes);
 }
 
-/* ---- what is announced ---- */
+/* ---- announced parts ---- */
 
 /* Number of parts after which there are some colours and, for frames with depth, some depth; 0: there never
  * are. */
@@ -74,7 +74,7 @@ bool fl_parts_set(struct fl_parts *parts, const struct message_frame_begin *begi
     return true;
 }
 
-/* ---- what comes ---- */
+/* ---- received parts ---- */
 
 struct fl_parts_bytes fl_parts_received(const struct fl_parts *parts)
 {

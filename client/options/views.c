@@ -10,7 +10,7 @@
 #define VIEWS_MAX 64u /* across and down; also between two rendered frames */
 #define DISTANCE_MAX_M 1e6
 
-/* ---- what is typed ---- */
+/* ---- parsing ---- */
 
 static error_t name_field(struct cli_job *job, const char *field)
 {

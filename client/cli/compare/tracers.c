@@ -155,7 +155,7 @@ static bool run(struct tracer_comparison *comparison, struct fl_error *error)
     return cli_pair_compare(pair, comparison->frame->frame, pair->images.picture, &comparison->figures, error);
 }
 
-/* ---- what came of it ---- */
+/* ---- results ---- */
 
 static bool is_within(const struct tracer_comparison *comparison)
 {

@@ -192,7 +192,7 @@ static bool run(struct views_comparison *comparison, struct fl_error *error)
     return true;
 }
 
-/* ---- what came of it ---- */
+/* ---- results ---- */
 
 static bool is_known(const struct views_comparison *comparison, const struct compared_frame *frame)
 {

@@ -174,7 +174,7 @@ static bool complete(struct serving *serving)
     return true;
 }
 
-/* ---- what people are told ---- */
+/* ---- messages to users ---- */
 
 /* Prints a word in the shell's syntax. */
 static void print_word(const char *word)

@@ -81,7 +81,7 @@ bool cli_picture_part_complete(struct cli_job *job)
     return true;
 }
 
-/* ---- what the picture depends on ---- */
+/* ---- digest of the picture's inputs ---- */
 
 static void add_text(XXH3_state_t *state, const char *text)
 {

@@ -21,7 +21,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* ---- what can be known before ---- */
+/* ---- checks before rendering ---- */
 
 /* Prepares a temporary file for standard output and devices, which a rename cannot replace: the complete file
  * is copied there. */

@@ -14,7 +14,7 @@
 #define FILE_BYTES_MAX (16u << 20)
 #define OBJECTS_MAX 4096u
 
-/* ---- what the scene has ---- */
+/* ---- scene ---- */
 
 static const struct shot_property light_properties[] = {
     {"colour", PROTOCOL_CHANNEL_LIGHT_COLOUR, SHOT_NUMBERS, 3, 0, 1e12, 1, "[10, 9, 8]"},

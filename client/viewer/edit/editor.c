@@ -22,7 +22,7 @@ static void say(struct editor *edit, const struct fl_error *refusal)
         screen_say(edit->screen, "not possible: %s", refusal->text);
 }
 
-/* ---- what is edited ---- */
+/* ---- choice of the object ---- */
 
 static void forget_objects(struct editor *edit)
 {
@@ -322,7 +322,7 @@ void editor_step(struct editor *edit, uint64_t now_ns)
     }
 }
 
-/* ---- what is shown ---- */
+/* ---- content of the panel ---- */
 
 static void show_which(const struct editor *edit, struct hud_edit_row *row)
 {

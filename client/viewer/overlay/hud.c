@@ -12,7 +12,7 @@
 #define STRUCTURE_SHARE_MAX 0.6
 #define STRUCTURE_LINES_MAX 10u
 
-/* ---- what is shown, at the top left ---- */
+/* ---- scene and status, at the top left ---- */
 
 static void print_samples(const struct hud_state *state, char *out, size_t bytes)
 {
@@ -181,7 +181,7 @@ static void draw_line(struct hud_layout *layout)
                  "%s", items[i].value);
 }
 
-/* ---- how fast, at the top right ---- */
+/* ---- performance, at the top right ---- */
 
 static void print_amount(double amount, const char *unit, char *out, size_t bytes)
 {

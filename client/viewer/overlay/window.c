@@ -107,7 +107,7 @@ uint64_t window_frame_ns(const struct window *window)
     return UINT64_C(1000000000) / (uint64_t)(known ? mode.refresh_rate : 60);
 }
 
-/* ---- what happens ---- */
+/* ---- events ---- */
 
 static void take_key(const SDL_Event *event, struct input *input)
 {
@@ -216,7 +216,7 @@ bool window_wants_drawing(struct window *window)
     return wants;
 }
 
-/* ---- what is shown ---- */
+/* ---- drawing ---- */
 
 void window_show(struct window *window, const struct pixmap *picture, const struct hud_state *state)
 {

@@ -39,7 +39,7 @@ void view_plan_local(struct view *view, uint64_t now_ns)
         plan_switch(&view->local.switched, summary.round_s, now_ns);
 }
 
-/* ---- what the daemon is asked for ---- */
+/* ---- requests to the daemon ---- */
 
 /* Returns the distance between both eyes; 0: one view. */
 static float baseline_of(const struct view *view)
@@ -177,7 +177,7 @@ void view_take_hidden(struct view *view, struct fl_frame *frame)
     views_give_layer(view->local.views, &layer);
 }
 
-/* ---- what is shown ---- */
+/* ---- choice of the shown picture ---- */
 
 void view_forget_local(struct view *view)
 {

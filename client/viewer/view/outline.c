@@ -9,7 +9,7 @@
 
 #define THICKNESS 2.0 /* pixels of the desktop */
 
-/* ---- what it is of ---- */
+/* ---- the outlined object ---- */
 
 /* Lights and the environment have no surface, and an error map shows no objects. */
 static bool is_wanted(const struct view *view)
@@ -47,7 +47,7 @@ bool view_outline_is_due(const struct view *view)
            view_is_at_rest(view, 1) && !(view->outline.is_answered && view_outline_is_asked(view));
 }
 
-/* ---- asking ---- */
+/* ---- requests ---- */
 
 void view_outline_ask(struct view *view, struct message_render *job)
 {
@@ -122,7 +122,7 @@ void view_outline_refuse(struct view *view)
     view->outline.is_answered = true;
 }
 
-/* ---- showing ---- */
+/* ---- drawing ---- */
 
 /* Returns whether the outline fits the picture. An outline of an older revision remains while a material
  * changes, since surfaces do not move. */

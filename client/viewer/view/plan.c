@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-/* ---- whether ---- */
+/* ---- decision to make views ---- */
 
 #define FAST_SHARE 0.6 /* share of a display frame within which pictures are fast enough without views */
 #define FAST_NS UINT64_C(2000000000)

@@ -17,7 +17,7 @@
  * motion exist: those are smaller and have fewer samples. */
 #define PLAN_UNSEEN_LITTLE 0.03
 
-/* ---- whether ---- */
+/* ---- decision to make views ---- */
 
 /* For LOCAL_AUTO (settings.h); all zero at first. */
 struct plan_switch {

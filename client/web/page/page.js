@@ -30,15 +30,15 @@ let comparison = 0, isCompared = false; // number of the newest comparison; whet
 const inputs = new Map(); // time of the input of a camera, by the camera's number
 const link = new URLSearchParams(location.hash.slice(1));
 
-// ---- what the gateway is told ----
+// ---- messages to the gateway ----
 
-function tell(message) {
+function send(message) {
   const isOpen = socket !== null && socket.readyState === WebSocket.OPEN;
   if (isOpen) socket.send(JSON.stringify(message));
   return isOpen;
 }
 
-function tellShow() {
+function sendShow() {
   const scale = window.devicePixelRatio || 1;
   const fit = Math.min(1, WIDTH_MAX / (canvas.clientWidth * scale), HEIGHT_MAX / (canvas.clientHeight * scale));
   const side = (css) => Math.max(SIDE_MIN, Math.floor(css * scale * fit));
@@ -50,21 +50,21 @@ function tellShow() {
   forgetErrors();
   // A menu is empty before the scene is known; the gateway has defaults for missing names.
   const chosen = (name) => $(name).value || link.get(name) || undefined;
-  tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer"), integrator: chosen("integrator"),
+  send({ show: { width, height, h264: wantsH264, tracer: chosen("tracer"), integrator: chosen("integrator"),
     clip: Number(chosen("clip") || 0) } });
 }
 
-function tellLook(moving) {
+function sendCamera(moving) {
   const from = camera || (lastFrame && cameraOfFrame(lastFrame, scene));
   if (!from) return;
   forgetErrors();
   id += 1;
   const { eye, at, up, fov } = from;
-  const isTold = tell({ look: { id, eye, at, up, fov, time, moving, node: camera ? 0 : node || 0 } });
-  if (isTold && movedAt) inputs.set(id, movedAt);
+  const isSent = send({ look: { id, eye, at, up, fov, time, moving, node: camera ? 0 : node || 0 } });
+  if (isSent && movedAt) inputs.set(id, movedAt);
 }
 
-// ---- what it tells ----
+// ---- messages from the gateway ----
 
 function drawStages() {
   $("timeline").hidden = !$("stages").checked;
@@ -83,30 +83,30 @@ function fill(select, entries, chosen) {
 
 // Updates the page at the beginning of a connection and after changes of the scene; choices stay if they still
 // exist.
-function takeScene(told) {
+function takeScene(message) {
   const clip = $("clip").value || link.get("clip") || "0";
-  scene = told;
-  document.title = `${told.name} - farlight`;
-  $("name").textContent = told.name;
-  $("right").hidden = !told.edit;
-  canvas.setAttribute("aria-label", `Picture of ${told.name}`);
+  scene = message;
+  document.title = `${message.name} - farlight`;
+  $("name").textContent = message.name;
+  $("right").hidden = !message.edit;
+  canvas.setAttribute("aria-label", `Picture of ${message.name}`);
   if (isNew) {
-    editing.begin(told.edit);
+    editing.begin(message.edit);
     say(isClipGone ? "the clip was removed: choose another one, if any" : lastFrame ? "" : FIRST);
   }
   isNew = isClipGone = false;
   editing.list();
-  const cameras = told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
-  if (told.node === 0) cameras.unshift([0, "start"]); // no camera of the scene
-  if (!cameras.some(([value]) => value === node)) node = told.node;
+  const cameras = message.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
+  if (message.node === 0) cameras.unshift([0, "start"]); // no camera of the scene
+  if (!cameras.some(([value]) => value === node)) node = message.node;
   fill($("camera"), [...cameras, ["", "free"]], camera ? "" : node);
-  fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], clip);
-  $("clips").hidden = told.clips.length === 0;
-  fill($("tracer"), told.tracers.map((name) => [name, name]), $("tracer").value || told.tracer);
-  fill($("integrator"), told.integrators.map((name) => [name, name]), $("integrator").value || told.integrator);
+  fill($("clip"), [[0, "none"], ...message.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], clip);
+  $("clips").hidden = message.clips.length === 0;
+  fill($("tracer"), message.tracers.map((name) => [name, name]), $("tracer").value || message.tracer);
+  fill($("integrator"), message.integrators.map((name) => [name, name]), $("integrator").value || message.integrator);
 }
 
-const editing = new Editing(tell);
+const editing = new Editing(send);
 
 // ---- errors of the tracer ----
 
@@ -130,11 +130,11 @@ function askForErrors() {
   if (!lastFrame || lastFrame.moving || lastFrame.samples < COMPARED_SAMPLES) return;
   isCompared = true;
   sayOfErrors("Tracing the reference ..");
-  tell({ compare: comparison });
+  send({ compare: comparison });
 }
 
 function takeErrors(errors, bytes) {
-  tell({ shown: 1 });
+  send({ shown: 1 });
   if (errors.compare !== comparison || !$("compare").checked) return;
   drawErrors($("errors"), errors, bytes);
   showFigures($("errors-table"), $("errors-picture"), errors, bytes);
@@ -144,7 +144,7 @@ function takeErrors(errors, bytes) {
 }
 
 const picture = new Picture(canvas, (header) => {
-  tell({ shown: 1 });
+  send({ shown: 1 });
   if (lastFrame && lastFrame.revision !== header.revision) forgetErrors();
   lastFrame = header;
   editing.seen(header.revision);
@@ -165,9 +165,9 @@ const picture = new Picture(canvas, (header) => {
 }, (isGone) => {
   if (isGone) {
     wantsH264 = false;
-    tellShow();
+    sendShow();
   } else {
-    tell({ key: true });
+    send({ key: true });
   }
 });
 
@@ -218,8 +218,8 @@ function connect() {
   socket = new WebSocket(new URL("view", location.href.split("#")[0].replace(/^http/, "ws")), "farlight");
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
-    tellShow();
-    if (camera) tellLook(false);
+    sendShow();
+    if (camera) sendCamera(false);
   };
   socket.onmessage = take;
   socket.onclose = (event) => {
@@ -297,7 +297,7 @@ function goTo(value) {
   camera = null;
   node = Number(value);
   if (node !== 0) {
-    tellLook(false);
+    sendCamera(false);
     return;
   }
   // A new view without a camera shows the whole scene.
@@ -307,12 +307,12 @@ function goTo(value) {
   connect();
 }
 $("camera").addEventListener("change", () => goTo($("camera").value));
-for (const name of ["tracer", "integrator", "clip"]) $(name).addEventListener("change", tellShow);
+for (const name of ["tracer", "integrator", "clip"]) $(name).addEventListener("change", sendShow);
 $("play").addEventListener("click", () => {
   isPlaying = !isPlaying;
   if (isPlaying && $("clip").value === "0") {
     $("clip").selectedIndex = 1;
-    tellShow();
+    sendShow();
   }
   $("play").textContent = isPlaying ? "Pause" : "Play";
   movedAt = 0;
@@ -347,9 +347,9 @@ $("share").addEventListener("click", async () => {
     say(`the link is in the address line; who has it can ${scene.edit ? "look and edit" : "look"}`);
   }
 });
-new ResizeObserver(tellShow).observe(canvas);
+new ResizeObserver(sendShow).observe(canvas);
 
-// ---- what goes on by itself ----
+// ---- animation ----
 
 function tick(now) {
   if (isPlaying) {
@@ -359,7 +359,7 @@ function tick(now) {
   tickAt = now;
   if (isDirty) {
     isDirty = false;
-    tellLook(true);
+    sendCamera(true);
     clearTimeout(resting);
     resting = setTimeout(settle, REST_MS); // a hidden page is not animated, but settles all the same
   }
@@ -368,7 +368,7 @@ function tick(now) {
 
 function settle() {
   movedAt = 0;
-  tellLook(false);
+  sendCamera(false);
 }
 
 camera = readCamera(link.get("view"));
