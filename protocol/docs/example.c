@@ -78,13 +78,13 @@ static void print_hello(void)
         hello.nonce[i] = (uint8_t)i;
     }
     print_bytes("Client, hello", bytes, handshake_hello_encode(bytes, &hello));
-    printf("The daemon's reply has random numbers, its limits and its name in it. Behind it comes the first "
+    printf("The daemon's reply contains random numbers, its limits and its name. It is followed by the first "
            "credit, whose\n"
            "total is the daemon's upload window:\n\n");
     struct message credit = made(MESSAGE_CREDIT);
     credit.credit.channel = 1;
     credit.credit.total = 4 << 20;
-    show("Daemon, by itself", 0, 1, &credit);
+    show("Daemon, unasked", 0, 1, &credit);
 }
 
 static void print_blob(uint32_t request, const struct record_blob_ref *reference, const void *data)
@@ -199,12 +199,12 @@ static void print_frame(void)
     begin->fov_y = 0.5f;
     begin->layers = 1;
     begin->key_frame = 1;
-    show("Daemon, of request 6", 6, 2, &message);
+    show("Daemon, for request 6", 6, 2, &message);
     message = made(MESSAGE_FRAME_DATA);
     message.frame_data.data = pixels;
     message.frame_data.data_bytes = sizeof(pixels);
-    show("Daemon, of request 6", 6, 2, &message);
-    printf("Behind it comes `frame_end`, which says what the frame has cost.\n\n");
+    show("Daemon, for request 6", 6, 2, &message);
+    printf("It is followed by `frame_end`, which states the costs of the frame.\n\n");
     print_ok(ANSWER_TO(6), 6, 0);
 }
 
@@ -212,9 +212,8 @@ void docgen_print_example(void)
 {
     struct record_blob_ref references[] = {reference_to(positions, sizeof(positions)),
                                            reference_to(indices, sizeof(indices))};
-    printf(
-        "## A session, byte by byte\n\n"
-        "A triangle in front of the camera, a light from where the camera is, and a picture of 2 x 2 pixels.\n\n");
+    printf("## A session, byte by byte\n\n"
+           "A triangle in front of the camera, a light at the camera, and a picture of 2 x 2 pixels.\n\n");
     print_hello();
     print_upload(references);
     print_transaction(references);

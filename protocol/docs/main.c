@@ -26,7 +26,7 @@ static void print_limits(void)
     static const struct handshake_limits none;
     struct handshake_limit limit;
     unsigned offset = 48;
-    printf("The limits of the daemon. Missing ones at the end are 0 (not told), further ones are skipped.\n\n"
+    printf("The limits of the daemon. Missing limits at the end are 0 (unknown), further limits are skipped.\n\n"
            "| offset | type | name | limit |\n| ---: | --- | --- | --- |\n");
     for (size_t i = 0; handshake_limit_at(&none, i, &limit); i++) {
         printf("| %u | u%u | `%s` | %s |\n", offset, 8 * limit.bytes, limit.name, limit.what);
@@ -39,14 +39,12 @@ static void print_capabilities(void)
 {
     printf("Capabilities are bits; all others are 0:\n\n"
            "| bit | meaning |\n| ---: | --- |\n"
-           "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
-           "| %d | of a reply: this client may only look, and change nothing |\n"
-           "| %d | of a reply of version 0: only sealed connections are accepted at this address, as over TCP by "
-           "a daemon "
-           "with a key |\n"
-           "| %d | of a reply of version 0: there may be a place later |\n"
-           "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will "
-           "|\n\n",
+           "| %d | client: it decodes the encoding h264; reply: the daemon encodes it |\n"
+           "| %d | reply: this client may read the scene, but not change it |\n"
+           "| %d | reply of version 0: this address accepts only sealed connections, as a daemon with a key does "
+           "over TCP |\n"
+           "| %d | reply of version 0: a later attempt may succeed |\n"
+           "| %d | client: frames of views may end unfinished, see `frame_end`; reply: they will |\n\n",
            __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
            __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_TRY_AGAIN),
            __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
@@ -55,7 +53,7 @@ static void print_capabilities(void)
 static void print_handshake(void)
 {
     printf("## Handshake\n\n"
-           "Its layout never changes. The client speaks first, at most %u bytes:\n\n"
+           "The layout of the handshake never changes. The client begins, with at most %u bytes:\n\n"
            "| offset | type | field |\n| ---: | --- | --- |\n"
            "| 0 | 4 bytes | `FARL` |\n"
            "| 4 | u16 | version_min, at least 1 |\n"
@@ -110,10 +108,11 @@ static void print_sealed_keys(void)
 {
     printf(
         "\nBLAKE2b is that of RFC 7693, X25519 that of RFC 7748; a key of BLAKE2b is its own key parameter.\n"
-        "With `|` for one after the other:\n\n"
+        "`|` stands for concatenation:\n\n"
         "- down | up = BLAKE2b-512(X25519 of the two keys | client's public key | server's public key), 32 bytes\n"
-        "  each (libsodium's crypto_kx). A public key that gives a secret of zeros, or is one's own, is\n"
-        "  refused.\n"
+        "  each (libsodium's crypto_kx). A public key that gives a secret of zeros, or equals the receiver's "
+        "own,\n"
+        "  is refused.\n"
         "- K(label) = BLAKE2b-256, keyed with the key of the connection, of label | up | down | message 1 |\n"
         "  message 2. A label is ASCII, with zeros up to 32 bytes.\n"
         "- Proof of message 3: BLAKE2b-256, keyed with K(`farlight sealed client proof`), of the first 32 bytes\n"
@@ -279,7 +278,7 @@ static void print_message(const struct message_desc *desc)
     printf("From: %s. Fixed part %" PRIu32 " bytes, payload %" PRIu32 " .. %" PRIu32 " bytes.%s\n\n",
            sender(desc->info.from), body->wire_fixed_bytes, desc->info.payload_min_bytes,
            desc->info.payload_max_bytes,
-           (desc->info.type & MESSAGE_TYPE_IGNORABLE) != 0 ? " May be ignored by who does not know it." : "");
+           (desc->info.type & MESSAGE_TYPE_IGNORABLE) != 0 ? " A peer that does not know it may ignore it." : "");
     print_fields(body, 2);
 }
 
@@ -287,8 +286,8 @@ static void print_predicted(void)
 {
     printf(
         "## The encoding `predicted`\n\n"
-        "One frame of Zstandard (RFC 8878). Unpacked it has as many bytes as the pixels, in planes, one after\n"
-        "the other: plane b has byte b of every pixel, rows from the top, without gaps. Several layers are one "
+        "A frame of Zstandard (RFC 8878). The unpacked size is that of the pixels, stored as consecutive\n"
+        "planes: plane b has byte b of every pixel, rows from the top, without gaps. Several layers are one "
         "picture of their common height.\n\n"
         "Each byte is stored minus its prediction, modulo 256. The prediction is computed from three bytes of\n"
         "the same plane: left of it (a), above it (b), and left of that (c); bytes outside the picture are 0:\n\n"
@@ -304,22 +303,23 @@ static void print_depth(void)
     printf(
         "## Depth of the form `inverse`\n\n"
         "`predicted` with two bytes per pixel, the lower one first: a number n. The depth is 1 / (n depth_step),\n"
-        "and 1 / depth is off by half of depth_step at most. Where n is 0 nothing is, or nothing nearer than\n"
+        "and 1 / depth is off by half of depth_step at most. Where n is 0 there is no surface nearer than\n"
         "2 / depth_step. With f = height / (2 tan(fov_y / 2)) pixels, an eye within the radius R of the frame's\n"
         "eye sees a point at the distance d from it no more than\n\n"
         "    depth_step / 2 * f * R / (1 - R / d)^2\n\n"
-        "pixels from where it is; depth_step is 2 depth_pixels / (f depth_radius), f of the frame with its "
+        "pixels from its true place; depth_step is 2 depth_pixels / (f depth_radius), f of the frame with its "
         "margin,\n"
-        "which has as many pixels a radian as the picture that was asked for.\n\n");
+        "which has as many pixels per radian as the requested picture.\n\n");
 }
 
 static void print_h264(void)
 {
     printf("## The encoding `h264`\n\n"
-           "The frames of a view with this encoding are one stream, whatever others are between them: an access\n"
-           "unit each, in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in "
+           "The frames of a view with this encoding form one stream, even with other frames between them: each is "
+           "an\n"
+           "access unit in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in "
            "the\n"
-           "limited range. Each can be decoded at once, as none needs a later one. A key frame is an IDR\n"
+           "limited range. Each can be decoded on arrival, since none needs a later one. A key frame is an IDR\n"
            "picture with the parameter sets before it; the stream begins with one, a change of the frames' size\n"
            "causes one, and otherwise only a request (`want_key_frame` of frame_ack). The decoded picture has an\n"
            "even width and height: if the frame's is odd, drop the last column or row.\n\n");
