@@ -101,22 +101,22 @@ bool open_colours(const struct library_colour &wanted, char *reason, size_t reas
     const std::string source = source_of(config);
     if (source.empty())
         return refuse(reason, reason_bytes,
-                    std::string(wanted.config) +
-                        " has neither the role aces_interchange nor linear Rec. 709 by a known "
-                        "name; it has: " +
-                        listed(config.getColorSpaceNames()));
+                      std::string(wanted.config) +
+                          " has neither the role aces_interchange nor linear Rec. 709 by a known "
+                          "name; it has: " +
+                          listed(config.getColorSpaceNames()));
     if (wanted.space) {
         if (!knows(config, wanted.space) && !has(config.getRoles(), wanted.space))
             return refuse(reason, reason_bytes,
-                        std::string(wanted.config) + " has no colour space '" + wanted.space +
-                            "'; it has: " + listed(config.getColorSpaceNames()));
+                          std::string(wanted.config) + " has no colour space '" + wanted.space +
+                              "'; it has: " + listed(config.getColorSpaceNames()));
         processor = config.createColorProcessor(source, wanted.space);
     } else {
         std::string display, view;
         if (!find_view(config, wanted.view, display, view))
             return refuse(reason, reason_bytes,
-                        std::string(wanted.config) + " has no view '" + wanted.view +
-                            "'; it has: " + listed(views_of(config)));
+                          std::string(wanted.config) + " has no view '" + wanted.view +
+                              "'; it has: " + listed(views_of(config)));
         processor = config.createDisplayTransform(display, view, source);
     }
     return processor || refuse(reason, reason_bytes, std::string(wanted.config) + ": " + config.geterror());
