@@ -120,7 +120,8 @@ def faults(names):
     for test in (*(frame[0] for frame in check_sync.FRAMES), check_sync.WITHOUT_BARRIERS):
         if test.split(":")[0] not in names:
             yield f"tests/tools/check_sync.py: no test is called {test}"
-    targets = re.findall(r"^\.PHONY:(.*)", pathlib.Path("Makefile").read_text(), re.MULTILINE)
+    rules = "\n".join(pathlib.Path(name).read_text() for name in ("Makefile", "tests/tests.mk", "conf/install.mk"))
+    targets = re.findall(r"^\.PHONY:(.*)", rules, re.MULTILINE)
     for target in " ".join(targets).split():
         if re.fullmatch(STEP_NAMES, target) and not any(step.target.split()[0] == target for step in STEPS):
             yield f"tests/tools/suite.py: no part of `make test-all` runs `make {target}`"
