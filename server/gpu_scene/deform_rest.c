@@ -157,18 +157,28 @@ static const float *floats_of(const struct scene_mesh *mesh, enum mesh_array arr
     return mesh->arrays[array] ? (const float *)(const void *)mesh->arrays[array]->data : NULL;
 }
 
-static bool find_joint_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
+static const uint16_t *joints_of(const struct scene_mesh *mesh)
+{
+    return mesh->influence_count ? (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data : NULL;
+}
+
+static bool reserve_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
+{
+    const uint16_t *joints = joints_of(mesh);
+    uint32_t joint_count = 0; /* one variable, so that the loop is vectors of the processor */
+    for (size_t i = 0; i < (size_t)mesh->vertex_count * mesh->influence_count; i++)
+        joint_count = joints[i] >= joint_count ? joints[i] + 1u : joint_count;
+    rest->joint_count = joint_count;
+    rest->joints = malloc(((size_t)joint_count + 1) * sizeof(*rest->joints));
+    rest->targets = calloc((size_t)mesh->target_count + 1, sizeof(*rest->targets));
+    return rest->joints && rest->targets;
+}
+
+static void find_joint_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
 {
     const float *positions = floats_of(mesh, MESH_POSITIONS), *weights = floats_of(mesh, MESH_WEIGHTS);
-    const uint16_t *joints =
-        mesh->influence_count ? (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data : NULL;
+    const uint16_t *joints = joints_of(mesh);
     size_t per_vertex = mesh->influence_count;
-    for (size_t i = 0; i < mesh->vertex_count * per_vertex; i++)
-        if (joints[i] >= rest->joint_count)
-            rest->joint_count = (uint32_t)joints[i] + 1;
-    rest->joints = malloc(((size_t)rest->joint_count + 1) * sizeof(*rest->joints));
-    if (!rest->joints)
-        return false;
     for (uint32_t joint = 0; joint < rest->joint_count; joint++)
         rest->joints[joint] = empty_box;
     rest->unmoved = empty_box;
@@ -182,17 +192,14 @@ static bool find_joint_boxes(struct deform_mesh *rest, const struct scene_mesh *
         if (!(sum > 0.0f))
             grow(&rest->unmoved, &positions[3 * vertex]);
     }
-    return true;
 }
 
-static bool find_target_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
+static void find_target_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
 {
     const float *added = floats_of(mesh, MESH_TARGET_POSITIONS);
-    rest->targets = calloc((size_t)mesh->target_count + 1, sizeof(*rest->targets));
-    for (uint32_t target = 0; rest->targets && added && target < mesh->target_count; target++)
+    for (uint32_t target = 0; added && target < mesh->target_count; target++)
         for (size_t vertex = 0; vertex < mesh->vertex_count; vertex++, added += 3)
             grow(&rest->targets[target], added);
-    return rest->targets != NULL;
 }
 
 /* ---- the buffers ---- */
@@ -216,7 +223,7 @@ static bool add_mesh(struct gpu_scene_deform *deform, const struct scene_mesh *m
     totals->target_vertices += (uint64_t)mesh->vertex_count * mesh->target_count;
     for (int array = 0; array < MESH_ARRAY_COUNT; array++)
         totals->arrays |= mesh->arrays[array] ? 1u << array : 0;
-    return find_joint_boxes(rest, mesh) && find_target_boxes(rest, mesh);
+    return reserve_boxes(rest, mesh);
 }
 
 static bool list_meshes(struct gpu_scene *gpu, const struct scene *scene, struct rest_totals *totals)
@@ -282,10 +289,10 @@ static size_t packed_bytes(enum mesh_array array)
     return item_bytes(array) == 3 * sizeof(float) ? 4 * sizeof(float) : item_bytes(array);
 }
 
-/* Writes one array of all meshes. */
+/* Writes one array of all meshes; boxes are found with the positions. */
 static void write_array(const struct gpu_scene *gpu, const struct packing_part *part, const atomic_bool *stop)
 {
-    const struct gpu_scene_deform *deform = &gpu->state->deform;
+    struct gpu_scene_deform *deform = &gpu->state->deform;
     const enum mesh_array array = (enum mesh_array)part->array;
     const enum rest_place place = (enum rest_place)part->place;
     const size_t in_bytes = item_bytes(array), out_bytes = packed_bytes(array);
@@ -293,6 +300,10 @@ static void write_array(const struct gpu_scene *gpu, const struct packing_part *
     for (uint32_t m = 0; m < deform->mesh_count && !atomic_load(stop); m++) {
         const struct scene_mesh *mesh = scene_mesh(gpu->scene, deform->meshes[m].id);
         char *to = (char *)part->out + place_of(&deform->meshes[m], place) * out_bytes;
+        if (array == MESH_POSITIONS) {
+            find_joint_boxes(&deform->meshes[m], mesh);
+            find_target_boxes(&deform->meshes[m], mesh);
+        }
         if (!mesh->arrays[array])
             continue;
         const char *from = (const char *)mesh->arrays[array]->data;
