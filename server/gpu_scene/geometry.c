@@ -101,8 +101,7 @@ static bool list_geometries(struct gpu_scene *gpu, const struct scene *scene, st
     const struct gpu_scene_deform *deform = &gpu->state->deform;
     struct hashmap only_deformed = {0};
     size_t total = scene->objects[OBJECT_MESH].count + scene->objects[OBJECT_SPHERES].count + deform->use_count;
-    free(gpu->geometries);
-    gpu->geometry_count = 0;
+    gpu_scene_drop_geometries(gpu);
     gpu->geometries = calloc(total ? total : 1, sizeof(*gpu->geometries));
     bool ok = gpu->geometries && find_only_deformed(gpu, scene, &only_deformed);
     if (ok) {
@@ -298,6 +297,7 @@ static void write_mesh(const struct gpu_scene *gpu, const struct gpu_scene_geome
     switch ((enum packed)packed) {
     case PACKED_TRIANGLES:
         pack_triangles(gpu, geometry, out);
+        gpu_scene_find_runs(geometry);
         break;
     case PACKED_POSITIONS:
         pack_positions(geometry, out);
@@ -329,9 +329,11 @@ static void write_spheres(const struct gpu_scene *gpu, const struct packing_part
     float *out = part->out;
     for (uint32_t i = 0; i < gpu->geometry_count && !atomic_load(stop); i++) {
         const struct gpu_scene_geometry *geometry = &gpu->geometries[i];
-        if (geometry->spheres)
-            memcpy(out + (size_t)geometry->device.first_primitive * 4, geometry->spheres->centres_radii->data,
-                   (size_t)geometry->spheres->sphere_count * 4 * sizeof(float));
+        if (!geometry->spheres)
+            continue;
+        memcpy(out + (size_t)geometry->device.first_primitive * 4, geometry->spheres->centres_radii->data,
+               (size_t)geometry->spheres->sphere_count * 4 * sizeof(float));
+        gpu_scene_find_runs(geometry);
     }
 }
 
@@ -413,6 +415,9 @@ bool gpu_scene_list_geometry(struct gpu_scene *gpu, const struct scene *scene, s
     if (!gpu_scene_deform_list(&gpu->state->deform, scene, error) || !list_geometries(gpu, scene, error))
         return false;
     struct totals totals = lay_out(gpu);
+    for (uint32_t i = 0; i < gpu->geometry_count; i++)
+        if (!gpu_scene_reserve_runs(&gpu->geometries[i], error))
+            return false;
     gpu->state->close_vertex = (uint32_t)totals.vertices;
     gpu->state->stale_tables = true;
     gpu->state->brought.bits |= CHANGED_GEOMETRY;

@@ -57,7 +57,7 @@ void gpu_scene_finish(struct gpu_scene *gpu)
         free(gpu->state->lights);
         free(gpu->state);
     }
-    free(gpu->geometries);
+    gpu_scene_drop_geometries(gpu);
     free(gpu->instances);
     free(gpu->motions);
     free(gpu->discs);

@@ -40,6 +40,13 @@ struct scene_changes {
     uint64_t uploaded_bytes;
 };
 
+/* Consecutive primitives of a geometry in object space, and at rest where they deform. */
+#define GEOMETRY_RUN 256u
+struct geometry_run {
+    float centre[3], radius; /* a ball round them */
+    float area;              /* sum of theirs */
+};
+
 /* Mirror, on the host, of the arrays that builders need, in device order. */
 struct gpu_scene_geometry {
     struct geometry device;
@@ -55,6 +62,7 @@ struct gpu_scene_geometry {
                                    those of the mesh */
     float lower[3], upper[3];   /* bounds in object space while the shutter is open; conservative for a
                                    deforming mesh: from its joints and weights, up to rounding */
+    struct geometry_run *runs;  /* owned; the last one may have fewer primitives */
 };
 
 struct gpu_scene {

@@ -76,6 +76,10 @@ void gpu_scene_drop_texture_packing(struct gpu_scene *gpu);
 uint32_t gpu_scene_texture_index(const struct gpu_scene *gpu, uint32_t texture_id, bool *found);
 /* geometry.c. Lists the shapes to be packed, none if none has changed. */
 bool gpu_scene_list_geometry(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
+/* runs.c. Reserves the runs of a geometry when it is listed, and finds them while it is packed, on any thread. */
+bool gpu_scene_reserve_runs(struct gpu_scene_geometry *geometry, struct error *error);
+void gpu_scene_find_runs(const struct gpu_scene_geometry *geometry);
+void gpu_scene_drop_geometries(struct gpu_scene *gpu);
 /* Finds the geometries with cutouts, and the special materials of the scene. */
 void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scene,
                                  const struct scene_motion *motion);

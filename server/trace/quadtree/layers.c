@@ -62,13 +62,14 @@ static bool add_spans(struct quadtree_layers *layers, const struct gpu_scene *sc
 static bool begin_face(struct quadtree_layers *layers, const struct gpu_scene *scene, struct error *error)
 {
     const struct raster_camera camera = quadtree_face_camera(&layers->store->uniforms, layers->face);
-    struct frame_uniforms uniforms = {.sample_places = {{0.5f, 0.5f}}};
-    raster_camera_fill(&uniforms, &camera);
+    struct frame_uniforms *uniforms = &layers->uniforms;
+    *uniforms = (struct frame_uniforms){.sample_places = {{0.5f, 0.5f}}};
+    raster_camera_fill(uniforms, &camera);
     layers->span_count = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         if (!quadtree_is_beside(&camera, scene, i) && !add_spans(layers, scene, &camera, i, error))
             return false;
-    return gpu_buffer_upload(layers->store->device, &layers->frame, &uniforms, sizeof(uniforms), error);
+    return gpu_buffer_upload(layers->store->device, &layers->frame, uniforms, sizeof(*uniforms), error);
 }
 
 static void clear(const struct quadtree_layers *layers)
@@ -113,6 +114,7 @@ static bool draw_part(struct quadtree_layers *layers, struct gpu_scene *scene, b
     const struct raster_view_target target = {
         .device = layers->store->device,
         .scene = scene,
+        .frame = &layers->uniforms,
         .layers = layers->pass_layers,
         .has_before = layers->layer > 0,
         .spans = layers->spans,

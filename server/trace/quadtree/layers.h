@@ -13,10 +13,11 @@
 /* All-zero is empty. Buffers and measured costs stay from one view to the next. */
 struct quadtree_layers {
     struct quadtree_store *store;
-    uint32_t pass_layers;         /* layers that a pass draws: 1, or all of a face */
-    struct gpu_buffer frame;      /* struct frame_uniforms of the face */
-    struct gpu_texture depths[2]; /* the current layer and the one before it; in one pass, all layers in the
-                                     first */
+    uint32_t pass_layers;           /* layers that a pass draws: 1, or all of a face */
+    struct frame_uniforms uniforms; /* of the face */
+    struct gpu_buffer frame;        /* the same */
+    struct gpu_texture depths[2];   /* the current layer and the one before it; in one pass, all layers in the
+                                       first */
     struct gpu_framebuffer framebuffer;
     struct raster_span *spans; /* primitives that the face may see */
     uint32_t span_count, span_capacity;

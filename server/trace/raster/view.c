@@ -3,6 +3,7 @@
 #include "trace/raster/view.h"
 
 #include "gpu/program.h"
+#include "trace/raster/weight.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -12,15 +13,19 @@
  * floating-point depth stays precise however small it is. */
 #define NEAR_OF_DIAGONAL 1e-5f
 
-/* Vertices per part, times step_scale: at most what takes some ten milliseconds with small triangles, and fewer
- * where a part takes longer than a step should, with larger triangles or a busy machine. A part has a fixed
- * cost, so parts are no smaller than needed. */
+/* Vertices per part, or pixels that cost as much, times step_scale: at most what takes some ten milliseconds, and
+ * fewer where a part takes longer than a step should, as on a busy machine. A part has a fixed cost, so parts are
+ * no smaller than needed. */
 #define DRAW_VERTICES_MAX (3u << 16)
-#define DRAW_VERTICES_FIRST (3u << 14) /* before anything is known of the scene */
+#define DRAW_VERTICES_FIRST (3u << 15) /* before anything is known of the scene */
 #define DRAW_VERTICES_MIN (3u << 12)
 
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
+/* Pixels that software GL draws in the time of a vertex, of plain triangles and of primitives whose shader decides
+ * whether and where they are seen. */
+#define PIXELS_A_VERTEX 64.0f
+#define PIXELS_A_VERTEX_DECIDED 6.0f
 
 float raster_near(const struct gpu_scene *scene, float near, bool orthographic)
 {
@@ -104,9 +109,36 @@ static struct raster_span span_of(const struct raster_view *view, const struct r
     return span;
 }
 
+/* Takes from the budget as many of `count` primitives of an instance from `first` on, or discs, as fit into it.
+ * `some`: takes at least one. Returns their number. */
+static uint32_t take_some(const struct raster_view_target *target, const struct raster_sight *sight,
+                          enum primitive_sort sort, uint32_t first, uint32_t count, bool some, float *budget)
+{
+    const enum primitive_kind kind = kind_of_sort[sort];
+    const bool decided = kind != PRIMITIVE_TRIANGLES || has_cutout(target->scene, sort) || target->layers > 0;
+    uint32_t taken = 0;
+    while (taken < count) {
+        const uint32_t at = first + taken;
+        const float pixels = kind == PRIMITIVE_DISCS ? raster_pixels_of_disc(sight, &target->scene->discs[at])
+                                                     : raster_pixels_of_run(sight, at / GEOMETRY_RUN);
+        const float each =
+            (float)vertices_per_primitive[kind] + pixels / (decided ? PIXELS_A_VERTEX_DECIDED : PIXELS_A_VERTEX);
+        const uint32_t run = kind == PRIMITIVE_DISCS ? 1 : GEOMETRY_RUN - at % GEOMETRY_RUN;
+        const uint32_t left = count - taken < run ? count - taken : run;
+        const float fitting = *budget / each;
+        const uint32_t part = fitting >= (float)left ? left : fitting >= 1.0f ? (uint32_t)fitting : 0;
+        const uint32_t drawn = part > 0 || !some || taken > 0 ? part : 1;
+        taken += drawn;
+        *budget -= each * (float)drawn;
+        if (drawn < left)
+            break;
+    }
+    return taken;
+}
+
 /* Continues a sort where the last part ended; *budget returns the vertices left. */
-static bool draw_sort(struct raster_view *view, const struct raster_view_target *target, uint32_t *budget,
-                      struct error *error)
+static bool draw_sort(struct raster_view *view, const struct raster_view_target *target,
+                      struct raster_sight *sight, float *budget, struct error *error)
 {
     const struct gpu_scene *scene = target->scene;
     enum primitive_sort sort = (enum primitive_sort)view->sort;
@@ -118,12 +150,15 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
         const struct raster_span span = span_of(view, target, &first);
         if (span.first + view->primitive >= span.end)
             continue;
-        first += span.first + view->primitive;
-        const uint32_t count = span.end - span.first - view->primitive;
+        const uint32_t begin = span.first + view->primitive, count = span.end - begin;
+        first += begin;
         if (!program &&
             !(program = get_program(target->device, kind, has_cutout(scene, sort), target->layers, error)))
             return false;
-        uint32_t maximum = *budget / vertices_per_primitive[kind], part = count < maximum ? count : maximum;
+        if (sort != SORT_DISCS)
+            raster_sight_take(sight, scene, span.instance);
+        const uint32_t part = take_some(target, sight, sort, begin, count, !view->has_some, budget);
+        view->has_some |= part > 0;
         if (sort == SORT_SPHERES) /* the picture's y points down, which reverses every winding */
             glFrontFace(scene->instances[span.instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
         gpu_uniform_uint(program, "instance_index", span.instance);
@@ -135,10 +170,9 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
         gpu_program_use(target->device, program);
         if (part > 0)
             glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(part * vertices_per_primitive[kind]));
-        *budget -= part * vertices_per_primitive[kind];
         view->primitive += part;
         if (part < count) {
-            *budget = 0;
+            *budget = 0.0f;
             return true;
         }
     }
@@ -147,17 +181,20 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
     return true;
 }
 
-static bool draw_sorts(struct raster_view *view, const struct raster_view_target *target, uint32_t *budget,
+static bool draw_sorts(struct raster_view *view, const struct raster_view_target *target, float budget,
                        struct error *error)
 {
+    struct raster_sight sight;
     bool drawn = true;
-    while (drawn && *budget > 0 && view->sort < SORT_COUNT) {
+    raster_sight_begin(&sight, target->frame);
+    view->has_some = false;
+    while (drawn && budget > 0.0f && view->sort < SORT_COUNT) {
         if (view->sort == SORT_SPHERES) { /* the inner sides of a sphere's box exist also when the eye is in the
                                              box */
             glEnable(GL_CULL_FACE);
             glCullFace(GL_FRONT);
         }
-        drawn = draw_sort(view, target, budget, error);
+        drawn = draw_sort(view, target, &sight, &budget, error);
         glDisable(GL_CULL_FACE);
     }
     return drawn;
@@ -174,7 +211,7 @@ bool raster_view_draw(struct raster_view *view, const struct raster_view_target 
 {
     if (view->part_vertices == 0)
         view->part_vertices = DRAW_VERTICES_FIRST;
-    uint32_t budget = view->part_vertices * target->device->facts.step_scale;
+    const uint32_t budget = view->part_vertices * target->device->facts.step_scale;
     glDisable(GL_BLEND);
     glDisable(GL_SCISSOR_TEST);
     glDisable(GL_CULL_FACE);
@@ -185,7 +222,7 @@ bool raster_view_draw(struct raster_view *view, const struct raster_view_target 
     glDepthMask(GL_TRUE);
     glDepthFunc(GL_GREATER);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    bool drawn = draw_sorts(view, target, &budget, error);
+    bool drawn = draw_sorts(view, target, (float)budget, error);
     glDisable(GL_DEPTH_TEST);
     *whole = view->sort == SORT_COUNT;
     return drawn;

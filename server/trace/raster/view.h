@@ -35,14 +35,16 @@ struct raster_span {
 /* Progress of drawing, and the size of a part. All-zero is valid; measured costs stay. */
 struct raster_view {
     uint32_t sort, span, primitive; /* span: an instance where there are no spans */
-    uint32_t part_vertices;         /* vertices of a part, times step_scale; 0: unknown yet */
+    uint32_t part_vertices; /* vertices of a part, or pixels that cost as much, times step_scale; 0: unknown yet */
+    bool has_some;          /* the part has a primitive already */
 };
 
 struct raster_view_target {
     struct gpu_device *device;
     const struct gpu_scene *scene;
-    uint32_t first_row; /* row of the view's picture that is the framebuffer's first */
-    uint32_t sample;    /* index in frame_uniforms.sample_places */
+    const struct frame_uniforms *frame; /* the uniforms at UNIFORM_FRAME */
+    uint32_t first_row;                 /* row of the view's picture that is the framebuffer's first */
+    uint32_t sample;                    /* index in frame_uniforms.sample_places */
     /* Number of layers that are drawn now. 0: the nearest surface, and no layer will follow. 1: the nearest
      * behind the depths at UNIT_TRACER_2, if has_before. 2 or 3: as many colours, for layers from the nearest
      * on, and after them a colour of as many depths, all cleared to 0; no depth is tested, and the device
