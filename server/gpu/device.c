@@ -108,6 +108,8 @@ void gpu_facts_choose(struct gpu_facts *facts, bool software)
     /* With more primitives, a step of the smallest range of rays would take software GL longer than a cancel
      * may. */
     facts->primitives_max = software ? 65000 : 0;
+    /* Software GL takes about 80 ms for as many lights, a slow GPU as long. */
+    facts->list_tests_max = software ? 1u << 25 : (uint64_t)1 << 31;
     facts->axes_samples_max = (software ? 1 : 8) * (4ull * 3 * 1024 * 1024);
 }
 

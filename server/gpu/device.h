@@ -62,6 +62,7 @@ struct gpu_facts {
     uint32_t band_slots_max;      /* samples in a band of a picture, which one step turns into pixels */
     uint32_t ray_tests_max;       /* maximum of elements or primitives per ray and dispatch */
     uint32_t primitives_max;      /* maximum for naive, which tests all of them with every ray; 0: no limit */
+    uint64_t list_tests_max;      /* maximum of a dispatch: rays times lights or discs, which no structure holds */
     uint64_t axes_samples_max;    /* maximum in a structure of samples along axes: ldc, abuffer */
     bool shares_memory;           /* buffers are mapped memory of the host, which writes them in place */
     uint64_t limits[GPU_LIMIT_COUNT];

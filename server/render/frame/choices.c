@@ -12,10 +12,12 @@
  * tracers are compared. */
 #define SLICE_RAYS_UNTOLD (1u << 18)
 #define SLICE_RAYS_MIN (1u << 12)
+/* The same where there are many lights: a work group of the passes over hits. */
+#define SLICE_RAYS_LIT_MIN (1u << 6)
 #define SLICE_MEMORY_PART 64
 
 /* Not by the limit in force, which changes with the frames of others. */
-uint32_t choices_slice_rays(const struct gpu_device *device, bool compared)
+uint32_t choices_slice_rays(const struct gpu_device *device, bool compared, uint32_t lights)
 {
     const struct gpu_facts *facts = &device->facts;
     const uint64_t ray_bytes = CHOICES_WAVE_PER_SLICE *
@@ -28,6 +30,8 @@ uint32_t choices_slice_rays(const struct gpu_device *device, bool compared)
         rays = SLICE_RAYS_UNTOLD;
     while (rays > SLICE_RAYS_MIN &&
            ((bytes_max && rays * ray_bytes > bytes_max) || rays * ray_texels > facts->texture_buffer_texels_max))
+        rays /= 2;
+    while (rays > SLICE_RAYS_LIT_MIN && rays * lights > facts->list_tests_max)
         rays /= 2;
     return (uint32_t)(compared ? rays / 2 : rays);
 }

@@ -9,8 +9,8 @@
 /* How many times as many rays as a slice its waves have room for at most: mirrors and glass rarely fill it. */
 #define CHOICES_WAVE_PER_SLICE 2
 
-/* Rays of a slice at most. */
-uint32_t choices_slice_rays(const struct gpu_device *device, bool compared);
+/* Rays of a slice at most, whose hits all look at every one of `lights`. */
+uint32_t choices_slice_rays(const struct gpu_device *device, bool compared, uint32_t lights);
 /* Whether first hits are rasterised, once the scene and the tracer of the context are those of its request. */
 bool choices_rasterise(const struct render_frame *frame);
 

@@ -76,7 +76,8 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
 {
     if (renderer->wanted_slice_pixels)
         return renderer->wanted_slice_pixels;
-    return choices_slice_rays(renderer->device, renderer->work->frame.request.compare);
+    const struct render_frame *frame = &renderer->work->frame;
+    return choices_slice_rays(renderer->device, frame->request.compare, frame->uniforms.light_count);
 }
 
 /* A wave for each bounce and one before them, or one alone where nothing sends rays on; more if a slice has needed

@@ -78,6 +78,7 @@ static bool draw_part(struct primary *primary, const struct render_frame *frame,
     const struct raster_view_target target = {
         .device = frame->device->gpu,
         .scene = frame->scene,
+        .frame = &frame->uniforms,
         .first_row = primary->first_row,
         .sample = primary->layer,
     };
