@@ -12,6 +12,8 @@
  * has the device's range_rays_first. */
 #define STEP_RAYS_GROWTH 2u
 #define STEP_RAYS_MAX (1u << 30)
+/* Divisor of the first step's rays where rays go through surfaces. */
+#define STEP_RAYS_THROUGH 16u
 
 /* ---- state ---- */
 
@@ -125,13 +127,30 @@ static uint32_t minimum_rays(const struct trace_state *state)
     return state->impl->minimum_rays ? state->impl->minimum_rays : 1;
 }
 
+/* Rays of a family's first step. A ray may go through many surfaces one after the other, and is tested with all
+ * discs. */
+static uint32_t first_step_rays(const struct trace_state *state, const struct gpu_scene *scene)
+{
+    const struct gpu_facts *facts = &state->device->facts;
+    const uint32_t minimum = minimum_rays(state);
+    uint64_t rays = facts->range_rays_first;
+    if (rays == UINT32_MAX)
+        return UINT32_MAX;
+    if (scene->has_translucent || scene->has_cutout)
+        rays /= STEP_RAYS_THROUGH;
+    if (rays * scene->disc_count > facts->list_tests_max)
+        rays = facts->list_tests_max / scene->disc_count;
+    return rays > minimum ? (uint32_t)rays : minimum;
+}
+
 /* The rays of the next step: the rest is divided into equal steps, none with more than the family's. */
-static struct ray_range next_range(const struct trace_state *state, uint64_t step_ns)
+static struct ray_range next_range(const struct trace_state *state, const struct gpu_scene *scene,
+                                   uint64_t step_ns)
 {
     const struct wave *wave = &state->wave;
     const uint32_t learnt = state->step_rays[wave->family], minimum = minimum_rays(state);
     const uint32_t first = state->traced_rays, left = wave->ray_count - first;
-    const uint32_t maximum = step_ns == 0 ? minimum : learnt ? learnt : state->device->facts.range_rays_first;
+    const uint32_t maximum = step_ns == 0 ? minimum : learnt ? learnt : first_step_rays(state, scene);
     struct ray_range rays = {.wave = wave, .first = first, .end = wave->ray_count};
     if (step_ns == STEP_WITHOUT_END || maximum >= left)
         return rays;
@@ -142,13 +161,13 @@ static struct ray_range next_range(const struct trace_state *state, uint64_t ste
     return rays;
 }
 
-static void learn(struct trace_state *state, uint32_t rays, uint64_t step_ns, uint64_t took_ns)
+static void learn(struct trace_state *state, const struct gpu_scene *scene, uint32_t rays, uint64_t step_ns,
+                  uint64_t took_ns)
 {
     uint32_t *step_rays = &state->step_rays[state->wave.family];
-    const uint32_t first = state->device->facts.range_rays_first;
-    if (first == UINT32_MAX)
+    if (state->device->facts.range_rays_first == UINT32_MAX)
         return;
-    const uint64_t last = *step_rays ? *step_rays : first, minimum = minimum_rays(state);
+    const uint64_t last = *step_rays ? *step_rays : first_step_rays(state, scene), minimum = minimum_rays(state);
     const uint64_t wanted = rays * step_ns / (took_ns + 1), maximum = STEP_RAYS_GROWTH * last;
     const uint64_t next = wanted < maximum ? wanted : maximum;
     *step_rays = (uint32_t)(next < minimum ? minimum : next < STEP_RAYS_MAX ? next : STEP_RAYS_MAX);
@@ -175,7 +194,7 @@ static enum tracer_progress intersect(struct tracer *tracer, struct gpu_scene *s
     const struct tracer_impl *impl = tracer->impl;
     const uint32_t all = state->wave.ray_count;
     if (!impl->trace_step) {
-        *rays = next_range(state, step_ns);
+        *rays = next_range(state, scene, step_ns);
         state->range_end = rays->end;
         state->step_end_ns = step_end_of(step_ns);
         if (!impl->trace_range(tracer, scene, state, rays, error))
@@ -211,7 +230,7 @@ static enum tracer_progress do_step(struct tracer *tracer, struct gpu_scene *sce
     if (progress == TRACER_FAILED)
         return TRACER_FAILED;
     if (rays.first < rays.end && !tracer->impl->trace_step && step_ns > 0 && step_ns != STEP_WITHOUT_END)
-        learn(state, rays.end - rays.first, step_ns, clock_now_ns() - start_ns);
+        learn(state, scene, rays.end - rays.first, step_ns, clock_now_ns() - start_ns);
     state->traced_rays = rays.end;
     return progress;
 }

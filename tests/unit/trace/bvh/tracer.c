@@ -4,6 +4,7 @@
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "trace/bvh/tracer.h"
+#include "trace/program.h"
 
 #define RAY_COUNT 4096u
 
@@ -445,4 +446,47 @@ TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
 TEST(an_unknown_form_is_refused)
 {
     expect_options_refused(TRACER_BVH, &(struct refused_options){"options.bvh_form", {.bvh = {.form = 5}}}, 1);
+}
+
+/* Rays of the first step of a wave, of which nothing was learnt. */
+static uint32_t first_step_of(struct scene *scene)
+{
+    struct ray *rays = rays_for_packets(39);
+    struct gpu_buffer ray_buffer = {0}, hit_buffer = {0};
+    struct error error = {0};
+    struct fixture fixture;
+    fixture_init(&fixture, scene);
+    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error), &error);
+    struct trace_state *wave = begin_wave(&fixture, &ray_buffer, &hit_buffer);
+    gpu_scene_bind(&fixture.gpu);
+    const enum tracer_progress progress =
+        tracer_trace_step(fixture.tracer, &fixture.gpu, wave, UINT64_C(1000000000), &error);
+    expect_ok(progress != TRACER_FAILED, &error);
+    const uint32_t traced = wave->traced_rays;
+    trace_state_destroy(wave);
+    gpu_buffer_finish(device, &ray_buffer);
+    gpu_buffer_finish(device, &hit_buffer);
+    fixture_finish(&fixture);
+    free(rays);
+    return traced;
+}
+
+TEST(a_first_step_has_fewer_rays_where_each_may_meet_much)
+{
+    const struct gpu_facts facts = device->facts;
+    gpu_facts_choose(&device->facts, true);
+    device->facts.range_rays_first = RAY_COUNT;
+    const uint32_t usual = first_step_of(scene_of_instances());
+    const uint32_t translucent = first_step_of(test_scene_translucent());
+    struct test_edits edits = {.scene = scene_of_instances()};
+    for (uint32_t i = 1; i <= 100; i++)
+        test_add(&edits, OBJECT_DISC)->set.disc =
+            (struct scene_disc){.base.id = i, .centre_world = {100, 0, 0}, .normal_world = {0, 0, 1}, .radius = 1};
+    test_commit(&edits);
+    device->facts.list_tests_max = 100 * RAY_COUNT / 4;
+    const uint32_t discs = first_step_of(edits.scene);
+    device->facts = facts;
+    assert_int_equal(usual, RAY_COUNT);
+    assert_in_range(translucent, TRACE_RAYS_MULTIPLE, RAY_COUNT / 8);
+    assert_in_range(discs, TRACE_RAYS_MULTIPLE, RAY_COUNT / 3);
 }
