@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/host.h"
 #include "base/progress.h"
+#include "engine/shot.h"
 
 #include <pthread.h>
 #include <stdlib.h>
@@ -67,6 +68,11 @@ static struct aside_commit *next_locked(struct aside *aside)
 static void carry_out(struct aside_commit *commit)
 {
     struct engine_command *command = commit->command;
+    if (command->kind == ENGINE_JOB_START) {
+        struct error found_again = {0}; /* by the job */
+        (void)shot_check(&command->job, commit->scene, &commit->bounds, &found_again);
+        return;
+    }
     uint64_t start_ns = clock_now_ns();
     commit->applied = scene_commit_unless(commit->scene, command->edits, command->edit_count, &commit->abandoned,
                                           &commit->error);

@@ -87,9 +87,9 @@ static struct job *replaced_by(struct engine *engine, const struct engine_comman
 }
 
 bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
-               struct error *error)
+               const struct animation_bounds *known, struct error *error)
 {
-    struct animation_bounds bounds = {0};
+    struct animation_bounds bounds = known ? *known : (struct animation_bounds){0};
     if (!spec_check(&command->job, reference->scene->scene, &bounds, error))
         return false;
     struct job *job = calloc(1, sizeof(*job));

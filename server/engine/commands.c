@@ -9,6 +9,8 @@
 
 /* Commands that may wait for one scene's frames; more are answered with busy. */
 #define WAITING_MAX 256
+/* Instances times primitives of a scene whose bounds are found at once: some milliseconds. */
+#define SEARCHED_HERE_MAX (UINT64_C(1) << 22)
 
 void engine_command_release_edits(struct engine_command *command)
 {
@@ -111,6 +113,54 @@ static bool commit(struct engine *engine, const struct engine_reference *referen
     return true;
 }
 
+/* ---- jobs that begin ---------------------------------------------------------------------------- */
+
+static void start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
+                  const struct animation_bounds *bounds)
+{
+    struct error error = {0};
+    if (!job_start(engine, reference, command, bounds, &error))
+        fail(engine, command, &error);
+}
+
+/* Whether its first frame needs the bounds of so large a scene that other jobs would wait for them. */
+static bool searches_long(struct engine_scene *scene, const struct engine_job *job)
+{
+    const bool is_framed = job->path == CAMERA_AUTO || (job->path == CAMERA_ORBIT && job->key_count == 0);
+    if (!is_framed && !(job->frame.aperture > 0.0f) && !job->has_ground)
+        return false;
+    engine_count_contents(scene);
+    return (uint64_t)scene->instances * (scene->triangles + scene->spheres) > SEARCHED_HERE_MAX;
+}
+
+/* False: the command stays the caller's. */
+static bool start_aside(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+{
+    struct aside_commit *search = searches_long(scene, &command->job) ? calloc(1, sizeof(*search)) : NULL;
+    if (!search)
+        return false;
+    search->scene = scene->scene;
+    search->command = command;
+    scene->commit = search;
+    aside_submit(engine->aside, search);
+    return true;
+}
+
+/* ---- what is finished aside --------------------------------------------------------------------- */
+
+static void finish_commit(struct engine *engine, struct engine_scene *scene, struct engine_reference *by,
+                          const struct aside_commit *commit)
+{
+    if (commit->command->kind == ENGINE_JOB_START) {
+        if (by && !atomic_load(&commit->abandoned))
+            start(engine, by, commit->command, &commit->bounds);
+    } else if (scene->references) {
+        committed(engine, scene, by, commit);
+    } else {
+        engine_scene_note(engine, scene); /* it has no holder to be told, and may end now */
+    }
+}
+
 void engine_finish_commits(struct engine *engine)
 {
     struct aside_commit *commit;
@@ -121,22 +171,12 @@ void engine_finish_commits(struct engine *engine)
         scene->commit = NULL;
         engine->promised_bytes -= commit->promised_bytes;
         const struct engine_command *command = commit->command;
-        const struct engine_reference *by = engine_find_reference(engine, command->client, command->scene);
-        if (scene->references)
-            committed(engine, scene, by && by->scene == scene ? by : NULL, commit);
-        else
-            engine_scene_note(engine, scene); /* it has no holder to be told, and may end now */
+        struct engine_reference *by = engine_find_reference(engine, command->client, command->scene);
+        finish_commit(engine, scene, by && by->scene == scene ? by : NULL, commit);
         aside_commit_destroy(commit);
         engine_run_waiting(engine, scene);
         engine_reap_scenes(engine);
     }
-}
-
-static void start(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
-{
-    struct error error = {0};
-    if (!job_start(engine, reference, command, &error))
-        fail(engine, command, &error);
 }
 
 /* False: it stays the caller's. */
@@ -243,8 +283,10 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
         engine_objects_list(engine, scene, command);
     } else if (command->kind == ENGINE_OBJECT_READ) {
         engine_object_read(engine, scene, command);
+    } else if (start_aside(engine, scene, command)) {
+        return;
     } else {
-        start(engine, reference, command);
+        start(engine, reference, command, NULL);
     }
     engine_command_destroy(command);
 }
@@ -282,8 +324,21 @@ static bool find_waiting(struct engine *engine, const struct engine_command *by,
     return false;
 }
 
+/* The job of that request that is not started yet, because a thread searches its scene; NULL: there is none. */
+static struct aside_commit *find_starting(struct engine *engine, const struct engine_command *by)
+{
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        const struct engine_command *command = scene->commit ? scene->commit->command : NULL;
+        if (command && command->kind == ENGINE_JOB_START && command->client == by->client &&
+            command->request == by->target_request && !atomic_load(&scene->commit->abandoned))
+            return scene->commit;
+    }
+    return NULL;
+}
+
 static void job_cancel(struct engine *engine, struct engine_command *command)
 {
+    struct aside_commit *starting = find_starting(engine, command);
     uint32_t target = command->target_request;
     struct engine_scene *waits_for;
     size_t place;
@@ -292,6 +347,9 @@ static void job_cancel(struct engine *engine, struct engine_command *command)
         struct engine_scene *scene = job->scene;
         job_abort(engine, job, engine_cancelled(command->client, target, "the client cancelled it"));
         engine_run_waiting(engine, scene);
+    } else if (starting) {
+        atomic_store(&starting->abandoned, true);
+        engine_post(engine, engine_cancelled(command->client, target, "the client cancelled it"));
     } else if (find_waiting(engine, command, &waits_for, &place)) {
         engine_command_destroy(take_waiting(waits_for, place));
         engine_post(engine, engine_cancelled(command->client, target, "the client cancelled it"));
@@ -308,9 +366,10 @@ static void give_credit(struct engine *engine, const struct engine_command *comm
     }
     struct engine_scene *waits_for;
     size_t place;
-    if (!find_waiting(engine, command, &waits_for, &place))
+    struct aside_commit *starting = find_starting(engine, command);
+    if (!starting && !find_waiting(engine, command, &waits_for, &place))
         return;
-    struct engine_command *waiting = waits_for->waiting[place];
+    struct engine_command *waiting = starting ? starting->command : waits_for->waiting[place];
     if (command->credit > waiting->job.credit)
         waiting->job.credit = command->credit;
 }

@@ -242,8 +242,9 @@ void engine_object_read(struct engine *engine, const struct engine_scene *from,
 bool engine_scene_is_open_to(const struct engine_scene *scene, uint64_t principal);
 
 /* batch.c: jobs. */
+/* `bounds`: of the scene, if they were searched already; NULL: not. Takes the keys over on success. */
 bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
-               struct error *error); /* takes the keys over on success */
+               const struct animation_bounds *bounds, struct error *error);
 /* A job that is not answered yet; NULL: none. */
 struct job *job_find(struct engine *engine, uint64_t client, uint32_t request);
 bool job_is_ready(const struct engine *engine, const struct job *job);

@@ -3,6 +3,7 @@
 #include "tests/unit/engine/engine_fake.h"
 
 #include "base/clock.h"
+#include "tests/accuracy/test_scenes.h"
 #include "tests/harness/test.h"
 
 #include <xxhash.h>
@@ -276,6 +277,54 @@ TEST(a_cancel_is_answered_once_after_its_job)
     expect_done(1, 5);
     submit_target(ENGINE_JOB_CANCEL, 1, 6, 5, 0);
     expect_done(1, 6);
+}
+
+/* Spheres in many places: their bounds take a while, which a thread of its own spends. */
+static void fill_scene(uint32_t request)
+{
+    enum { SPHERES = 2000, NODES = 3000 };
+    struct engine_command *made = commit_of_nodes(1, request, 1, NODES + 1);
+    float(*spheres)[4] = calloc(SPHERES, sizeof(*spheres));
+    for (uint32_t i = 0; i < SPHERES; i++)
+        spheres[i][3] = 1.0f + (float)i / SPHERES;
+    struct scene_edit *edit = &made->edits[NODES];
+    *edit = (struct scene_edit){.object = OBJECT_SPHERES};
+    edit->set.spheres = (struct scene_spheres){
+        .base.id = 1, .sphere_count = SPHERES, .centres_radii = test_blob(spheres, SPHERES * sizeof(*spheres))};
+    free(spheres);
+    for (uint32_t i = 0; i < NODES; i++) {
+        struct scene_node *node = &made->edits[i].set.node;
+        node->kind = NODE_SPHERES;
+        node->object = 1;
+        node->parent_from_node[0] = node->parent_from_node[5] = node->parent_from_node[10] = 1;
+        node->parent_from_node[3] = (float)i;
+    }
+    submit(made);
+    expect_done(1, request);
+}
+
+TEST(a_job_that_searches_a_large_scene_for_its_camera_can_be_cancelled_and_others_follow_it)
+{
+    open_scene(1, 1);
+    fill_scene(2);
+    struct engine_command *made[2] = {render(1, 3, 0, 0), render(1, 5, 0, 0)};
+    for (int i = 0; i < 2; i++)
+        made[i]->job.path = CAMERA_AUTO;
+    submit(made[0]);
+    submit_target(ENGINE_JOB_CANCEL, 1, 4, 3, 0);
+    expect_failed(1, 3, ERROR_CANCELLED, "");
+    expect_done(1, 4);
+    submit(made[1]);
+    submit_commit(1, 6, 1);
+    uint64_t revision = 0;
+    for (unsigned answered = 0; answered < 3; answered++) {
+        struct engine_event *event = next_event();
+        assert_int_not_equal(event->kind, ENGINE_FAILED);
+        if (event->request == 6)
+            revision = event->revision;
+        engine_event_destroy(event);
+    }
+    assert_int_equal(revision, 2);
 }
 
 TEST(a_cancelled_job_that_lacks_credit_ends_too)
