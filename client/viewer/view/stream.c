@@ -226,6 +226,7 @@ bool view_is_at_rest(const struct view *view, unsigned samples)
            !view->sent.moving && view->eye.glide_begin_ns == 0 && view->frames.count > 0 &&
            view->frames.last.command == view->sent.command && view->frames.last.change == view->sent.change &&
            !view->frames.last.moving && !view->frames.last.more_follows &&
+           !(view->frames.is_live && view->local.shows_made) && /* until the next step */
            view_has_samples(view, &view->frames.last, enough);
 }
 
