@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a process that serves needs of the machine: the system's libraries, the GPU's devices, and its own files.
- */
+/* Sandbox of a process that serves: its access to the system's libraries, the GPU's devices, and its own files. */
 #include "confine.h"
 
 #include "base/log.h"
@@ -52,7 +51,7 @@ static const char *const driver_variables[] = {"GBM_BACKENDS_PATH",
                                                "VK_ICD_FILENAMES",
                                                "__EGL_VENDOR_LIBRARY_DIRS",
                                                "__EGL_VENDOR_LIBRARY_FILENAMES"};
-/* The same of drivers' caches, each of which is one folder. */
+/* Environment variables with drivers' caches, each of which is one folder. */
 static const char *const cache_variables[] = {"MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"};
 /* Drivers' caches beside ours. */
 static const char *const caches[] = {"mesa_shader_cache", "mesa_shader_cache_db", "nvidia"};

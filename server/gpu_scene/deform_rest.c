@@ -165,7 +165,7 @@ static const uint16_t *joints_of(const struct scene_mesh *mesh)
 static bool reserve_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
 {
     const uint16_t *joints = joints_of(mesh);
-    uint32_t joint_count = 0; /* one variable, so that the loop is vectors of the processor */
+    uint32_t joint_count = 0; /* a single variable lets the compiler vectorise the loop */
     for (size_t i = 0; i < (size_t)mesh->vertex_count * mesh->influence_count; i++)
         joint_count = joints[i] >= joint_count ? joints[i] + 1u : joint_count;
     rest->joint_count = joint_count;

@@ -44,7 +44,7 @@ struct wave {
     struct gpu_buffer *rays;       /* struct ray */
     struct gpu_buffer *hits;       /* struct hit; closest */
     struct gpu_buffer *visibility; /* uint; any */
-    struct gpu_buffer *times;      /* one float per ray, 0: the shutter opens, 1: it closes; NULL: 0 for all */
+    struct gpu_buffer *times;      /* float per ray, 0: the shutter opens, 1: it closes; NULL: 0 for all */
     bool shared_origin;            /* every ray begins at the same point */
     bool within_reach;             /* layers only: no hits on surfaces hidden from every eye of the structure */
     bool bare;                     /* closest: intersections suffice, they do not become hits */

@@ -14,8 +14,8 @@
 struct quadtree_layers {
     struct quadtree_store *store;
     uint32_t pass_layers;           /* layers that a pass draws: 1, or all of a face */
-    struct frame_uniforms uniforms; /* of the face */
-    struct gpu_buffer frame;        /* the same */
+    struct frame_uniforms uniforms; /* uniforms of the current face */
+    struct gpu_buffer frame;        /* buffer of these */
     struct gpu_texture depths[2];   /* the current layer and the one before it; in one pass, all layers in the
                                        first */
     struct gpu_framebuffer framebuffer;

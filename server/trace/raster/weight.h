@@ -11,11 +11,11 @@
 
 /* A view, and an instance as it sees it. */
 struct raster_sight {
-    float view_from_world[12], extent[2], near; /* as frame_uniforms has them */
+    float view_from_world[12], extent[2], near; /* members of frame_uniforms */
     bool orthographic;
-    float pixels;    /* of the picture */
+    float pixels;    /* pixels of the picture */
     float unit_area; /* pixels of a surface of area 1 that faces the view at distance 1; orthographic: anywhere */
-    float from_object[12]; /* to view space */
+    float from_object[12]; /* object to view space */
     float scale;           /* maximum of lengths, object to view space */
     float swelling;        /* how many times as large as at rest areas are */
     const struct gpu_scene_geometry *geometry;

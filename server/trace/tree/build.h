@@ -87,7 +87,7 @@ struct bvh_refit_plan {
 
 struct bvh_form {
     bool spheres;            /* bounds are spheres, not boxes */
-    bool one_order;          /* the same order for every direction */
+    bool one_order;          /* every direction has the same order */
     bool whole;              /* boxes in floats, not on a grid */
     unsigned threads;        /* maximum; small shapes take one */
     const atomic_bool *stop; /* makes a build fail soon once it is set; NULL: never */

@@ -45,7 +45,7 @@ struct bvh_store_build {
     bool is_mapped;          /* both buffers are mapped for writing */
     uint64_t start_ns;       /* beginning of the run */
     uint32_t uploaded;       /* number of trees uploaded */
-    uint64_t uploaded_bytes; /* of the next tree's elements and primitives */
+    uint64_t uploaded_bytes; /* bytes of the next tree's elements and primitives */
 };
 
 struct bvh_store {
