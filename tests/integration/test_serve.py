@@ -390,7 +390,7 @@ class Serve(Case):
                 (("serve", self.model, "--name", ""), "need it to attach"),
                 (("serve", self.model, "--server", "unix:/x", "--listen", "unix:/y"), "already has its addresses"),
                 (("serve", self.model, "--server", "unix:/x", "--", "--device", "0"), "already has its options"),
-                (("serve", *[self.model] * 65), "more than 64 models"),
+                (("serve", *[self.model] * 65), "at most 64 models"),
                 (("render", "--scene", "x", "-o", "x.png"), "no address of a daemon is given"),
                 (("render", self.model, "--scene", "x", "--server", "unix:/x", "-o", "x.png"), "one or the other"),
                 (("render", "--scene", "x", "--server", "unix:/x", "--environment", "a.hdr", "-o", "x.png"), "light"),

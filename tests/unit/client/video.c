@@ -408,7 +408,7 @@ TEST(an_unwritable_output_is_reported_before_the_first_frame)
         {"missing/a.mp4", {0}, "No such file", "", NULL},
         {"", {.format = "mp4"}, "Is a directory", "", NULL},
         {"a.avi", {0}, "the ending belongs to no supported video format", ".mp4, .mkv, .webp or .gif", NULL},
-        {"a.mp4", {.lossless = true}, "an MP4 file does not hold FFV1", ".mkv", NULL},
+        {"a.mp4", {.lossless = true}, "an MP4 file cannot contain FFV1", ".mkv", NULL},
         {"a.mkv", {.lossless = true, .codec = "h264"}, "h264 is not lossless, which is asked", "leave", NULL},
         {"a.mkv", {.codec = "ffv1"}, "ffv1 is lossless, which is not asked for", "ask for lossless", NULL},
         {"a.mp4", {.codec = "h264_v4l2m2m"}, "is not a codec that can be written", "h264, mpeg4", NULL},

@@ -211,7 +211,7 @@ TEST(a_daemon_that_says_what_makes_no_sense_is_reported)
     world.wrong_object = 1;
     come();
     assert_false(edit("material.steel.roughness=1", NULL));
-    check_error(FL_ERROR_PROTOCOL, "not object 5");
+    check_error(FL_ERROR_PROTOCOL, "another object than 5");
     leave();
     world.stuck = true;
     come();
