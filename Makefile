@@ -345,6 +345,7 @@ help:
 	@echo 'make equal-time measure noise over time beside Cycles, into out/equal-time   [ONLY=scene,scene OPTIONS="--denoise"]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
+	@echo 'make breaks     kill the worker of an animation, or take its GPU, again and again   [ROUNDS=1000]'
 	@echo 'make deb        build Debian packages into out/deb; make dist: an archive of the sources'
 	@echo 'make deb-same   build them once more in another folder, and see that they have the same bytes'
 	@echo 'make deb-test   build them, install them on a clean Debian, render there, and remove them'

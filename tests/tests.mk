@@ -74,7 +74,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
 
 # ---- what people call ------------------------------------------------------------------------------
-.PHONY: tests tests-all test test-part test-all test-zink check-sync bench fidelity equal-time soak farm-drill farm-test web-test
+.PHONY: tests tests-all test test-part test-all test-zink check-sync bench fidelity equal-time soak farm-drill breaks farm-test web-test
 .PHONY: blender-test siege bench-plot check-headers check-rules lint check analyze coverage format
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 # With the benchmark, whose own tests need it.
@@ -124,6 +124,11 @@ soak: test-packages
 farm-drill: test-packages
 	$(MAKE) -j$(JOBS) all
 	python3 tests/soak/drill.py $(B) $(ROUNDS) $(if $(SEED),--seed $(SEED))
+# An animation whose worker is killed, or loses its GPU, so many times.
+breaks: test-packages
+	$(MAKE) -j$(JOBS) all tests
+	python3 tests/soak/breaks.py $(B) killed $(ROUNDS)
+	python3 tests/soak/breaks.py $(B) lost $(ROUNDS)
 # The templates of conf/farm: Slurm with killed workers, and what stands in for other managers. Debian's own Python has yaml.
 farm-test: farm-packages
 	$(MAKE) -j$(JOBS) all tests

@@ -157,8 +157,7 @@ bool engine_need_device(struct engine *engine, struct error *error)
     if (too_often(engine->rebuilds_ns, engine->rebuilds, now_ns)) {
         error_set(error, ERROR_DEVICE_LOST, "device", "the GPU was lost %d times within 5 minutes",
                   DEVICE_REBUILDS_MAX);
-        error->retryable = true;
-        error->retry_after_ms = (uint32_t)((*oldest_ns + DEVICE_REBUILDS_WINDOW_NS - now_ns) / 1000000u) + 1;
+        error->retryable = true; /* by another process, which is there at once */
         return error_remedy(error, "try a smaller picture or scene, or another device");
     }
     *oldest_ns = now_ns;
