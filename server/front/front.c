@@ -24,7 +24,7 @@
 /* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
 /* In which workers may say goodbye to their clients and end. */
-#define STOP_NS UINT64_C(800000000)
+#define STOP_NS UINT64_C(600000000)
 #define BLANKS " \t"
 /* Between two pings of a worker. */
 #define PING_NS UINT64_C(10000000000)
