@@ -225,7 +225,7 @@ class HostileFiles(PartsCase):
         for other in (b"0/2", b"3/2", b"2/0", b"a/2", b"2 2", b"1/2"):
             with self.subTest(other):
                 self.refused(self.bytes.replace(name, other + name[3:]))
-        self.refused(self.bytes.replace(digest, b"g" + digest[1:]), "does not say of what it is a part")
+        self.refused(self.bytes.replace(digest, b"g" + digest[1:]), "does not say which picture it belongs to")
         self.refused(self.bytes.replace(digest, b"0" * 16), "another picture")
         rays = self.bytes.index(b"farlight/primary_rays\0string\0") + len(b"farlight/primary_rays\0string\0") + 4
         self.refused(self.bytes[:rays] + b"-" + self.bytes[rays + 1:], "farlight/primary_rays is no number of rays")
