@@ -134,7 +134,7 @@ VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 # farlight.h is installed as <farlight/client.h>, the others below farlight/.
 PUBLIC_HEADERS := client/lib/farlight.h client/warp/warp.h \
-    $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def)
+    $(addprefix protocol/,messages.h messages.def values.h values.def tracers.h tracers.def words.h words.def)
 SHARED_OBJ := $(LIB_OBJ) $(PROTOCOL_OBJ)
 
 # The Python package: links to its sources, beside what is generated.

@@ -3,13 +3,14 @@
  *
  * Payload, little-endian, nothing aligned but bulk data:
  *   u16 struct_bytes   size of the fixed fields that follow (these 2 bytes not counted)
- *   fixed fields       packed, in table order: u8 u16 u32 u64 f32, enums as u32, byte arrays as they are
+ *   fixed fields       packed, in table order: u8 u16 u32 u64 f32, enums as u32, byte arrays as they are; a nested
+ *                      record as u16 struct_bytes and its fixed fields
  *   counted fields     in table order, all present:
  *     string           u32 bytes, then UTF-8 without NUL
  *     array            u32 count, then the records; a record is its fixed fields, then its counted ones
  *     bulk             u32 bytes, then zeros up to a multiple of 8 from the start of the payload, then the bytes
- * A shorter fixed part (an older peer), cut between two fields, leaves the rest at message_init()'s defaults; a
- * longer one (a newer peer) is read past. Bytes after the last field are an error. */
+ * A shorter fixed part of a message or nested record (an older peer), cut between two fields, leaves the rest at
+ * message_init()'s defaults; a longer one (a newer peer) is read past. Bytes after the last field are an error. */
 #ifndef FARLIGHT_PROTOCOL_CODEC_H
 #define FARLIGHT_PROTOCOL_CODEC_H
 

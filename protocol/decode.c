@@ -16,6 +16,8 @@ struct decoder {
 
 static bool decode_counted(struct decoder *decoder, const struct field_desc *field, char *body,
                            const struct path *parent);
+static bool decode_fixed_part(struct decoder *decoder, struct reader *reader, const struct struct_desc *desc,
+                              char *body, const struct path *parent);
 
 void scratch_init(struct scratch *scratch, void *data, size_t capacity_bytes)
 {
@@ -64,6 +66,10 @@ static void read_fixed(struct reader *reader, const struct field_desc *field, ch
 static bool decode_fixed(struct decoder *decoder, struct reader *reader, const struct field_desc *field,
                          char *body, const struct path *parent)
 {
+    if (field->kind == FIELD_RECORD) {
+        struct path path = {parent, field->name, -1};
+        return decode_fixed_part(decoder, reader, field->record(), body + field->offset, &path);
+    }
     size_t wire_bytes = (size_t)field->width_bytes * field->count;
     size_t left = reader_left(reader);
     if (wire_bytes > left) {
@@ -72,6 +78,35 @@ static bool decode_fixed(struct decoder *decoder, struct reader *reader, const s
     }
     read_fixed(reader, field, body + field->offset);
     return check_fixed(field, body + field->offset, parent, decoder->error);
+}
+
+/* Decodes the fixed fields after their size, of a message or of a record in one: fewer than ours from an older
+ * peer, more from a newer one. */
+static bool decode_fixed_part(struct decoder *decoder, struct reader *reader, const struct struct_desc *desc,
+                              char *body, const struct path *parent)
+{
+    struct path path = {parent, "struct_bytes", -1};
+    size_t left = reader_left(reader);
+    uint16_t struct_bytes = reader_u16(reader);
+    if (reader->failed) {
+        return fail_truncated(decoder, &path, 2, left);
+    }
+    left = reader_left(reader);
+    const uint8_t *bytes = reader_view(reader, struct_bytes);
+    if (!bytes) {
+        return fail_truncated(decoder, &path, struct_bytes, left);
+    }
+    struct reader fixed;
+    reader_init(&fixed, bytes, struct_bytes);
+    for (const struct field_desc *field = desc->fields; field->name && !field_is_counted(field); field++) {
+        if (reader_left(&fixed) == 0) {
+            break; /* the rest keeps its defaults */
+        }
+        if (!decode_fixed(decoder, &fixed, field, body, parent)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 /* Reads the count before a counted field. */
@@ -196,39 +231,11 @@ static bool decode_counted(struct decoder *decoder, const struct field_desc *fie
     }
 }
 
-/* Decodes the fixed part, which is shorter than ours from an older peer and longer from a newer one. */
-static bool decode_fixed_part(struct decoder *decoder, const struct struct_desc *desc, char *body,
-                              const struct path *root)
-{
-    struct path path = {root, "struct_bytes", -1};
-    size_t left = reader_left(&decoder->reader);
-    uint16_t struct_bytes = reader_u16(&decoder->reader);
-    if (decoder->reader.failed) {
-        return fail_truncated(decoder, &path, 2, left);
-    }
-    left = reader_left(&decoder->reader);
-    const uint8_t *bytes = reader_view(&decoder->reader, struct_bytes);
-    if (!bytes) {
-        return fail_truncated(decoder, &path, struct_bytes, left);
-    }
-    struct reader fixed;
-    reader_init(&fixed, bytes, struct_bytes);
-    for (const struct field_desc *field = desc->fields; field->name && !field_is_counted(field); field++) {
-        if (reader_left(&fixed) == 0) {
-            break; /* the rest keeps its defaults */
-        }
-        if (!decode_fixed(decoder, &fixed, field, body, root)) {
-            return false;
-        }
-    }
-    return true;
-}
-
 static bool decode_body(struct decoder *decoder, const struct message_desc *desc, char *body)
 {
     const struct struct_desc *fields = desc->body();
     const struct path root = {NULL, desc->info.name, -1};
-    if (!decode_fixed_part(decoder, fields, body, &root)) {
+    if (!decode_fixed_part(decoder, &decoder->reader, fields, body, &root)) {
         return false;
     }
     for (const struct field_desc *field = fields->fields; field->name; field++) {

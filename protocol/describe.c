@@ -39,6 +39,7 @@ enum enum_index {
 #define REAL(field, min, max, doc) + 4
 #define REALS(field, count, min, max, doc) + 4 * (count)
 #define BYTES(field, count, doc) + (count)
+#define NESTED(record, field, doc) + 2 + wire_fixed_record_##record
 #define SETTING_WHOLE(tracer, field, min, max, default_value, unit, doc) + 4
 #define SETTING_ONE_OF(tracer, field, numbers, max, default_value, unit, doc) + 4
 #define SETTING_REAL(tracer, field, min, max, default_value, unit, doc) + 4
@@ -104,12 +105,18 @@ enum enum_index {
      .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value),            \
      .default_real = (float)(default_value), .unit = field_unit},
 #define REALS(field, number, min_value, max_value, field_doc)                                                     \
+    OPTION_REALS(field, number, min_value, max_value, (min_value) > 0 ? (min_value) : 0, "", field_doc)
+#define OPTION_REALS(field, number, min_value, max_value, default_value, field_unit, field_doc)                   \
     {.name = #field, .doc = field_doc, .kind = FIELD_REAL, .width_bytes = 4, .count = number,                     \
      .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value),            \
-     .default_real = (float)((min_value) > 0 ? (min_value) : 0)},
+     .default_real = (float)(default_value), .unit = field_unit},
 #define BYTES(field, number, field_doc)                                                                           \
     {.name = #field, .doc = field_doc, .kind = FIELD_BYTES, .width_bytes = 1, .count = number,                    \
      .offset = offsetof(owner, field)},
+#define NESTED(record_name, field, field_doc)                                                                     \
+    {.name = #field, .doc = field_doc, .kind = FIELD_RECORD, .count = 1,                                          \
+     .width_bytes = 2 + wire_fixed_record_##record_name, .offset = offsetof(owner, field),                        \
+     .record = describe_record_##record_name},
 #define STRING(field, max_bytes, field_doc)                                                                       \
     {.name = #field, .doc = field_doc, .kind = FIELD_STRING, .offset = offsetof(owner, field), .max = max_bytes},
 #define ARRAY(record_name, field, max_count, field_doc)                                                           \
@@ -194,6 +201,23 @@ const struct field_desc *struct_field(const struct struct_desc *desc, const char
     return field->name ? field : NULL;
 }
 
+size_t struct_leaves(const struct struct_desc *desc, struct field_desc *leaves, size_t max)
+{
+    size_t count = 0;
+    for (const struct field_desc *field = desc->fields; field->name && count < max; field++) {
+        if (field->kind == FIELD_RECORD) {
+            size_t nested = struct_leaves(field->record(), leaves + count, max - count);
+            for (size_t i = 0; i < nested; i++) {
+                leaves[count + i].offset += field->offset;
+            }
+            count += nested;
+        } else if (!field_is_counted(field)) {
+            leaves[count++] = *field;
+        }
+    }
+    return count;
+}
+
 bool field_has_number(const struct field_desc *field, uint64_t value)
 {
     if (value == 0 && field->zero_is_default) {
@@ -266,6 +290,9 @@ void field_default(const struct field_desc *field, void *place)
         for (uint32_t i = 0; i < field->count; i++) {
             memcpy((char *)place + 4 * i, &field->default_real, 4);
         }
+        break;
+    case FIELD_RECORD:
+        struct_defaults(field->record(), place);
         break;
     case FIELD_STRING:
         memcpy(place, &empty, sizeof(empty));

@@ -29,6 +29,7 @@ enum field_kind {
     FIELD_ENUM,   /* enumeration */
     FIELD_REAL,   /* `count` floats (1: REAL, else REALS); real_min, real_max */
     FIELD_BYTES,  /* `count` bytes */
+    FIELD_RECORD, /* one `record`, which has fixed fields alone */
     FIELD_STRING, /* `max` bytes; counted from here on */
     FIELD_ARRAY,  /* `max` records of `record` */
     FIELD_BULK,   /* `max` bytes */
@@ -38,10 +39,11 @@ struct field_desc {
     const char *name;
     const char *doc;
     enum field_kind kind;
-    uint32_t width_bytes; /* size of one element of a fixed field, in memory and on the wire */
-    uint32_t count;       /* elements of a fixed field */
-    size_t offset;        /* offset of the field in its struct */
-    size_t count_offset;  /* offset of <field>_count or <field>_bytes */
+    uint32_t
+        width_bytes; /* size of one element of a fixed field, in memory and on the wire; of a record on the wire */
+    uint32_t count;  /* elements of a fixed field */
+    size_t offset;   /* offset of the field in its struct */
+    size_t count_offset; /* offset of <field>_count or <field>_bytes */
     uint64_t min, max;
     const char *numbers; /* list of allowed numbers within min and max, "2, 4, 8"; NULL: all */
     bool
@@ -83,6 +85,9 @@ const struct message_desc *message_describe(uint32_t type); /* NULL: unknown */
 bool field_is_counted(const struct field_desc *field);
 /* Finds a field by its name; NULL: there is none. */
 const struct field_desc *struct_field(const struct struct_desc *desc, const char *name);
+/* Fills the array with the struct's fixed fields, where a nested record is replaced by its own fields; offsets
+ * count from the start of the struct. Returns how many there are, or `max`. */
+size_t struct_leaves(const struct struct_desc *desc, struct field_desc *leaves, size_t max);
 /* Lists the allowed values for people: "16 to 4096", "auto, 1, 4", "overlap, one". Cut off where it does not
  * fit. */
 const char *field_allowed_text(const struct field_desc *field, char *out, size_t out_bytes);

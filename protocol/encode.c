@@ -52,6 +52,14 @@ static bool encode_fixed(struct writer *writer, const struct field_desc *field, 
     }
 }
 
+/* A record in a message: the bytes of its fields, then they. */
+static bool encode_nested(struct encoder *encoder, const struct field_desc *field, const char *place,
+                          const struct path *path)
+{
+    return writer_put_u16(encoder->writer, (uint16_t)(field->width_bytes - 2)) &&
+           encode_struct(encoder, field->record(), place, path);
+}
+
 static bool encode_string(struct encoder *encoder, const struct field_desc *field, const char *body,
                           const struct path *path)
 {
@@ -116,6 +124,9 @@ static bool encode_struct(struct encoder *encoder, const struct struct_desc *des
         struct path field_path = {path, field->name, -1};
         bool ok = false;
         switch (field->kind) {
+        case FIELD_RECORD:
+            ok = encode_nested(encoder, field, body + field->offset, &field_path);
+            break;
         case FIELD_STRING:
             ok = encode_string(encoder, field, body, &field_path);
             break;

@@ -10,7 +10,7 @@
 #ifndef FARLIGHT_PROTOCOL_MESSAGES_H
 #define FARLIGHT_PROTOCOL_MESSAGES_H
 
-#include "protocol/tracers.h"
+#include "protocol/values.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -20,11 +20,6 @@
 
 /* clang-format off */
 /* ---- fields ---- */
-#define PROTOCOL_INT_u8 uint8_t
-#define PROTOCOL_INT_u16 uint16_t
-#define PROTOCOL_INT_u32 uint32_t
-#define PROTOCOL_INT_u64 uint64_t
-
 #define RECORD(name, doc) struct record_##name {
 #define RECORD_END(name) };
 #define INT(type, field, min, max, doc) PROTOCOL_INT_##type field;
@@ -32,6 +27,7 @@
 #define REAL(field, min, max, doc) float field;
 #define TRACER_SETTINGS(field) struct tracer_settings field;
 #define REALS(field, count, min, max, doc) float field[count];
+#define NESTED(record, field, doc) struct record_##record field;
 #define BYTES(field, count, doc) uint8_t field[count];
 #define STRING(field, max, doc) const char *field;
 #define ARRAY(record, field, max, doc)                                                                           \
@@ -43,7 +39,9 @@
 /* Some have no fields, which strict C does not know. */
 #define MESSAGE(NAME, name, number, from, doc) __extension__ struct message_##name {
 #define MESSAGE_END(NAME, name) };
+#define MESSAGES_WITHOUT_VALUES
 #include "protocol/messages.def"
+#undef MESSAGES_WITHOUT_VALUES
 
 /* clang-format on */
 

@@ -125,7 +125,7 @@ static bool change(struct edit *edit, size_t index, const struct fl_field *field
     double before[FL_FIELD_VALUES_MAX] = {0}, values[FL_FIELD_VALUES_MAX] = {0};
     if (!edit_field_applies(field, message))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "a %s light has no %s",
-                            protocol_light_kind_text(message->set_light.kind), field->name);
+                            protocol_light_kind_text(message->set_light.value.kind), field->name);
     edit_field_load(field, message, before);
     memcpy(values, before, sizeof(values));
     combine(assignment, field, values);

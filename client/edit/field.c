@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Fields of objects that can be edited. Fields of materials, lights and cameras come from the table of
- * messages, so that new ones need no code here; fields of nodes and of the environment, and the intensity of
+/* Fields of objects that can be edited. Fields of materials, lights and cameras come from the records
+ * of values.def, so that new ones need no code here; fields of nodes and of the environment, and the intensity of
  * lights, are computed from messages. */
 #include "edit/field.h"
 
@@ -22,7 +22,7 @@
 
 /* ---- units ---- */
 
-/* Units of fields that have none in messages.def. */
+/* Units of fields that have none in values.def. */
 static const struct {
     const char *name, *unit;
     double scale; /* value in the message of one unit */
@@ -67,15 +67,6 @@ enum message_type edit_message_type(enum protocol_object_kind kind)
                                                  : MESSAGE_OK;
 }
 
-/* Length of the stem if the field is the first of three, X_red and so on; 0: it is not. */
-static size_t stem_of_triple(const struct field_desc *wire)
-{
-    const char *suffix = strrchr(wire->name, '_');
-    if (!suffix || strcmp(suffix, "_red") != 0 || wire->kind != FIELD_REAL)
-        return 0;
-    return (size_t)(suffix - wire->name);
-}
-
 /* True for three numbers that cannot be negative, or four with an alpha, which are colours in all messages of
  * objects. */
 static bool is_colour(const struct fl_field *field)
@@ -86,7 +77,6 @@ static bool is_colour(const struct fl_field *field)
 static struct fl_field of_wire(const struct field_desc *wire)
 {
     struct fl_field field = {.count = 1, .source = EDIT_WIRE, .wire = wire, .doc = wire->doc, .unit = wire->unit};
-    const size_t stem = stem_of_triple(wire);
     snprintf(field.name, sizeof(field.name), "%s", wire->name);
     if (wire->kind == FIELD_ENUM) {
         field.form = FL_FIELD_WORD;
@@ -100,12 +90,6 @@ static struct fl_field of_wire(const struct field_desc *wire)
         field.min = (double)wire->real_min;
         field.max = (double)wire->real_max;
     }
-    if (stem > 0) {
-        const char *end = stem >= 6 && strncmp(wire->name + stem - 6, "colour", 6) == 0 ? "" : "_colour";
-        snprintf(field.name, sizeof(field.name), "%.*s%s", (int)stem, wire->name, end);
-        field.source = EDIT_WIRE_TRIPLE;
-        field.count = 3;
-    }
     field.form = is_colour(&field) ? FL_FIELD_COLOUR : field.form;
     set_unit(&field);
     return field;
@@ -118,7 +102,7 @@ static struct fl_field made(const char *name, enum edit_source source, unsigned 
     return field;
 }
 
-static size_t node_fields(struct fl_field fields[FL_FIELDS_MAX])
+static size_t node_fields(const struct struct_desc *record, struct fl_field fields[FL_FIELDS_MAX])
 {
     fields[0] = made("translate", EDIT_TRANSLATE, 3, COORDINATE_MAX);
     fields[0].unit = "metres";
@@ -128,10 +112,10 @@ static size_t node_fields(struct fl_field fields[FL_FIELDS_MAX])
     fields[1].doc = "about x, then y, then z";
     fields[2] = made("scale", EDIT_SCALE, 3, SCALE_MAX);
     fields[2].doc = "along x, y and z; one number: along all";
-    fields[3] = of_wire(struct_field(message_describe(MESSAGE_SET_NODE)->body(), "hidden"));
+    fields[3] = of_wire(struct_field(record, "hidden"));
     fields[4] = made("matrix", EDIT_MATRIX, 12, COORDINATE_MAX);
     fields[4].doc = "the whole transform: 3x4, row by row";
-    fields[5] = of_wire(struct_field(message_describe(MESSAGE_SET_NODE)->body(), "light_group"));
+    fields[5] = of_wire(struct_field(record, "light_group"));
     return 6;
 }
 
@@ -144,25 +128,17 @@ static struct fl_field intensity(double max, const char *doc)
 }
 
 /* Fields of the environment, without its image. */
-static size_t environment_fields(struct fl_field fields[FL_FIELDS_MAX])
+static size_t environment_fields(const struct struct_desc *record, struct fl_field fields[FL_FIELDS_MAX])
 {
-    const struct struct_desc *body = message_describe(MESSAGE_SET_ENVIRONMENT)->body();
-    fields[1] = of_wire(struct_field(body, "colour"));
+    fields[1] = of_wire(struct_field(record, "colour"));
     fields[0] = intensity(fields[1].max, "the largest of the colour's numbers");
     fields[2] = made("rotation", EDIT_TURN, 1, TURN_MAX);
     fields[2].unit = "degrees";
     fields[2].doc = "turn of the image about +y; 0: its middle column is +x";
-    fields[3] = of_wire(struct_field(body, "backdrop"));
-    fields[4] = of_wire(struct_field(body, "display_values"));
-    fields[5] = of_wire(struct_field(body, "light_group"));
+    fields[3] = of_wire(struct_field(record, "backdrop"));
+    fields[4] = of_wire(struct_field(record, "display_values"));
+    fields[5] = of_wire(struct_field(record, "light_group"));
     return 6;
-}
-
-/* False for fields that identify an object or refer to others. */
-static bool is_value(const struct field_desc *wire, const struct struct_desc *body)
-{
-    return wire != body->fields && !field_is_counted(wire) && wire->kind != FIELD_BYTES &&
-           strcmp(wire->name, "kind") != 0;
 }
 
 size_t fl_fields(enum protocol_object_kind kind, struct fl_field fields[FL_FIELDS_MAX])
@@ -171,20 +147,17 @@ size_t fl_fields(enum protocol_object_kind kind, struct fl_field fields[FL_FIELD
     size_t count = 0;
     if (type == MESSAGE_OK)
         return 0;
+    const struct struct_desc *record = struct_field(message_describe(type)->body(), "value")->record();
     if (type == MESSAGE_SET_NODE)
-        return node_fields(fields);
+        return node_fields(record, fields);
     if (type == MESSAGE_SET_ENVIRONMENT)
-        return environment_fields(fields);
-    const struct struct_desc *body = message_describe(type)->body();
+        return environment_fields(record, fields);
     if (type == MESSAGE_SET_LIGHT)
         fields[count++] =
             intensity(COORDINATE_MAX, "the largest of the colour's numbers, in the unit of the light's kind");
-    for (const struct field_desc *wire = body->fields; wire->name && count < FL_FIELDS_MAX; wire++) {
-        if (!is_value(wire, body))
-            continue;
-        fields[count] = of_wire(wire);
-        wire += fields[count++].source == EDIT_WIRE_TRIPLE ? 2 : 0;
-    }
+    for (const struct field_desc *wire = record->fields; wire->name && count < FL_FIELDS_MAX; wire++)
+        if (strcmp(wire->name, "kind") != 0) /* an object keeps its kind */
+            fields[count++] = of_wire(wire);
     return count;
 }
 
@@ -228,7 +201,7 @@ bool edit_field_applies(const struct fl_field *field, const struct message *obje
 {
     if (object->type != MESSAGE_SET_LIGHT)
         return true;
-    const enum protocol_light_kind kind = object->set_light.kind;
+    const enum protocol_light_kind kind = object->set_light.value.kind;
     if (strcmp(field->name, "range") == 0)
         return kind == PROTOCOL_LIGHT_POINT || kind == PROTOCOL_LIGHT_SPOT;
     if (strcmp(field->name, "inner_cone") == 0 || strcmp(field->name, "outer_cone") == 0)
@@ -243,16 +216,20 @@ const char *fl_field_word(const struct fl_field *field, unsigned number)
 
 /* ---- values ---- */
 
+/* Where the value of the field is; the object is a message of the field's kind. */
+static char *place_of(const struct fl_field *field, const struct message *object)
+{
+    const struct struct_desc *body = message_describe(object->type)->body();
+    return (char *)object + MESSAGE_BODY_OFFSET + struct_field(body, "value")->offset + field->wire->offset;
+}
+
 static void load_wire(const struct fl_field *field, const struct message *object, double *values)
 {
-    const char *body = (const char *)object + MESSAGE_BODY_OFFSET;
-    for (unsigned i = 0; i < field->count; i++) {
-        const bool apart = field->source == EDIT_WIRE_TRIPLE;
-        const struct field_desc *wire = field->wire + (apart ? i : 0);
-        const char *place = body + wire->offset + (apart ? 0 : i * sizeof(float));
+    const char *place = place_of(field, object);
+    for (unsigned i = 0; i < field->count; i++, place += sizeof(float)) {
         float real;
-        if (wire->kind != FIELD_REAL) {
-            values[i] = (double)field_load_int(wire, place);
+        if (field->wire->kind != FIELD_REAL) {
+            values[i] = (double)field_load_int(field->wire, place);
             continue;
         }
         memcpy(&real, place, sizeof(real));
@@ -262,11 +239,9 @@ static void load_wire(const struct fl_field *field, const struct message *object
 
 static void store_wire(const struct fl_field *field, struct message *object, const double *values)
 {
-    char *body = (char *)object + MESSAGE_BODY_OFFSET;
-    for (unsigned i = 0; i < field->count; i++) {
-        const bool apart = field->source == EDIT_WIRE_TRIPLE;
-        const struct field_desc *wire = field->wire + (apart ? i : 0);
-        char *place = body + wire->offset + (apart ? 0 : i * sizeof(float));
+    const struct field_desc *wire = field->wire;
+    char *place = place_of(field, object);
+    for (unsigned i = 0; i < field->count; i++, place += sizeof(float)) {
         if (wire->kind != FIELD_REAL) {
             field_store_int(wire, place, (uint64_t)llround(values[i]));
             continue;
@@ -284,11 +259,10 @@ static double intensity_of(const float colour[3])
 void edit_field_load(const struct fl_field *field, const struct message *object,
                      double values[FL_FIELD_VALUES_MAX])
 {
-    const float *matrix = object->set_node.parent_from_node; /* nodes only */
+    const float *matrix = object->set_node.value.parent_from_node; /* nodes only */
     double unused[3];
     switch ((enum edit_source)field->source) {
     case EDIT_WIRE:
-    case EDIT_WIRE_TRIPLE:
         load_wire(field, object, values);
         return;
     case EDIT_TRANSLATE:
@@ -308,11 +282,11 @@ void edit_field_load(const struct fl_field *field, const struct message *object,
             values[i] = (double)matrix[i];
         return;
     case EDIT_INTENSITY:
-        values[0] = intensity_of(object->type == MESSAGE_SET_LIGHT ? object->set_light.colour
-                                                                   : object->set_environment.colour);
+        values[0] = intensity_of(object->type == MESSAGE_SET_LIGHT ? object->set_light.value.colour
+                                                                   : object->set_environment.value.colour);
         return;
     case EDIT_TURN:
-        values[0] = (double)object->set_environment.rotation / RADIANS_PER_DEGREE + TURN_OF_IMAGE;
+        values[0] = (double)object->set_environment.value.rotation / RADIANS_PER_DEGREE + TURN_OF_IMAGE;
         values[0] = rint(values[0] / ANGLE_STEP) * ANGLE_STEP + 0.0;
         return;
     }
@@ -327,11 +301,10 @@ static void store_intensity(float colour[3], double intensity)
 
 void edit_field_store(const struct fl_field *field, struct message *object, const double *values)
 {
-    float *matrix = object->set_node.parent_from_node;
+    float *matrix = object->set_node.value.parent_from_node;
     double degrees[3], scale[3];
     switch ((enum edit_source)field->source) {
     case EDIT_WIRE:
-    case EDIT_WIRE_TRIPLE:
         store_wire(field, object, values);
         return;
     case EDIT_TRANSLATE:
@@ -351,12 +324,12 @@ void edit_field_store(const struct fl_field *field, struct message *object, cons
             matrix[i] = (float)values[i];
         return;
     case EDIT_INTENSITY:
-        store_intensity(object->type == MESSAGE_SET_LIGHT ? object->set_light.colour
-                                                          : object->set_environment.colour,
+        store_intensity(object->type == MESSAGE_SET_LIGHT ? object->set_light.value.colour
+                                                          : object->set_environment.value.colour,
                         values[0]);
         return;
     case EDIT_TURN:
-        object->set_environment.rotation = (float)((values[0] - TURN_OF_IMAGE) * RADIANS_PER_DEGREE);
+        object->set_environment.value.rotation = (float)((values[0] - TURN_OF_IMAGE) * RADIANS_PER_DEGREE);
         return;
     }
 }

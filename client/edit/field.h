@@ -8,9 +8,8 @@
 
 /* Storage of a field's values: fl_field.source. */
 enum edit_source {
-    EDIT_WIRE,        /* the message's field `wire`, divided by `scale` */
-    EDIT_WIRE_TRIPLE, /* `wire` and the two fields after it */
-    EDIT_TRANSLATE,   /* a node's matrix */
+    EDIT_WIRE,      /* the field `wire` of the message's record, divided by `scale` */
+    EDIT_TRANSLATE, /* a node's matrix */
     EDIT_ROTATE,
     EDIT_SCALE,
     EDIT_MATRIX,

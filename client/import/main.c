@@ -272,7 +272,7 @@ static float turn_of(double degrees)
 
 static bool import_environment(struct import_scene *scene, struct files *files, const char *file, double degrees)
 {
-    struct message_set_environment environment = {.colour = {1, 1, 1}, .rotation = turn_of(degrees)};
+    struct message_set_environment environment = {.value.colour = {1, 1, 1}, .value.rotation = turn_of(degrees)};
     struct texture_job job = {0};
     char reason[FILES_REASON_BYTES] = "";
     unsigned char *bytes = files_read_descriptor(files, files->environment, &job.size_bytes, reason);
@@ -293,8 +293,8 @@ static bool import_environment(struct import_scene *scene, struct files *files, 
     if (job.width != 2 * job.height)
         import_note(scene, PROTOCOL_SEVERITY_INFO, file,
                     "is %u x %u; an equirectangular image is twice as wide as high", job.width, job.height);
-    environment.width = job.width;
-    environment.height = job.height;
+    environment.value.width = job.width;
+    environment.value.height = job.height;
     import_set_environment(scene, &environment,
                            import_add_blob(scene, job.texels, (uint64_t)job.width * job.height * 8));
     return !scene->failed;

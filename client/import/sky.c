@@ -38,9 +38,9 @@ static struct placement world_from(const struct import_scene *scene, const size_
     for (int depth = 0; node && depth < DEPTH_MAX; depth++) {
         struct placement parent;
         for (int i = 0; i < 12; i++)
-            parent.m[i] = (double)node->parent_from_node[i];
+            parent.m[i] = (double)node->value.parent_from_node[i];
         world = placement_product(&parent, &world);
-        node = node_of(scene, edits, node->parent);
+        node = node_of(scene, edits, node->value.parent);
     }
     return world;
 }
@@ -80,7 +80,7 @@ static void mark_rays(const struct import_scene *scene, const struct import_edit
         return;
     const float *positions = (const float *)(const void *)scene->blobs[edit->blobs[0] - 1].bytes;
     const uint32_t *indices = (const uint32_t *)(const void *)scene->blobs[edit->blobs[1] - 1].bytes;
-    for (size_t i = 0; i < mesh->triangle_count; i++) {
+    for (size_t i = 0; i < mesh->value.triangle_count; i++) {
         double corners[3][3];
         for (int k = 0; k < 3; k++)
             for (int row = 0; row < 3; row++) {
@@ -110,11 +110,11 @@ static bool is_in_a_room(const struct import_scene *scene, const size_t *node_ed
         }
     for (size_t i = 0; i < scene->edit_count; i++) {
         const struct message_set_node *node = &scene->edits[i].message.set_node;
-        if (scene->edits[i].message.type != MESSAGE_SET_NODE || node->kind != PROTOCOL_NODE_MESH ||
-            node->object > scene->last_id[PROTOCOL_OBJECT_MESH] || mesh_edits[node->object] == 0)
+        if (scene->edits[i].message.type != MESSAGE_SET_NODE || node->value.kind != PROTOCOL_NODE_MESH ||
+            node->value.object > scene->last_id[PROTOCOL_OBJECT_MESH] || mesh_edits[node->value.object] == 0)
             continue;
         const struct placement world = world_from(scene, node_edits, node);
-        mark_rays(scene, &scene->edits[mesh_edits[node->object] - 1], &world, rays, met);
+        mark_rays(scene, &scene->edits[mesh_edits[node->value.object] - 1], &world, rays, met);
     }
     for (int i = 0; i < RAYS; i++)
         count += met[i];
@@ -133,7 +133,7 @@ static bool looks_from_a_room(const struct import_scene *scene)
         if (message->type != MESSAGE_SET_NODE)
             continue;
         node_edits[message->set_node.node] = i + 1;
-        if (!camera && message->set_node.kind == PROTOCOL_NODE_CAMERA)
+        if (!camera && message->set_node.value.kind == PROTOCOL_NODE_CAMERA)
             camera = &message->set_node;
     }
     const bool is = camera && node_edits && mesh_edits && is_in_a_room(scene, node_edits, mesh_edits, camera);
@@ -163,7 +163,8 @@ static void sky_at(double up, float radiance[3])
 
 void import_add_sky(struct import_scene *scene)
 {
-    const struct message_set_environment environment = {.colour = {1, 1, 1}, .width = COLUMNS, .height = ROWS};
+    const struct message_set_environment environment = {
+        .value.colour = {1, 1, 1}, .value.width = COLUMNS, .value.height = ROWS};
     if (scene->failed || scene->last_id[PROTOCOL_OBJECT_LIGHT] == 0 || has_environment(scene) ||
         looks_from_a_room(scene))
         return;

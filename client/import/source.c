@@ -130,7 +130,7 @@ static void write_prefix(struct source *sources, size_t index)
 bool source_begin(struct import_scene *scene, struct source *sources, size_t index, size_t count)
 {
     struct source *source = &sources[index];
-    struct message_set_node root = {.kind = PROTOCOL_NODE_GROUP};
+    struct message_set_node root = {.value.kind = PROTOCOL_NODE_GROUP};
     char name[IMPORT_PREFIX_MAX + 1];
 
     import_copy_text(scene->file, sizeof(scene->file), source_name(source));
@@ -141,7 +141,7 @@ bool source_begin(struct import_scene *scene, struct source *sources, size_t ind
     write_prefix(sources, index);
     snprintf(name, sizeof(name), "%.*s", (int)strlen(source->prefix) - 1, source->prefix);
     root.name = name;
-    transform(source, root.parent_from_node);
+    transform(source, root.value.parent_from_node);
     source->root = import_add_node(scene, &root);
     scene->root = source->root;
     scene->is_added = index > 0;
@@ -198,7 +198,7 @@ static bool copy_nodes(struct import_scene *scene, const struct source *first, u
             return false;
         edit->message.set_node = node;
         edit->message.set_node.node = node.node + offset;
-        edit->message.set_node.parent = node.parent == first->root ? root : node.parent + offset;
+        edit->message.set_node.value.parent = node.value.parent == first->root ? root : node.value.parent + offset;
         edit->message.set_node.name = import_copy_name(scene, own_name(first, node.name ? node.name : ""));
         edit->message.set_node.weights = import_copy_weights(scene, node.weights, node.weights_count);
     }

@@ -27,11 +27,11 @@ bool fl_boxes_add_node(struct fl_boxes *boxes, const struct message_set_node *no
         return false;
     struct fl_box_node *made = &boxes->nodes[boxes->node_count++];
     *made = (struct fl_box_node){.node = node->node,
-                                 .parent = node->parent,
-                                 .object = node->object,
-                                 .kind = node->kind,
-                                 .is_skinned = node->skin != 0};
-    memcpy(made->parent_from_node, node->parent_from_node, sizeof(made->parent_from_node));
+                                 .parent = node->value.parent,
+                                 .object = node->value.object,
+                                 .kind = node->value.kind,
+                                 .is_skinned = node->value.skin != 0};
+    memcpy(made->parent_from_node, node->value.parent_from_node, sizeof(made->parent_from_node));
     return true;
 }
 

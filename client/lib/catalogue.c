@@ -93,15 +93,16 @@ static bool observe_node(struct fl_catalogue *catalogue, const struct message_se
 {
     count_id(catalogue, PROTOCOL_OBJECT_NODE, node->node);
     return keep(catalogue, FL_CATALOGUE_NODES, (struct fl_catalogue_entry){.id = node->node}, node->name, error) &&
-           (node->kind != PROTOCOL_NODE_LIGHT || node->name[0] == '\0' ||
-            keep(catalogue, FL_CATALOGUE_LIGHT_NODES, (struct fl_catalogue_entry){.id = node->object}, node->name,
-                 error));
+           (node->value.kind != PROTOCOL_NODE_LIGHT || node->name[0] == '\0' ||
+            keep(catalogue, FL_CATALOGUE_LIGHT_NODES, (struct fl_catalogue_entry){.id = node->value.object},
+                 node->name, error));
 }
 
 static bool observe_light(struct fl_catalogue *catalogue, const struct message_set_light *light,
                           struct fl_error *error)
 {
-    const bool has_size = light->kind == PROTOCOL_LIGHT_RECTANGLE || light->kind == PROTOCOL_LIGHT_SPHERE;
+    const bool has_size =
+        light->value.kind == PROTOCOL_LIGHT_RECTANGLE || light->value.kind == PROTOCOL_LIGHT_SPHERE;
     count_id(catalogue, PROTOCOL_OBJECT_LIGHT, light->light);
     return keep(catalogue, FL_CATALOGUE_LIGHTS,
                 (struct fl_catalogue_entry){.id = light->light, .has_size = has_size}, light->name, error);

@@ -110,14 +110,14 @@ static bool send_channels(const struct clip *clip, uint32_t request, uint32_t id
         struct message message = {.type = MESSAGE_SET_CHANNEL};
         struct message_set_channel *channel = &message.set_channel;
         channel->channel = fl_scene_new_id(clip->scene, PROTOCOL_OBJECT_CHANNEL);
-        channel->clip = id;
-        channel->path = channels[i].path;
-        channel->object = channels[i].object;
-        channel->interpolation = channels[i].interpolation;
-        channel->width = channels[i].width;
-        channel->key_count = channels[i].key_count;
-        channel->first_time = (uint32_t)at;
-        channel->first_value = (uint32_t)at + channels[i].key_count;
+        channel->value.clip = id;
+        channel->value.path = channels[i].path;
+        channel->value.object = channels[i].object;
+        channel->value.interpolation = channels[i].interpolation;
+        channel->value.width = channels[i].width;
+        channel->value.key_count = channels[i].key_count;
+        channel->value.first_time = (uint32_t)at;
+        channel->value.first_value = (uint32_t)at + channels[i].key_count;
         at += channels[i].key_count * (1 + numbers_per_key(&channels[i]));
         if (!edit(clip, request, &message, deadline_ns, error))
             return false;

@@ -207,7 +207,7 @@ static bool remember_camera(struct fl_importer *importer, const struct message_s
                  sizeof(*importer->camera_objects), error))
         return false;
     struct fl_camera_info *camera = &importer->cameras[importer->camera_count];
-    importer->camera_objects[importer->camera_count++] = node->object;
+    importer->camera_objects[importer->camera_count++] = node->value.object;
     camera->node = node->node;
     snprintf(camera->name, sizeof(camera->name), "%s", node->name);
     return true;
@@ -243,7 +243,7 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
         return false;
     switch (message->type) {
     case MESSAGE_SET_NODE:
-        return message->set_node.kind != PROTOCOL_NODE_CAMERA ||
+        return message->set_node.value.kind != PROTOCOL_NODE_CAMERA ||
                remember_camera(importer, &message->set_node, error);
     case MESSAGE_SET_CAMERA:
         return remember_object(importer, &message->set_camera, error);

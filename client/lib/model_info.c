@@ -61,17 +61,17 @@ static bool list(struct listing *listing, const struct message *message, struct 
         return fl_boxes_add(&listing->boxes, &message->import_bounds, error);
     case MESSAGE_SET_MESH:
         info->meshes++;
-        info->closed_meshes += message->set_mesh.closed;
-        info->triangles += message->set_mesh.triangle_count;
-        info->morph_targets += message->set_mesh.target_count;
+        info->closed_meshes += message->set_mesh.value.closed;
+        info->triangles += message->set_mesh.value.triangle_count;
+        info->morph_targets += message->set_mesh.value.target_count;
         break;
     case MESSAGE_SET_SKIN:
         info->skins++;
-        info->joints += message->set_skin.joint_count;
+        info->joints += message->set_skin.value.joint_count;
         break;
     case MESSAGE_SET_SPHERES:
         info->sphere_sets++;
-        info->spheres += message->set_spheres.sphere_count;
+        info->spheres += message->set_spheres.value.sphere_count;
         break;
     case MESSAGE_SET_DISC:
         info->discs++;

@@ -3,7 +3,8 @@
 """Writes messages.py, from the tables of protocol/, and version.py into a folder.
 
 Usage: generate.py FOLDER. The C preprocessor ($CC or cc) reads the tables, as it does for the C side. A record or a
-message becomes a dataclass with the defaults of the table, an enumeration an IntEnum. A method of the package that takes
+message becomes a dataclass with the defaults of the table, an enumeration an IntEnum. Fields of a record that a message
+nests are attributes of the message's class. A method of the package that takes
 fields of a message as keywords, and says so by @takes(messages.NAME_keywords), has a signature there with all of them.
 """
 import ast
@@ -25,6 +26,7 @@ ROWS = {
     "INT": "type, field, min, max, doc", "ENUM": "enum_name, field, doc", "REAL": "field, min, max, doc",
     "OPTION_INT": "type, field, min, max, default_value, unit, doc",
     "OPTION_REAL": "field, min, max, default_value, unit, doc", "REALS": "field, count, min, max, doc",
+    "OPTION_REALS": "field, count, min, max, default_value, unit, doc", "NESTED": "record, field, doc",
     "BYTES": "field, count, doc", "STRING": "field, max, doc", "ARRAY": "record, field, max, doc",
     "BULK": "field, max, doc",
     "SETTING_WHOLE": "tracer, field, min, max, default_value, unit, doc",
@@ -95,7 +97,7 @@ class Field:
 
     def __init__(self, row):
         kind = row[0]
-        self.doc = row[-1]
+        self.row, self.doc = row, row[-1]
         getattr(self, kind.lower())(*row[1:-1])
 
     def make(self, name, descriptor, annotation, default):
@@ -125,9 +127,15 @@ class Field:
     def option_real(self, *arguments):
         self.real(*arguments)
 
-    def reals(self, field, count, low, high):
-        start = ", ".join([real(low) if float(low) > 0 else "0.0"] * int(count))
+    def reals(self, field, count, low, high, default=None, _unit=None):
+        start = ", ".join([real(default or (low if float(low) > 0 else "0"))] * int(count))
         self.make(field, f"real({{name}}, {real(low)}, {real(high)}, {count})", "Sequence[float]", f"({start})")
+
+    def option_reals(self, *arguments):
+        self.reals(*arguments)
+
+    def nested(self, record, field):
+        self.make(field, f"nested({{name}}, {camel(record)})", camel(record), f"{camel(record)}()")
 
     def bytes(self, field, count):
         self.make(field, f"exactly({{name}}, {count})", "bytes", f"bytes({count})")
@@ -183,6 +191,15 @@ def message_rows():
     return groups
 
 
+def attributes(groups):
+    """The fields of each record and message by its name, those of nested records among them."""
+    found = {}
+    for row, fields in groups:
+        found[row[1] if row[0] == "RECORD" else row[2]] = [
+            part for field in fields for part in (found[field.row[1]] if field.row[0] == "NESTED" else [field])]
+    return found
+
+
 def heads():
     """Finds the own arguments of the methods with @takes(messages.NAME_keywords), by NAME."""
     found = {}
@@ -209,7 +226,7 @@ def signature(name, head, keywords, doc):
 
 
 def signatures(groups):
-    fields = {(row[1] if row[0] == "RECORD" else row[2]): fields for row, fields in groups}
+    fields = attributes(groups)
     lines = ["", "", "# What methods take: their own arguments, and fields of a message as keywords. Never called."]
     taken = heads()
     for name, (message, left_out) in SIGNATURES.items():
@@ -233,17 +250,17 @@ def changes(fields):
 
 
 def structs(groups):
-    lines = []
+    lines, known = [], attributes(groups)
     for row, fields in groups:
         lines += ["", "", "@dataclass"]
         name, doc = (row[1], row[2]) if row[0] == "RECORD" else (row[2], row[5])
         base = "Record" if row[0] == "RECORD" else "Message"
-        lines += [f"class {camel(name)}({base}):", docstring(doc, [(field.name, field.doc) for field in fields])]
+        lines += [f"class {camel(name)}({base}):", docstring(doc, [(field.name, field.doc) for field in known[name]])]
         if row[0] == "MESSAGE":
             lines += [f"    TYPE: ClassVar[int] = {row[3]}", f'    SENDER: ClassVar[str] = "{row[4].lower()}"']
         lines += [f'    NAME: ClassVar[str] = "{name}"', "    FIELDS: ClassVar[tuple[Field, ...]] = ("]
         lines += [f"        {field.descriptor}," for field in fields] + ["    )"]
-        lines += [f"    {field.name}: {field.annotation} = {field.default}" for field in fields]
+        lines += [f"    {field.name}: {field.annotation} = {field.default}" for field in known[name]]
     names = [camel(row[2]) for row, _ in groups if row[0] == "MESSAGE"]
     lines += ["", "", "_ALL: tuple[type[Message], ...] = ("]
     lines += [textwrap.fill(", ".join(names) + ",", WIDTH, initial_indent="    ", subsequent_indent="    "), ")"]

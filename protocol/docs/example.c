@@ -73,7 +73,8 @@ static void print_ok(const char *what, uint32_t request, uint64_t revision)
 static void print_hello(void)
 {
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "example"};
+    struct handshake_hello hello = {
+        .version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX, .name = "example"};
     for (size_t i = 0; i < sizeof(hello.nonce); i++) {
         hello.nonce[i] = (uint8_t)i;
     }
@@ -122,10 +123,10 @@ static void print_node(uint32_t node, enum protocol_node_kind kind)
 {
     struct message message = made(MESSAGE_SET_NODE);
     message.set_node.node = node;
-    message.set_node.kind = kind;
-    message.set_node.object = 1;
-    message.set_node.parent_from_node[0] = message.set_node.parent_from_node[5] =
-        message.set_node.parent_from_node[10] = 1;
+    message.set_node.value.kind = kind;
+    message.set_node.value.object = 1;
+    message.set_node.value.parent_from_node[0] = message.set_node.value.parent_from_node[5] =
+        message.set_node.value.parent_from_node[10] = 1;
     show("Client", 5, 0, &message);
 }
 
@@ -137,15 +138,15 @@ static void print_transaction(struct record_blob_ref references[2])
     message = made(MESSAGE_SET_MATERIAL);
     message.set_material.material = 1;
     static const float base_colour[] = {0.8f, 0.4f, 0.2f, 1};
-    memcpy(message.set_material.base_colour, base_colour, sizeof(base_colour));
-    message.set_material.roughness = 1;
-    message.set_material.ior = 1.5f;
+    memcpy(message.set_material.value.base_colour, base_colour, sizeof(base_colour));
+    message.set_material.value.roughness = 1;
+    message.set_material.value.ior = 1.5f;
     show("Client", 5, 0, &message);
     struct record_material_range range = {.count = 1, .material = 1};
     message = made(MESSAGE_SET_MESH);
     message.set_mesh.mesh = 1;
-    message.set_mesh.vertex_count = 3;
-    message.set_mesh.triangle_count = 1;
+    message.set_mesh.value.vertex_count = 3;
+    message.set_mesh.value.triangle_count = 1;
     message.set_mesh.arrays = references;
     message.set_mesh.arrays_count = 2;
     message.set_mesh.ranges = &range;
@@ -154,9 +155,9 @@ static void print_transaction(struct record_blob_ref references[2])
     print_node(1, PROTOCOL_NODE_MESH);
     message = made(MESSAGE_SET_LIGHT);
     message.set_light.light = 1;
-    message.set_light.kind = PROTOCOL_LIGHT_DIRECTIONAL;
+    message.set_light.value.kind = PROTOCOL_LIGHT_DIRECTIONAL;
     for (int i = 0; i < 3; i++) {
-        message.set_light.colour[i] = 3.1415927f;
+        message.set_light.value.colour[i] = 3.1415927f;
     }
     show("Client", 5, 0, &message);
     print_node(2, PROTOCOL_NODE_LIGHT);

@@ -164,17 +164,21 @@ static void print_framing(void)
            "other flags, a size outside the type's range and a message that the peer may not send end the\n"
            "connection.\n\n",
            CODEC_CONTROL_PAYLOAD_MAX_BYTES, CODEC_BULK_PAYLOAD_MAX_BYTES);
-    printf("## Payload\n\n"
-           "`u16 struct_bytes` (the size of the fixed fields that follow), the fixed fields, packed, then the\n"
-           "counted fields, all in the order of the tables below.\n\n"
-           "- Fixed: u8 u16 u32 u64, f32 (never NaN or infinite), enums as u32, byte arrays.\n"
-           "- string: u32 bytes, then UTF-8 without NUL. No terminator.\n"
-           "- array: u32 count, then the records, each its fixed fields and then its counted ones.\n"
-           "- bulk: u32 bytes, zeros up to a multiple of 8 from the start of the payload, the bytes.\n");
-    printf("- A shorter fixed part, cut between two fields, comes from an older peer: the rest has the value 0,\n"
-           "  or the field's minimum where that is above 0. A longer one comes from a newer peer: the rest is\n"
-           "  skipped.\n"
-           "- All counted fields are present. Bytes after the last one are an error.\n\n");
+    printf(
+        "## Payload\n\n"
+        "`u16 struct_bytes` (the size of the fixed fields that follow), the fixed fields, packed, then the\n"
+        "counted fields, all in the order of the tables below.\n\n"
+        "- Fixed: u8 u16 u32 u64, f32 (never NaN or infinite), enums as u32, byte arrays, and records: u16 bytes\n"
+        "  of the record's fixed fields, then the fields.\n"
+        "- string: u32 bytes, then UTF-8 without NUL. No terminator.\n"
+        "- array: u32 count, then the records, each its fixed fields and then its counted ones.\n"
+        "- bulk: u32 bytes, zeros up to a multiple of 8 from the start of the payload, the bytes.\n");
+    printf(
+        "- A fixed part, of a message or of a record in it, that is shorter and cut between two fields comes "
+        "from\n"
+        "  an older peer: missing fields have their defaults. A longer one comes from a newer peer: the rest is\n"
+        "  skipped.\n"
+        "- All counted fields are present. Bytes after the last one are an error.\n\n");
 }
 
 static void print_enum(const struct enum_desc *desc)
@@ -223,6 +227,9 @@ static void print_field_row(const struct field_desc *field, size_t offset)
         break;
     case FIELD_BYTES:
         printf("%" PRIu32 " bytes | any", field->count);
+        break;
+    case FIELD_RECORD:
+        printf("u16 %" PRIu32 ", then %s | ", field->width_bytes - 2, field->record()->name);
         break;
     case FIELD_STRING:
         printf("string | at most %" PRIu64 " bytes", field->max);

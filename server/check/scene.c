@@ -40,10 +40,10 @@ static struct blob *blob_of(struct builder *builder, const void *data, size_t si
     return blob;
 }
 
-static struct material_range *ranges_of(struct builder *builder, const struct material_range *ranges,
-                                        uint32_t count)
+static struct record_material_range *ranges_of(struct builder *builder, const struct record_material_range *ranges,
+                                               uint32_t count)
 {
-    struct material_range *copy = malloc(count * sizeof(*copy));
+    struct record_material_range *copy = malloc(count * sizeof(*copy));
     if (copy)
         memcpy(copy, ranges, count * sizeof(*copy));
     builder->lacks_memory |= !copy;
@@ -54,9 +54,9 @@ static void add_node(struct builder *builder, enum node_kind kind, uint32_t obje
 {
     struct scene_node *node = &add(builder, OBJECT_NODE)->set.node;
     node->base.id = 100 * (uint32_t)kind + object;
-    node->kind = kind;
-    node->object = object;
-    memcpy(node->parent_from_node, placed, sizeof(node->parent_from_node));
+    node->value.kind = kind;
+    node->value.object = object;
+    memcpy(node->value.parent_from_node, placed, sizeof(node->value.parent_from_node));
 }
 
 static struct scene_material *add_material(struct builder *builder, enum material id, float red, float green,
@@ -64,17 +64,17 @@ static struct scene_material *add_material(struct builder *builder, enum materia
 {
     struct scene_material *material = &add(builder, OBJECT_MATERIAL)->set.material;
     *material = (struct scene_material){.base.id = id,
-                                        .base_colour = {red, green, blue, 1},
-                                        .roughness = 1,
-                                        .ior = 1.5f,
-                                        .alpha_cutoff = 0.5f,
-                                        .specular = 1,
-                                        .specular_colour = {1, 1, 1},
-                                        .attenuation = {1, 1, 1},
-                                        .iridescence_ior = 1.3f,
-                                        .diffuse_transmission_colour = {1, 1, 1}};
+                                        .value.base_colour = {red, green, blue, 1},
+                                        .value.roughness = 1,
+                                        .value.ior = 1.5f,
+                                        .value.alpha_cutoff = 0.5f,
+                                        .value.specular = 1,
+                                        .value.specular_colour = {1, 1, 1},
+                                        .value.attenuation_colour = {1, 1, 1},
+                                        .value.iridescence_ior = 1.3f,
+                                        .value.diffuse_transmission_colour = {1, 1, 1}};
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
-        material->textures[i] = (struct texture_use){.uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1};
+        material->textures[i] = (struct record_texture_use){.uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1};
     return material;
 }
 
@@ -90,11 +90,11 @@ struct arrays {
 static struct scene_mesh *add_mesh(struct builder *builder, uint32_t id, const struct arrays *arrays,
                                    enum material material)
 {
-    const struct material_range range = {0, arrays->triangles, material};
+    const struct record_material_range range = {0, arrays->triangles, material};
     struct scene_mesh *mesh = &add(builder, OBJECT_MESH)->set.mesh;
     mesh->base.id = id;
-    mesh->vertex_count = arrays->vertices;
-    mesh->triangle_count = arrays->triangles;
+    mesh->value.vertex_count = arrays->vertices;
+    mesh->value.triangle_count = arrays->triangles;
     mesh->arrays[MESH_POSITIONS] =
         blob_of(builder, arrays->positions, arrays->vertices * sizeof(*arrays->positions));
     mesh->arrays[MESH_INDICES] = blob_of(builder, arrays->indices, arrays->triangles * sizeof(*arrays->indices));
@@ -132,7 +132,7 @@ static void add_torus(struct builder *builder, uint32_t around, uint32_t across)
                             .triangles = 2 * vertices};
     if (arrays.positions && arrays.indices) {
         fill_torus(&arrays, around, across);
-        add_mesh(builder, TORUS, &arrays, MATTE)->closed = true;
+        add_mesh(builder, TORUS, &arrays, MATTE)->value.closed = true;
         add_node(builder, NODE_MESH, TORUS, identity);
     } else {
         builder->lacks_memory = true;
@@ -157,10 +157,10 @@ static void add_spheres(struct builder *builder)
 {
     static const float centres_radii[][4] = {
         {-1.5f, 0.1f, 0.8f, 0.5f}, {1.6f, 0.2f, 0.4f, 0.6f}, {0.1f, 0, 1.7f, 0.3f}};
-    static const struct material_range ranges[] = {{0, 1, GLASS}, {1, 1, METAL}, {2, 1, MATTE}};
+    static const struct record_material_range ranges[] = {{0, 1, GLASS}, {1, 1, METAL}, {2, 1, MATTE}};
     struct scene_spheres *spheres = &add(builder, OBJECT_SPHERES)->set.spheres;
     spheres->base.id = 1;
-    spheres->sphere_count = 3;
+    spheres->value.sphere_count = 3;
     spheres->centres_radii = blob_of(builder, centres_radii, sizeof(centres_radii));
     spheres->ranges = ranges_of(builder, ranges, 3);
     spheres->range_count = 3;
@@ -176,12 +176,12 @@ static void add_holes(struct builder *builder)
             memset(texels[y][x], (x + y) % 2 ? 255 : 0, 4);
     struct scene_texture *texture = &add(builder, OBJECT_TEXTURE)->set.texture;
     texture->base.id = 1;
-    texture->width = texture->height = 4;
-    texture->nearest = true;
+    texture->value.width = texture->value.height = 4;
+    texture->value.nearest = true;
     texture->texels = blob_of(builder, texels, sizeof(texels));
     struct scene_material *material = add_material(builder, HOLED, 0.8f, 0.7f, 0.2f);
-    material->alpha_mode = ALPHA_MASK;
-    material->double_sided = true;
+    material->value.alpha_mode = ALPHA_MASK;
+    material->value.double_sided = true;
     material->textures[MATERIAL_BASE_COLOUR].texture = 1;
 }
 
@@ -189,14 +189,17 @@ static void add_disc_light_and_sky(struct builder *builder)
 {
     static const float above[12] = {1, 0, 0, -2, 0, 1, 0, 4, 0, 0, 1, 3};
     struct scene_disc *disc = &add(builder, OBJECT_DISC)->set.disc;
-    *disc = (struct scene_disc){
-        .base.id = 1, .material = MATTE, .centre_world = {0, 0.5f, -3}, .normal_world = {0, 0, 1}, .radius = 1.2f};
+    *disc = (struct scene_disc){.base.id = 1,
+                                .value.material = MATTE,
+                                .value.centre_world = {0, 0.5f, -3},
+                                .value.normal_world = {0, 0, 1},
+                                .value.radius = 1.2f};
     struct scene_light *light = &add(builder, OBJECT_LIGHT)->set.light;
-    *light = (struct scene_light){.base.id = 1, .kind = LIGHT_POINT, .colour = {40, 40, 40}};
+    *light = (struct scene_light){.base.id = 1, .value.kind = LIGHT_POINT, .value.colour = {40, 40, 40}};
     add_node(builder, NODE_LIGHT, 1, above);
     struct scene_edit *sky = add(builder, OBJECT_NODE);
     sky->kind = EDIT_SET_ENVIRONMENT;
-    sky->set.environment = (struct scene_environment){.colour = {0.3f, 0.4f, 0.5f}};
+    sky->set.environment = (struct scene_environment){.value.colour = {0.3f, 0.4f, 0.5f}};
 }
 
 /* ---- scenes ---- */
@@ -222,11 +225,11 @@ struct scene *check_scene_small(struct error *error)
     struct builder builder = {.count = 0};
     add_material(&builder, MATTE, 0.6f, 0.5f, 0.4f);
     struct scene_material *metal = add_material(&builder, METAL, 0.9f, 0.9f, 0.6f);
-    metal->metallic = 1;
-    metal->roughness = 0;
+    metal->value.metallic = 1;
+    metal->value.roughness = 0;
     struct scene_material *glass = add_material(&builder, GLASS, 1, 1, 1);
-    glass->transmission = 1;
-    glass->roughness = 0;
+    glass->value.transmission = 1;
+    glass->value.roughness = 0;
     add_holes(&builder);
     add_torus(&builder, 24, 16);
     add_square(&builder, FLOOR, 3, MATTE, floor);

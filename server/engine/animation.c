@@ -244,10 +244,12 @@ static bool node_camera(const struct engine_job *job, const struct scene *scene,
     const struct scene_node *node = scene_node(scene, job->camera_node);
     if (!node)
         return error_set(error, ERROR_UNKNOWN_ID, field, "node %u does not exist", job->camera_node);
-    const struct scene_camera *shown = node->kind == NODE_CAMERA ? scene_camera(scene, node->object) : NULL;
+    const struct scene_camera *shown =
+        node->value.kind == NODE_CAMERA ? scene_camera(scene, node->value.object) : NULL;
     if (!shown)
         return error_set(error, ERROR_INVALID, field, "node %u shows no camera", job->camera_node);
-    *camera = (struct frame_camera){.fov_y = shown->fov_y, .ortho_height = shown->height, .near = shown->near};
+    *camera = (struct frame_camera){
+        .fov_y = shown->value.fov_y, .ortho_height = shown->value.height, .near = shown->value.near};
     if (scene_world_from_node(scene, pose, node->base.id, camera->world_from_view) &&
         make_rigid(camera->world_from_view))
         return true;

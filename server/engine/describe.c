@@ -21,15 +21,15 @@ void engine_count_contents(struct engine_scene *from)
     size_t cursor = 0;
     void *value;
     while (hashmap_next(&scene->objects[OBJECT_NODE], &cursor, NULL, &value)) {
-        enum node_kind kind = ((const struct scene_node *)value)->kind;
+        enum node_kind kind = ((const struct scene_node *)value)->value.kind;
         from->instances += kind == NODE_MESH || kind == NODE_SPHERES;
     }
     cursor = 0;
     while (hashmap_next(&scene->objects[OBJECT_MESH], &cursor, NULL, &value))
-        from->triangles += ((const struct scene_mesh *)value)->triangle_count;
+        from->triangles += ((const struct scene_mesh *)value)->value.triangle_count;
     cursor = 0;
     while (hashmap_next(&scene->objects[OBJECT_SPHERES], &cursor, NULL, &value))
-        from->spheres += ((const struct scene_spheres *)value)->sphere_count;
+        from->spheres += ((const struct scene_spheres *)value)->value.sphere_count;
 }
 
 /* ---- the list ----------------------------------------------------------------------------------- */
@@ -105,15 +105,15 @@ static void describe_cameras(struct engine_scene_description *description, const
     void *value;
     while (hashmap_next(&scene->objects[OBJECT_NODE], &cursor, NULL, &value)) {
         const struct scene_node *node = value;
-        if (node->kind == NODE_CAMERA)
+        if (node->value.kind == NODE_CAMERA)
             keep_first(nodes, &description->camera_count, node->base.id);
     }
     for (uint32_t i = 0; i < description->camera_count; i++) {
         const struct scene_node *node = scene_node(scene, nodes[i]);
-        const struct scene_camera *camera = scene_camera(scene, node->object);
+        const struct scene_camera *camera = scene_camera(scene, node->value.object);
         struct engine_camera_entry *entry = &description->cameras[i];
         entry->node = nodes[i];
-        entry->fov_y = camera ? camera->fov_y : 0;
+        entry->fov_y = camera ? camera->value.fov_y : 0;
         memcpy(entry->name, node->base.name[0] || !camera ? node->base.name : camera->base.name,
                sizeof(entry->name));
     }
@@ -122,12 +122,13 @@ static void describe_cameras(struct engine_scene_description *description, const
 static void describe_channel(struct engine_scene_description *description, const uint32_t *numbers,
                              const struct scene *scene, const struct scene_channel *channel)
 {
-    const uint32_t *found = bsearch(&channel->clip, numbers, description->clip_count, sizeof(*numbers), by_number);
-    const struct scene_clip *clip = scene_clip(scene, channel->clip);
+    const uint32_t *found =
+        bsearch(&channel->value.clip, numbers, description->clip_count, sizeof(*numbers), by_number);
+    const struct scene_clip *clip = scene_clip(scene, channel->value.clip);
     if (!found || !clip || !clip->floats)
         return;
     const float *floats = (const float *)(const void *)clip->floats->data;
-    float end_s = floats[(size_t)channel->first_time + channel->key_count - 1];
+    float end_s = floats[(size_t)channel->value.first_time + channel->value.key_count - 1];
     struct engine_clip_entry *entry = &description->clips[found - numbers];
     entry->channels++;
     entry->duration_s = fminf(fmaxf(entry->duration_s, end_s), DURATION_MAX_S);

@@ -15,9 +15,9 @@ static void add(struct engine_object_list *list, enum object_kind kind, const st
     if (kind != OBJECT_NODE)
         return;
     const struct scene_node *node = (const struct scene_node *)(const void *)object;
-    entry->parent = node->parent;
-    entry->shows_kind = node->kind;
-    entry->shows = node->object;
+    entry->parent = node->value.parent;
+    entry->shows_kind = node->value.kind;
+    entry->shows = node->value.object;
 }
 
 /* A cursor is the number of objects in front, so that a whole list costs no more than one look at each object. */

@@ -45,8 +45,8 @@ static float *values_of(const struct scene *scene, const struct scene_pose *pose
 {
     const struct scene_mesh *mesh = scene_mesh(scene, use->mesh_id);
     const struct scene_skin *skin = skin_of(scene, use);
-    size_t joint_floats = skin ? (size_t)skin->joint_count * 12 : 0;
-    float *values = malloc((joint_floats + mesh->target_count + 1) * sizeof(*values));
+    size_t joint_floats = skin ? (size_t)skin->value.joint_count * 12 : 0;
+    float *values = malloc((joint_floats + mesh->value.target_count + 1) * sizeof(*values));
     if (!values) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the joints of node %u", use->node);
         return NULL;
@@ -56,7 +56,7 @@ static float *values_of(const struct scene *scene, const struct scene_pose *pose
         return NULL;
     }
     scene_pose_weights(pose, scene_node(scene, use->node), mesh, values + joint_floats);
-    *count = (uint32_t)joint_floats + mesh->target_count;
+    *count = (uint32_t)joint_floats + mesh->value.target_count;
     return values;
 }
 
@@ -79,7 +79,7 @@ static void grow_by_pose(struct deform_box *box, const struct scene_mesh *mesh, 
 {
     const float *weights = values + (size_t)joint_count * 12;
     struct deform_box added = {{0}, {0}};
-    for (uint32_t target = 0; target < mesh->target_count; target++)
+    for (uint32_t target = 0; target < mesh->value.target_count; target++)
         for (int k = 0; k < 3; k++) {
             float a = weights[target] * rest->targets[target].lower[k];
             float b = weights[target] * rest->targets[target].upper[k];
@@ -109,7 +109,7 @@ static void grow_by_pose(struct deform_box *box, const struct scene_mesh *mesh, 
 static void find_box(struct deform_use *use, const struct scene *scene, const struct deform_mesh *rest)
 {
     const struct scene_mesh *mesh = scene_mesh(scene, use->mesh_id);
-    uint32_t joint_count = (use->value_count - mesh->target_count) / 12;
+    uint32_t joint_count = (use->value_count - mesh->value.target_count) / 12;
     use->box = (struct deform_box){{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
     grow_by_pose(&use->box, mesh, rest, use->open, use->skin != 0, joint_count);
     if (use->close)
@@ -136,7 +136,7 @@ static bool add_pass(struct work *work, uint32_t use_index, bool closes)
 {
     const struct deform_use *use = &work->gpu->state->deform.uses[use_index];
     const float *values = closes ? use->close : use->open;
-    uint32_t target_count = scene_mesh(work->scene, use->mesh_id)->target_count;
+    uint32_t target_count = scene_mesh(work->scene, use->mesh_id)->value.target_count;
     uint32_t joint_floats = use->value_count - target_count;
     if (!add_parameters(work, (size_t)joint_floats / 4 + target_count))
         return false;
@@ -255,13 +255,13 @@ static bool run_pass(const struct work *work, const struct pass *pass, struct er
         const char *name;
         uint32_t value;
     } uniforms[] = {
-        {"vertex_count", mesh->vertex_count},
+        {"vertex_count", mesh->value.vertex_count},
         {"first_vertex", rest->first_vertex},
         {"first_vertex_out", out->first_vertex + (pass->closes ? out->close_offset : 0)},
         {"first_influence", rest->first_influence},
-        {"influence_count", use->skin ? mesh->influence_count : 0},
+        {"influence_count", use->skin ? mesh->value.influence_count : 0},
         {"first_joint", pass->first_joint},
-        {"joint_count", (use->value_count - mesh->target_count) / 12},
+        {"joint_count", (use->value_count - mesh->value.target_count) / 12},
         {"first_target_vertex", rest->first_target_vertex},
         {"first_morph", pass->first_morph},
         {"morph_count", pass->morph_count},
@@ -269,7 +269,7 @@ static bool run_pass(const struct work *work, const struct pass *pass, struct er
     };
     for (size_t i = 0; i < sizeof(uniforms) / sizeof(uniforms[0]); i++)
         gpu_uniform_uint(program, uniforms[i].name, uniforms[i].value);
-    gpu_dispatch(gpu->device, program, mesh->vertex_count);
+    gpu_dispatch(gpu->device, program, mesh->value.vertex_count);
     return true;
 }
 

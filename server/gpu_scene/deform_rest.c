@@ -59,7 +59,7 @@ static bool can_deform(const struct scene *scene)
     void *value;
     while (hashmap_next(&scene->objects[OBJECT_MESH], &cursor, &id, &value)) {
         const struct scene_mesh *mesh = value;
-        if (mesh->influence_count || mesh->target_count)
+        if (mesh->value.influence_count || mesh->value.target_count)
             return true;
     }
     return false;
@@ -67,7 +67,7 @@ static bool can_deform(const struct scene *scene)
 
 static const struct scene_mesh *deformed_mesh(const struct scene *scene, const struct scene_node *node)
 {
-    const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
+    const struct scene_mesh *mesh = node->value.kind == NODE_MESH ? scene_mesh(scene, node->value.object) : NULL;
     return mesh && scene_node_deforms(node, mesh) ? mesh : NULL;
 }
 
@@ -81,7 +81,8 @@ uint64_t gpu_scene_deform_signature(const struct scene *scene)
     while (hashmap_next(&scene->objects[OBJECT_NODE], &cursor, &id, &value)) {
         const struct scene_node *node = value;
         if (deformed_mesh(scene, node))
-            signature += gpu_scene_mix(gpu_scene_mix(id + 1) + ((uint64_t)node->object << 32 | node->skin));
+            signature +=
+                gpu_scene_mix(gpu_scene_mix(id + 1) + ((uint64_t)node->value.object << 32 | node->value.skin));
     }
     return signature;
 }
@@ -126,9 +127,9 @@ bool gpu_scene_deform_list(struct gpu_scene_deform *deform, const struct scene *
             const struct scene_mesh *mesh = deformed_mesh(scene, node);
             if (mesh)
                 uses[count++] = (struct deform_use){.node = (uint32_t)id,
-                                                    .mesh_id = node->object,
+                                                    .mesh_id = node->value.object,
                                                     .mesh_revision = mesh->base.revision,
-                                                    .skin = mesh->influence_count ? node->skin : 0};
+                                                    .skin = mesh->value.influence_count ? node->value.skin : 0};
         }
         qsort(uses, count, sizeof(*uses), by_node);
     }
@@ -159,18 +160,18 @@ static const float *floats_of(const struct scene_mesh *mesh, enum mesh_array arr
 
 static const uint16_t *joints_of(const struct scene_mesh *mesh)
 {
-    return mesh->influence_count ? (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data : NULL;
+    return mesh->value.influence_count ? (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data : NULL;
 }
 
 static bool reserve_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
 {
     const uint16_t *joints = joints_of(mesh);
     uint32_t joint_count = 0; /* a single variable lets the compiler vectorise the loop */
-    for (size_t i = 0; i < (size_t)mesh->vertex_count * mesh->influence_count; i++)
+    for (size_t i = 0; i < (size_t)mesh->value.vertex_count * mesh->value.influence_count; i++)
         joint_count = joints[i] >= joint_count ? joints[i] + 1u : joint_count;
     rest->joint_count = joint_count;
     rest->joints = malloc(((size_t)joint_count + 1) * sizeof(*rest->joints));
-    rest->targets = calloc((size_t)mesh->target_count + 1, sizeof(*rest->targets));
+    rest->targets = calloc((size_t)mesh->value.target_count + 1, sizeof(*rest->targets));
     return rest->joints && rest->targets;
 }
 
@@ -178,11 +179,11 @@ static void find_joint_boxes(struct deform_mesh *rest, const struct scene_mesh *
 {
     const float *positions = floats_of(mesh, MESH_POSITIONS), *weights = floats_of(mesh, MESH_WEIGHTS);
     const uint16_t *joints = joints_of(mesh);
-    size_t per_vertex = mesh->influence_count;
+    size_t per_vertex = mesh->value.influence_count;
     for (uint32_t joint = 0; joint < rest->joint_count; joint++)
         rest->joints[joint] = empty_box;
     rest->unmoved = empty_box;
-    for (size_t vertex = 0; vertex < mesh->vertex_count; vertex++) {
+    for (size_t vertex = 0; vertex < mesh->value.vertex_count; vertex++) {
         float sum = 0.0f;
         for (size_t k = vertex * per_vertex; k < (vertex + 1) * per_vertex; k++) {
             if (weights[k] > 0.0f)
@@ -197,8 +198,8 @@ static void find_joint_boxes(struct deform_mesh *rest, const struct scene_mesh *
 static void find_target_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
 {
     const float *added = floats_of(mesh, MESH_TARGET_POSITIONS);
-    for (uint32_t target = 0; added && target < mesh->target_count; target++)
-        for (size_t vertex = 0; vertex < mesh->vertex_count; vertex++, added += 3)
+    for (uint32_t target = 0; added && target < mesh->value.target_count; target++)
+        for (size_t vertex = 0; vertex < mesh->value.vertex_count; vertex++, added += 3)
             grow(&rest->targets[target], added);
 }
 
@@ -218,9 +219,9 @@ static bool add_mesh(struct gpu_scene_deform *deform, const struct scene_mesh *m
         .first_influence = (uint32_t)totals->influences,
         .first_target_vertex = (uint32_t)totals->target_vertices,
     };
-    totals->vertices += mesh->vertex_count;
-    totals->influences += (uint64_t)mesh->vertex_count * mesh->influence_count;
-    totals->target_vertices += (uint64_t)mesh->vertex_count * mesh->target_count;
+    totals->vertices += mesh->value.vertex_count;
+    totals->influences += (uint64_t)mesh->value.vertex_count * mesh->value.influence_count;
+    totals->target_vertices += (uint64_t)mesh->value.vertex_count * mesh->value.target_count;
     for (int array = 0; array < MESH_ARRAY_COUNT; array++)
         totals->arrays |= mesh->arrays[array] ? 1u << array : 0;
     return reserve_boxes(rest, mesh);
@@ -267,10 +268,10 @@ static size_t place_of(const struct deform_mesh *rest, enum rest_place place)
 
 static size_t count_of(const struct scene_mesh *mesh, enum rest_place place)
 {
-    size_t vertices = mesh->vertex_count;
+    size_t vertices = mesh->value.vertex_count;
     return place == REST_VERTEX
                ? vertices
-               : vertices * (place == REST_INFLUENCE ? mesh->influence_count : mesh->target_count);
+               : vertices * (place == REST_INFLUENCE ? mesh->value.influence_count : mesh->value.target_count);
 }
 
 /* Bytes of an item; joints are 16 bits. */

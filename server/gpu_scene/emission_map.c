@@ -24,13 +24,13 @@ static double cell_mean(const struct scene_texture *texture, const double linear
 {
     const uint8_t *texels = texture->texels->data;
     uint32_t x0, x1, y0, y1;
-    texels_of(x, texture->width, &x0, &x1);
-    texels_of(y, texture->height, &y0, &y1);
+    texels_of(x, texture->value.width, &x0, &x1);
+    texels_of(y, texture->value.height, &y0, &y1);
     double sum = 0.0;
     for (uint32_t v = y0; v < y1; v++)
         for (uint32_t u = x0; u < x1; u++)
             for (size_t c = 0; c < 3; c++)
-                sum += linear[texels[((size_t)v * texture->width + u) * 4 + c]];
+                sum += linear[texels[((size_t)v * texture->value.width + u) * 4 + c]];
     return sum / (3.0 * (x1 - x0) * (y1 - y0));
 }
 
@@ -38,11 +38,11 @@ void emission_map_init(struct emission_map *map, const struct scene_texture *tex
 {
     double linear[256];
     for (int i = 0; i < 256; i++)
-        linear[i] = texture->format == TEXTURE_RGBA8_SRGB ? linear_from_srgb(i / 255.0) : i / 255.0;
+        linear[i] = texture->value.format == TEXTURE_RGBA8_SRGB ? linear_from_srgb(i / 255.0) : i / 255.0;
     memset(map->sums, 0, sizeof(map->sums));
     map->texture = texture->base.id;
-    map->width = texture->width;
-    map->height = texture->height;
+    map->width = texture->value.width;
+    map->height = texture->value.height;
     for (uint32_t y = 0; y < CELLS; y++)
         for (uint32_t x = 0; x < CELLS; x++)
             map->sums[y + 1][x + 1] =

@@ -158,7 +158,7 @@ static void turn_cone(const struct turn *turn, const struct emitter_bounds *in, 
 static float emission_of(const struct scene *scene, const struct scene_pose *pose, uint32_t id)
 {
     const struct scene_material *material = scene_pose_material(pose, scene_material(scene, id));
-    return material->emission[0] + material->emission[1] + material->emission[2];
+    return material->value.emission[0] + material->value.emission[1] + material->value.emission[2];
 }
 
 /* Textures only reduce a material's emission. */
@@ -167,7 +167,7 @@ static bool any_lamps(const struct emitters *emitters, const struct scene *scene
     bool found = false;
     for (uint32_t i = 0; i < emitters->surface_count; i++) {
         const uint32_t id = emitters->surfaces[i].material;
-        const float *emission = scene_pose_material(pose, scene_material(scene, id))->emission;
+        const float *emission = scene_pose_material(pose, scene_material(scene, id))->value.emission;
         found |= fmaxf(fmaxf(emission[0], emission[1]), emission[2]) > LAMP_RADIANCE;
     }
     return found;

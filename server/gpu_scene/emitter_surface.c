@@ -16,8 +16,9 @@
 /* Whether triangles of this material are sampled as lights. */
 static bool shines(const struct scene_material *material)
 {
-    return material && material->alpha_mode == ALPHA_OPAQUE && !material->unlit && !material->emission_seen_only &&
-           material->emission[0] + material->emission[1] + material->emission[2] > 0.0f;
+    return material && material->value.alpha_mode == ALPHA_OPAQUE && !material->value.unlit &&
+           !material->value.emission_seen_only &&
+           material->value.emission[0] + material->value.emission[1] + material->value.emission[2] > 0.0f;
 }
 
 static const struct scene_material *material_of(const struct scene *scene, const struct scene_pose *pose,
@@ -34,7 +35,7 @@ static void add_surfaces(const struct gpu_scene *gpu, uint32_t geometry, const s
 {
     const struct gpu_scene_geometry *own = &gpu->geometries[geometry];
     for (uint32_t r = 0; own->mesh && r < own->mesh->range_count; r++) {
-        const struct material_range *range = &own->mesh->ranges[r];
+        const struct record_material_range *range = &own->mesh->ranges[r];
         if (range->count == 0 || !shines(material_of(scene, pose, range->material)))
             continue;
         if (surfaces)
@@ -90,7 +91,7 @@ static uint32_t choose_cluster_size(const struct gpu_scene *gpu, const struct em
     return size > 1 ? (size < UINT32_MAX ? (uint32_t)size : UINT32_MAX) : 1;
 }
 
-static uint64_t texture_signature(const struct scene *scene, const struct texture_use *use)
+static uint64_t texture_signature(const struct scene *scene, const struct record_texture_use *use)
 {
     const struct scene_texture *texture = use->texture ? scene_texture(scene, use->texture) : NULL;
     uint64_t sum =
@@ -126,7 +127,7 @@ struct source {
     const uint32_t *indices; /* indices of the surface's first triangle */
     const float *positions;
     const float *texcoords; /* NULL: 0 everywhere */
-    const struct texture_use *use;
+    const struct record_texture_use *use;
     const struct emission_map *map; /* NULL: the whole surface is equally bright */
 };
 
@@ -228,7 +229,7 @@ struct maps {
 
 /* Map of a texture; NULL: the surface has no texture. */
 static const struct emission_map *find_map(struct maps *maps, const struct scene *scene,
-                                           const struct texture_use *use)
+                                           const struct record_texture_use *use)
 {
     const struct scene_texture *texture = use->texture ? scene_texture(scene, use->texture) : NULL;
     if (!texture)
@@ -278,7 +279,8 @@ static bool make_clusters(struct emitters *emitters, const struct gpu_scene *gpu
     for (uint32_t s = 0; ok && s < emitters->surface_count; s++) {
         const struct emitter_surface *surface = &emitters->surfaces[s];
         const struct scene_mesh *mesh = gpu->geometries[surface->geometry].mesh;
-        const struct texture_use *use = &material_of(scene, pose, surface->material)->textures[MATERIAL_EMISSION];
+        const struct record_texture_use *use =
+            &material_of(scene, pose, surface->material)->textures[MATERIAL_EMISSION];
         const struct blob *texcoords = mesh->arrays[use->texcoord_set == 1 ? MESH_TEXCOORDS_1 : MESH_TEXCOORDS_0];
         fill_clusters(emitters, surface, &gpu->geometries[surface->geometry],
                       (struct source){.mesh = mesh,

@@ -35,7 +35,7 @@ static uint32_t mesh_flags(const struct scene_mesh *mesh)
         flags |= GEOMETRY_HAS_TEXCOORDS_1;
     if (mesh->arrays[MESH_COLOURS])
         flags |= GEOMETRY_HAS_COLOURS;
-    if (mesh->closed)
+    if (mesh->value.closed)
         flags |= GEOMETRY_CLOSED;
     return flags;
 }
@@ -53,9 +53,10 @@ static bool find_only_deformed(const struct gpu_scene *gpu, const struct scene *
         ok = hashmap_put(meshes, deform->uses[i].mesh_id, &deform->uses[i]);
     while (ok && meshes->count > 0 && hashmap_next(&scene->objects[OBJECT_NODE], &cursor, &id, &value)) {
         const struct scene_node *node = value;
-        const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
+        const struct scene_mesh *mesh =
+            node->value.kind == NODE_MESH ? scene_mesh(scene, node->value.object) : NULL;
         if (mesh && !scene_node_deforms(node, mesh))
-            hashmap_remove(meshes, node->object);
+            hashmap_remove(meshes, node->value.object);
     }
     return ok;
 }
@@ -130,22 +131,22 @@ static struct totals lay_out(struct gpu_scene *gpu)
             geometry->device = (struct geometry){
                 .kind = GEOMETRY_MESH,
                 .first_primitive = (uint32_t)totals.triangles,
-                .primitive_count = geometry->mesh->triangle_count,
+                .primitive_count = geometry->mesh->value.triangle_count,
                 .first_vertex = (uint32_t)totals.vertices,
-                .vertex_count = geometry->mesh->vertex_count,
+                .vertex_count = geometry->mesh->value.vertex_count,
                 .flags = mesh_flags(geometry->mesh),
             };
-            totals.triangles += geometry->mesh->triangle_count;
-            totals.vertices += geometry->mesh->vertex_count;
-            totals.close_vertices += geometry->node ? geometry->mesh->vertex_count : 0;
+            totals.triangles += geometry->mesh->value.triangle_count;
+            totals.vertices += geometry->mesh->value.vertex_count;
+            totals.close_vertices += geometry->node ? geometry->mesh->value.vertex_count : 0;
             totals.flags |= geometry->device.flags;
         } else {
             geometry->device = (struct geometry){
                 .kind = GEOMETRY_SPHERES,
                 .first_primitive = (uint32_t)totals.spheres,
-                .primitive_count = geometry->spheres->sphere_count,
+                .primitive_count = geometry->spheres->value.sphere_count,
             };
-            totals.spheres += geometry->spheres->sphere_count;
+            totals.spheres += geometry->spheres->value.sphere_count;
         }
     }
     return totals;
@@ -163,14 +164,14 @@ struct run {
     uint32_t first, end, material_index;
 };
 
-static struct run next_run(const struct gpu_scene *gpu, const struct material_range *ranges, uint32_t range_count,
-                           uint32_t *range, uint32_t at, uint32_t count)
+static struct run next_run(const struct gpu_scene *gpu, const struct record_material_range *ranges,
+                           uint32_t range_count, uint32_t *range, uint32_t at, uint32_t count)
 {
     while (*range < range_count && (uint64_t)ranges[*range].first + ranges[*range].count <= at)
         ++*range;
     if (*range == range_count)
         return (struct run){.first = at, .end = count};
-    const struct material_range *next = &ranges[*range];
+    const struct record_material_range *next = &ranges[*range];
     if (next->first > at)
         return (struct run){.first = at, .end = next->first < count ? next->first : count};
     uint64_t end = (uint64_t)next->first + next->count;
@@ -185,8 +186,8 @@ static void pack_triangles(const struct gpu_scene *gpu, const struct gpu_scene_g
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
     uint32_t base = geometry->device.first_vertex, range = 0;
     out += (size_t)geometry->device.first_primitive * 4;
-    for (uint32_t at = 0; at < mesh->triangle_count;) {
-        struct run run = next_run(gpu, mesh->ranges, mesh->range_count, &range, at, mesh->triangle_count);
+    for (uint32_t at = 0; at < mesh->value.triangle_count;) {
+        struct run run = next_run(gpu, mesh->ranges, mesh->range_count, &range, at, mesh->value.triangle_count);
         for (size_t i = run.first; i < run.end; i++) {
             out[4 * i] = base + indices[3 * i];
             out[4 * i + 1] = base + indices[3 * i + 1];
@@ -204,7 +205,7 @@ static void pack_positions(const struct gpu_scene_geometry *geometry, float *out
         return;
     const float *in = (const float *)(const void *)geometry->mesh->arrays[MESH_POSITIONS]->data;
     out += (size_t)geometry->device.first_vertex * 4;
-    for (size_t i = 0; i < geometry->mesh->vertex_count; i++) {
+    for (size_t i = 0; i < geometry->mesh->value.vertex_count; i++) {
         memcpy(&out[4 * i], &in[3 * i], 3 * sizeof(float));
         out[4 * i + 3] = 0.0f;
     }
@@ -221,7 +222,7 @@ static void pack_normals(const struct gpu_scene_geometry *geometry, float *out)
     const struct scene_mesh *mesh = geometry->mesh;
     out += (size_t)geometry->device.first_vertex * 4;
     if (!(geometry->device.flags & GEOMETRY_HAS_NORMALS)) {
-        memset(out, 0, (size_t)mesh->vertex_count * 4 * sizeof(float));
+        memset(out, 0, (size_t)mesh->value.vertex_count * 4 * sizeof(float));
         return;
     }
     if (geometry->node)
@@ -230,7 +231,7 @@ static void pack_normals(const struct gpu_scene_geometry *geometry, float *out)
     const float *tangents = NULL;
     if (geometry->device.flags & GEOMETRY_HAS_TANGENTS)
         tangents = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
-    for (size_t i = 0; i < mesh->vertex_count; i++) {
+    for (size_t i = 0; i < mesh->value.vertex_count; i++) {
         for (size_t k = 0; k < 3; k++)
             out[4 * i + k] = finite_or_zero(in[3 * i + k]);
         out[4 * i + 3] = tangents ? (tangents[4 * i + 3] < 0.0f ? -1.0f : 1.0f) : 0.0f;
@@ -242,13 +243,13 @@ static void pack_tangents(const struct gpu_scene_geometry *geometry, uint32_t *o
     const struct scene_mesh *mesh = geometry->mesh;
     out += geometry->device.first_vertex;
     if (!(geometry->device.flags & GEOMETRY_HAS_TANGENTS)) {
-        memset(out, 0, (size_t)mesh->vertex_count * sizeof(*out));
+        memset(out, 0, (size_t)mesh->value.vertex_count * sizeof(*out));
         return;
     }
     if (geometry->node)
         return;
     const float *in = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
-    for (size_t i = 0; i < mesh->vertex_count; i++)
+    for (size_t i = 0; i < mesh->value.vertex_count; i++)
         out[i] = unit_vector_pack(&in[4 * i]);
 }
 
@@ -259,7 +260,7 @@ static void pack_texcoords(const struct gpu_scene_geometry *geometry, float *out
     for (unsigned set = 0; set < 2; set++) {
         const struct blob *blob = mesh->arrays[MESH_TEXCOORDS_0 + set];
         const float *in = blob ? (const float *)(const void *)blob->data : NULL;
-        for (size_t i = 0; i < mesh->vertex_count; i++) {
+        for (size_t i = 0; i < mesh->value.vertex_count; i++) {
             out[4 * i + 2 * set] = in ? finite_or_zero(in[2 * i]) : 0.0f;
             out[4 * i + 2 * set + 1] = in ? finite_or_zero(in[2 * i + 1]) : 0.0f;
         }
@@ -270,7 +271,7 @@ static void pack_texcoords(const struct gpu_scene_geometry *geometry, float *out
 static void pack_colours(const struct gpu_scene_geometry *geometry, uint16_t *out)
 {
     const struct scene_mesh *mesh = geometry->mesh;
-    const size_t count = (size_t)mesh->vertex_count * 4;
+    const size_t count = (size_t)mesh->value.vertex_count * 4;
     out += (size_t)geometry->device.first_vertex * 4;
     if (!mesh->arrays[MESH_COLOURS])
         memset(out, 0, count * sizeof(*out));
@@ -332,7 +333,7 @@ static void write_spheres(const struct gpu_scene *gpu, const struct packing_part
         if (!geometry->spheres)
             continue;
         memcpy(out + (size_t)geometry->device.first_primitive * 4, geometry->spheres->centres_radii->data,
-               (size_t)geometry->spheres->sphere_count * 4 * sizeof(float));
+               (size_t)geometry->spheres->value.sphere_count * 4 * sizeof(float));
         gpu_scene_find_runs(geometry);
     }
 }
@@ -344,8 +345,8 @@ static void write_sphere_materials(const struct gpu_scene *gpu, const struct pac
     for (uint32_t i = 0; i < gpu->geometry_count && !atomic_load(stop); i++) {
         const struct scene_spheres *set = gpu->geometries[i].spheres;
         uint32_t range = 0;
-        for (uint32_t at = 0; set && at < set->sphere_count;) {
-            struct run run = next_run(gpu, set->ranges, set->range_count, &range, at, set->sphere_count);
+        for (uint32_t at = 0; set && at < set->value.sphere_count;) {
+            struct run run = next_run(gpu, set->ranges, set->range_count, &range, at, set->value.sphere_count);
             for (; at < run.end; at++)
                 materials[gpu->geometries[i].device.first_primitive + at] = run.material_index;
         }
@@ -436,20 +437,21 @@ static void classify_material(struct gpu_scene *gpu, const struct scene *scene, 
     if (!material)
         return;
     material = scene_pose_material(pose, material);
-    if (material->alpha_mode == ALPHA_MASK) {
+    if (material->value.alpha_mode == ALPHA_MASK) {
         *geometry_flags |= GEOMETRY_HAS_CUTOUT;
         gpu->has_cutout = true;
     }
-    if (material->alpha_mode == ALPHA_BLEND || material->transmission > 0.0f)
+    if (material->value.alpha_mode == ALPHA_BLEND || material->value.transmission > 0.0f)
         gpu->has_translucent = true;
-    gpu->has_transmission |= material->transmission > 0.0f;
-    gpu->has_tangents |= material->textures[MATERIAL_NORMAL].texture ||
-                         material->textures[MATERIAL_BUMP].texture ||
-                         material->textures[MATERIAL_CLEARCOAT_NORMAL].texture || material->anisotropy != 0.0f;
+    gpu->has_transmission |= material->value.transmission > 0.0f;
+    gpu->has_tangents |=
+        material->textures[MATERIAL_NORMAL].texture || material->textures[MATERIAL_BUMP].texture ||
+        material->textures[MATERIAL_CLEARCOAT_NORMAL].texture || material->value.anisotropy != 0.0f;
     bool varies =
         material->textures[MATERIAL_BASE_COLOUR].texture || material->textures[MATERIAL_TRANSMISSION].texture ||
         material->textures[MATERIAL_METALLIC_ROUGHNESS].texture || (*geometry_flags & GEOMETRY_HAS_COLOURS);
-    gpu->has_varied_alpha |= varies && (material->alpha_mode != ALPHA_OPAQUE || material->transmission > 0.0f);
+    gpu->has_varied_alpha |=
+        varies && (material->value.alpha_mode != ALPHA_OPAQUE || material->value.transmission > 0.0f);
 }
 
 void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scene,
@@ -463,7 +465,8 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
     gpu->has_texcoords = gpu->has_colours = gpu->has_tangents = false;
     for (uint32_t i = 0; i < gpu->geometry_count; i++) {
         struct gpu_scene_geometry *geometry = &gpu->geometries[i];
-        const struct material_range *ranges = geometry->mesh ? geometry->mesh->ranges : geometry->spheres->ranges;
+        const struct record_material_range *ranges =
+            geometry->mesh ? geometry->mesh->ranges : geometry->spheres->ranges;
         uint32_t range_count = geometry->mesh ? geometry->mesh->range_count : geometry->spheres->range_count;
         uint32_t flags = geometry->device.flags & ~GEOMETRY_HAS_CUTOUT;
         for (uint32_t k = 0; k < range_count; k++)
@@ -481,5 +484,5 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
     void *value;
     uint32_t ignored = 0;
     while (hashmap_next(&scene->objects[OBJECT_DISC], &cursor, &id, &value))
-        classify_material(gpu, scene, pose, ((const struct scene_disc *)value)->material, &ignored);
+        classify_material(gpu, scene, pose, ((const struct scene_disc *)value)->value.material, &ignored);
 }

@@ -133,7 +133,7 @@ static void pack_instances(const struct gpu_scene *gpu, struct posed *posed, boo
         const float *matrices[MOTION_POSES_MAX];
         uint32_t geometry;
         bool found = (is_mesh && find_deforming(gpu, in->node->base.id, &geometry)) ||
-                     find_rigid(gpu, is_mesh, in->node->object, &geometry);
+                     find_rigid(gpu, is_mesh, in->node->value.object, &geometry);
         if (!found || !matrices_of(posed, i, matrices))
             continue;
         struct instance *instance = &fresh->instances[fresh->count++];
@@ -258,13 +258,14 @@ static int by_id(const void *a, const void *b)
 
 static void pack_disc(const struct gpu_scene *gpu, const struct scene_disc *in, struct disc *out)
 {
-    *out = (struct disc){.material = gpu_scene_material_index(gpu, in->material)};
-    memcpy(out->centre_radius, in->centre_world, 3 * sizeof(float));
-    out->centre_radius[3] = in->radius;
-    float length = sqrtf(in->normal_world[0] * in->normal_world[0] + in->normal_world[1] * in->normal_world[1] +
-                         in->normal_world[2] * in->normal_world[2]);
+    *out = (struct disc){.material = gpu_scene_material_index(gpu, in->value.material)};
+    memcpy(out->centre_radius, in->value.centre_world, 3 * sizeof(float));
+    out->centre_radius[3] = in->value.radius;
+    float length = sqrtf(in->value.normal_world[0] * in->value.normal_world[0] +
+                         in->value.normal_world[1] * in->value.normal_world[1] +
+                         in->value.normal_world[2] * in->value.normal_world[2]);
     for (int i = 0; i < 3; i++)
-        out->normal[i] = length > 0.0f ? in->normal_world[i] / length : 0.0f;
+        out->normal[i] = length > 0.0f ? in->value.normal_world[i] / length : 0.0f;
 }
 
 bool gpu_scene_pack_discs(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,

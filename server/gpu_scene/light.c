@@ -41,30 +41,32 @@ static float mean_scale(const float m[12])
 static bool pack_light(const struct scene_light *in, const float world_from_light[12], struct light *out)
 {
     const float forward[3] = {0.0f, 0.0f, -1.0f};
-    const float half_u[3] = {0.5f * in->size[0], 0.0f, 0.0f}, half_v[3] = {0.0f, 0.5f * in->size[1], 0.0f};
+    const float half_u[3] = {0.5f * in->value.size[0], 0.0f, 0.0f},
+                half_v[3] = {0.0f, 0.5f * in->value.size[1], 0.0f};
     float direction[3];
     *out = (struct light){
         .position_kind = {world_from_light[3], world_from_light[7], world_from_light[11],
-                          (float)device_kinds[in->kind]},
-        .colour = {in->colour[0], in->colour[1], in->colour[2], 0.0f},
+                          (float)device_kinds[in->value.kind]},
+        .colour = {in->value.colour[0], in->value.colour[1], in->value.colour[2], 0.0f},
     };
     affine_vector(direction, world_from_light, forward);
     float length = length3(direction);
-    bool needs_direction = in->kind == LIGHT_SPOT || in->kind == LIGHT_DIRECTIONAL || in->kind == LIGHT_RECTANGLE;
+    bool needs_direction =
+        in->value.kind == LIGHT_SPOT || in->value.kind == LIGHT_DIRECTIONAL || in->value.kind == LIGHT_RECTANGLE;
     if (needs_direction && !(length > 0.0f && isfinite(length)))
         return false;
     for (int k = 0; k < 3; k++)
         out->direction_range[k] = length > 0.0f ? direction[k] / length : forward[k];
-    out->direction_range[3] = in->range;
-    if (in->kind == LIGHT_SPHERE)
-        out->colour[3] = in->size[0] * mean_scale(world_from_light);
-    if (in->kind == LIGHT_RECTANGLE) {
+    out->direction_range[3] = in->value.range;
+    if (in->value.kind == LIGHT_SPHERE)
+        out->colour[3] = in->value.size[0] * mean_scale(world_from_light);
+    if (in->value.kind == LIGHT_RECTANGLE) {
         affine_vector(out->half_u_inner, world_from_light, half_u);
         affine_vector(out->half_v_outer, world_from_light, half_v);
     }
-    if (in->kind == LIGHT_SPOT) {
-        out->half_u_inner[3] = cosf(in->inner_cone);
-        out->half_v_outer[3] = cosf(in->outer_cone);
+    if (in->value.kind == LIGHT_SPOT) {
+        out->half_u_inner[3] = cosf(in->value.inner_cone);
+        out->half_v_outer[3] = cosf(in->value.outer_cone);
     }
     return true;
 }
@@ -79,7 +81,7 @@ static bool pack_lights(struct gpu_scene *gpu, const struct scene *scene, const 
         *packed = calloc(count + 1, sizeof(**packed));
     gpu->light_count = 0;
     for (size_t i = 0; *packed && i < count; i++) {
-        const struct scene_light *light = scene_light(scene, list[i].node->object);
+        const struct scene_light *light = scene_light(scene, list[i].node->value.object);
         if (light &&
             pack_light(scene_pose_light(pose, light), list[i].world_from_object, *packed + gpu->light_count))
             (*packed)[gpu->light_count++].position_kind[3] += (float)list[i].light_group / LIGHT_GROUPS_MAX;
@@ -94,13 +96,14 @@ static void note_environment(struct gpu_scene *gpu, const struct scene *scene, s
     const struct scene_environment *environment = &scene->environment;
     if (gpu->state->any_update && gpu->state->environment_revision == environment->revision)
         return;
-    memcpy(gpu->environment_colour, environment->colour, sizeof(gpu->environment_colour));
-    gpu->environment_rotation = environment->rotation;
+    memcpy(gpu->environment_colour, environment->value.colour, sizeof(gpu->environment_colour));
+    gpu->environment_rotation = environment->value.rotation;
     gpu->has_environment_image = environment->texels != NULL;
     changes->bits |= CHANGED_LIGHTS;
     gpu->state->environment_rows = 0;
     if (gpu->has_environment_image)
-        changes->uploaded_bytes += (uint64_t)environment->width * environment->height * ENVIRONMENT_TEXEL_BYTES;
+        changes->uploaded_bytes +=
+            (uint64_t)environment->value.width * environment->value.height * ENVIRONMENT_TEXEL_BYTES;
     else
         gpu_texture_finish(gpu->device, &gpu->environment);
     gpu->state->environment_revision = environment->revision;
@@ -110,25 +113,25 @@ bool gpu_scene_upload_environment(struct gpu_scene *gpu, uint64_t end_ns, bool *
 {
     const struct scene_environment *environment = &gpu->scene->environment;
     uint32_t *row = &gpu->state->environment_rows;
-    *done = !gpu->has_environment_image || *row == environment->height;
+    *done = !gpu->has_environment_image || *row == environment->value.height;
     if (*done)
         return true;
-    if (!gpu_texture_reserve(gpu->device, &gpu->environment, GL_RGBA16F, environment->width, environment->height,
-                             error))
+    if (!gpu_texture_reserve(gpu->device, &gpu->environment, GL_RGBA16F, environment->value.width,
+                             environment->value.height, error))
         return false;
     glTextureParameteri(gpu->environment.name, GL_TEXTURE_WRAP_S, GL_REPEAT); /* columns wrap */
-    const size_t row_bytes = (size_t)environment->width * ENVIRONMENT_TEXEL_BYTES;
+    const size_t row_bytes = (size_t)environment->value.width * ENVIRONMENT_TEXEL_BYTES;
     const uint32_t strip =
         ENVIRONMENT_STRIP_BYTES / row_bytes ? (uint32_t)(ENVIRONMENT_STRIP_BYTES / row_bytes) : 1;
-    while (*row < environment->height) {
-        uint32_t left = environment->height - *row, rows = left < strip ? left : strip;
+    while (*row < environment->value.height) {
+        uint32_t left = environment->value.height - *row, rows = left < strip ? left : strip;
         gpu_texture_write_rows(&gpu->environment, GL_RGBA, GL_HALF_FLOAT, *row, rows,
                                environment->texels->data + *row * row_bytes);
         *row += rows;
         if (clock_now_ns() >= end_ns)
             break;
     }
-    *done = *row == environment->height;
+    *done = *row == environment->value.height;
     return true;
 }
 

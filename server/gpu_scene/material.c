@@ -75,8 +75,8 @@ bool gpu_scene_index_materials(struct gpu_scene *gpu, const struct scene *scene,
     return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the indices of materials");
 }
 
-static uint32_t add_slot(const struct gpu_scene *gpu, const struct texture_use *use, struct texture_slot *slots,
-                         uint32_t *slot_count)
+static uint32_t add_slot(const struct gpu_scene *gpu, const struct record_texture_use *use,
+                         struct texture_slot *slots, uint32_t *slot_count)
 {
     bool found = false;
     uint32_t texture = use->texture ? gpu_scene_texture_index(gpu, use->texture, &found) : 0;
@@ -98,57 +98,58 @@ static uint32_t tangent_flags(const struct scene_material *material)
     static const enum material_texture turned[] = {MATERIAL_NORMAL, MATERIAL_BUMP, MATERIAL_CLEARCOAT_NORMAL,
                                                    MATERIAL_ANISOTROPY};
     for (size_t i = 0; i < sizeof(turned) / sizeof(*turned); i++) {
-        const struct texture_use *use = &material->textures[turned[i]];
+        const struct record_texture_use *use = &material->textures[turned[i]];
         if (use->texture)
             return MATERIAL_TANGENT | (use->texcoord_set == 1 ? MATERIAL_TANGENT_SECOND : 0);
     }
-    return material->anisotropy != 0.0f ? MATERIAL_TANGENT : 0;
+    return material->value.anisotropy != 0.0f ? MATERIAL_TANGENT : 0;
 }
 
 static void pack_material(const struct gpu_scene *gpu, const struct scene_material *in, struct material *out,
                           struct texture_slot *slots, uint32_t *slot_count)
 {
+    const struct record_material *value = &in->value;
     *out = (struct material){
-        .emission_ior = {in->emission[0], in->emission[1], in->emission[2], in->ior},
-        .metallic = in->metallic,
-        .roughness = in->roughness,
-        .transmission = in->transmission,
-        .alpha_cutoff = in->alpha_cutoff,
-        .anisotropy = in->anisotropy,
-        .anisotropy_rotation = in->anisotropy_rotation,
-        .specular = in->specular,
-        .specular_red = in->specular_colour[0],
-        .specular_green = in->specular_colour[1],
-        .specular_blue = in->specular_colour[2],
-        .clearcoat = in->clearcoat,
-        .clearcoat_roughness = in->clearcoat_roughness,
-        .dispersion = in->dispersion,
-        .iridescence = in->iridescence,
-        .iridescence_ior = in->iridescence_ior,
-        .iridescence_minimum = in->iridescence_minimum_nm,
-        .iridescence_maximum = in->iridescence_maximum_nm,
-        .sheen_red = in->sheen[0],
-        .sheen_green = in->sheen[1],
-        .sheen_blue = in->sheen[2],
-        .sheen_roughness = in->sheen_roughness,
-        .diffuse_red = in->diffuse_transmission_colour[0],
-        .diffuse_green = in->diffuse_transmission_colour[1],
-        .diffuse_blue = in->diffuse_transmission_colour[2],
-        .diffuse_transmission = in->diffuse_transmission,
+        .emission_ior = {value->emission[0], value->emission[1], value->emission[2], value->ior},
+        .metallic = value->metallic,
+        .roughness = value->roughness,
+        .transmission = value->transmission,
+        .alpha_cutoff = value->alpha_cutoff,
+        .anisotropy = value->anisotropy,
+        .anisotropy_rotation = value->anisotropy_rotation,
+        .specular = value->specular,
+        .specular_red = value->specular_colour[0],
+        .specular_green = value->specular_colour[1],
+        .specular_blue = value->specular_colour[2],
+        .clearcoat = value->clearcoat,
+        .clearcoat_roughness = value->clearcoat_roughness,
+        .dispersion = value->dispersion,
+        .iridescence = value->iridescence,
+        .iridescence_ior = value->iridescence_ior,
+        .iridescence_minimum = value->iridescence_minimum_nm,
+        .iridescence_maximum = value->iridescence_maximum_nm,
+        .sheen_red = value->sheen[0],
+        .sheen_green = value->sheen[1],
+        .sheen_blue = value->sheen[2],
+        .sheen_roughness = value->sheen_roughness,
+        .diffuse_red = value->diffuse_transmission_colour[0],
+        .diffuse_green = value->diffuse_transmission_colour[1],
+        .diffuse_blue = value->diffuse_transmission_colour[2],
+        .diffuse_transmission = value->diffuse_transmission,
         .id = in->base.id,
     };
-    memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
+    memcpy(out->base_colour, value->base_colour, sizeof(out->base_colour));
     float *const absorbs[3] = {&out->absorbs_red, &out->absorbs_green, &out->absorbs_blue};
     float *const body[3] = {&out->body_red, &out->body_green, &out->body_blue};
     for (int i = 0; i < 3; i++) {
         *absorbs[i] = scene_material_absorption(in, i);
         *body[i] = scene_material_body_tint(in, i);
     }
-    out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |
-                 (in->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
-                 (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0) |
-                 (in->emission_seen_only ? MATERIAL_EMISSION_SEEN_ONLY : 0) |
-                 (in->thin_walled ? MATERIAL_THIN_WALLED : 0) | tangent_flags(in);
+    out->flags = (value->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |
+                 (value->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
+                 (value->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (value->unlit ? MATERIAL_UNLIT : 0) |
+                 (value->emission_seen_only ? MATERIAL_EMISSION_SEEN_ONLY : 0) |
+                 (value->thin_walled ? MATERIAL_THIN_WALLED : 0) | tangent_flags(in);
     uint32_t *const places[MATERIAL_TEXTURE_COUNT] = {
         [MATERIAL_BASE_COLOUR] = &out->texture_base_colour,
         [MATERIAL_NORMAL] = &out->texture_normal,

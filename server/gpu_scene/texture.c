@@ -120,13 +120,13 @@ static uint64_t chain_texels(uint32_t width, uint32_t height, uint32_t *levels)
 static void pack_texture(const struct srgb_tables *tables, const struct scene_texture *texture, uint8_t *chain,
                          uint8_t *out)
 {
-    uint32_t width = texture->width, height = texture->height;
+    uint32_t width = texture->value.width, height = texture->value.height;
     const uint8_t *level = texture->texels->data;
     uint8_t *next = chain;
     memcpy(out, level, (size_t)width * height * 4);
     out += (size_t)width * height * 4;
     while (width > 1 || height > 1) {
-        halve(tables, texture->format == TEXTURE_RGBA8_SRGB, level, width, height, next);
+        halve(tables, texture->value.format == TEXTURE_RGBA8_SRGB, level, width, height, next);
         width = width > 1 ? width / 2 : 1;
         height = height > 1 ? height / 2 : 1;
         size_t bytes = (size_t)width * height * 4;
@@ -152,18 +152,19 @@ static bool lay_out(struct gpu_scene *gpu, const struct scene *scene, struct tex
     while (hashmap_next(&scene->objects[OBJECT_TEXTURE], &cursor, &id, &value)) {
         const struct scene_texture *texture = value;
         uint32_t levels;
-        uint64_t texels = chain_texels(texture->width, texture->height, &levels);
+        uint64_t texels = chain_texels(texture->value.width, texture->value.height, &levels);
         if (texels > max || *texel_count > max - texels)
             return error_set(error, ERROR_LIMIT, "scene",
                              "the textures have more than the %llu texels that this device's texel buffers hold",
                              (unsigned long long)max);
         infos[index] = (struct texture_info){
             .first_texel = (uint32_t)*texel_count,
-            .width = texture->width,
-            .height = texture->height,
-            .flags = (texture->format == TEXTURE_RGBA8_SRGB ? TEXTURE_SRGB : 0) |
-                     (texture->nearest ? TEXTURE_NEAREST : 0) | (uint32_t)texture->wrap_u << TEXTURE_WRAP_U_SHIFT |
-                     (uint32_t)texture->wrap_v << TEXTURE_WRAP_V_SHIFT | levels << TEXTURE_LEVELS_SHIFT,
+            .width = texture->value.width,
+            .height = texture->value.height,
+            .flags = (texture->value.format == TEXTURE_RGBA8_SRGB ? TEXTURE_SRGB : 0) |
+                     (texture->value.nearest ? TEXTURE_NEAREST : 0) |
+                     (uint32_t)texture->value.wrap_u << TEXTURE_WRAP_U_SHIFT |
+                     (uint32_t)texture->value.wrap_v << TEXTURE_WRAP_V_SHIFT | levels << TEXTURE_LEVELS_SHIFT,
         };
         *texel_count += texels;
         if (!hashmap_put(indices, id, (void *)((uintptr_t)index + 1)))
@@ -199,8 +200,8 @@ static void pack_one(void *context, uint32_t i)
     if (atomic_load(run->stop))
         return;
     uint32_t levels;
-    uint64_t below =
-        chain_texels(texture->width, texture->height, &levels) - (uint64_t)texture->width * texture->height;
+    uint64_t below = chain_texels(texture->value.width, texture->value.height, &levels) -
+                     (uint64_t)texture->value.width * texture->value.height;
     uint8_t *chain = malloc((size_t)below * 4 + 1);
     if (chain)
         pack_texture(packing->tables, texture, chain, run->out + (size_t)packing->infos[i].first_texel * 4);

@@ -22,7 +22,7 @@ bool weights_check(const float *weights, uint32_t count, const struct edit_place
 
 bool node_check(const struct scene_node *node, const struct edit_place *place)
 {
-    if (node->skin && node->kind != NODE_MESH)
+    if (node->value.skin && node->value.kind != NODE_MESH)
         return edit_error(place, ERROR_INVALID, ".skin",
                           "only a node that shows a mesh has a skin, so this must be 0");
     return weights_check(node->weights, node->weight_count, place);
@@ -34,14 +34,14 @@ static const char clip_floats_path[] = ".arrays[0] (times and values)";
 bool skin_check_shape(const struct scene_skin *skin, const struct edit_place *place)
 {
     const char *joints = ".arrays[0] (joints)";
-    if (!skin->joint_count || skin->joint_count > SKIN_JOINTS_MAX)
-        return edit_error(place, ERROR_INVALID, ".joint_count", "%u is not within 1 .. %d", skin->joint_count,
-                          SKIN_JOINTS_MAX);
+    if (!skin->value.joint_count || skin->value.joint_count > SKIN_JOINTS_MAX)
+        return edit_error(place, ERROR_INVALID, ".joint_count", "%u is not within 1 .. %d",
+                          skin->value.joint_count, SKIN_JOINTS_MAX);
     if (!skin->joints)
         return edit_error(place, ERROR_INVALID, joints, "a skin needs this array");
-    return array_size_check(skin->joints, skin->joint_count, 4, joints, place) &&
+    return array_size_check(skin->joints, skin->value.joint_count, 4, joints, place) &&
            (!skin->joint_from_mesh ||
-            array_size_check(skin->joint_from_mesh, skin->joint_count, 48, matrices_path, place));
+            array_size_check(skin->joint_from_mesh, skin->value.joint_count, 48, matrices_path, place));
 }
 
 bool skin_check_content(const struct scene_skin *skin, const struct edit_place *place)
@@ -49,7 +49,7 @@ bool skin_check_content(const struct scene_skin *skin, const struct edit_place *
     if (!skin->joint_from_mesh)
         return true;
     const float *values = (const float *)(const void *)skin->joint_from_mesh->data;
-    size_t count = (size_t)skin->joint_count * 12, bad = first_bad_float(values, count, COORDINATE_MAX);
+    size_t count = (size_t)skin->value.joint_count * 12, bad = first_bad_float(values, count, COORDINATE_MAX);
     if (bad == count)
         return true;
     edit_error(place, ERROR_INVALID, matrices_path, "the matrix of joint %zu has %g as entry %zu", bad / 12,
@@ -80,19 +80,19 @@ bool clip_check_content(const struct scene_clip *clip, const struct edit_place *
 
 bool channel_check(const struct scene_channel *channel, const struct edit_place *place)
 {
-    const struct channel_row *row = channel_row(channel->path);
+    const struct channel_row *row = channel_row(channel->value.path);
     enum object_kind kind;
     if (!row)
-        return edit_error(place, ERROR_INVALID, ".path", "%u is no path", (unsigned)channel->path);
-    if ((unsigned)channel->interpolation > INTERPOLATION_BEZIER)
+        return edit_error(place, ERROR_INVALID, ".path", "%u is no path", (unsigned)channel->value.path);
+    if ((unsigned)channel->value.interpolation > INTERPOLATION_BEZIER)
         return edit_error(place, ERROR_INVALID, ".interpolation", "%u is no interpolation",
-                          (unsigned)channel->interpolation);
-    if (channel->width < row->width_min || channel->width > row->width_max)
+                          (unsigned)channel->value.interpolation);
+    if (channel->value.width < row->width_min || channel->value.width > row->width_max)
         return edit_error(place, ERROR_INVALID, ".width", "values of this path have %u numbers, not %u",
-                          row->width_min, channel->width);
-    if (!channel->key_count)
+                          row->width_min, channel->value.width);
+    if (!channel->value.key_count)
         return edit_error(place, ERROR_INVALID, ".key_count", "a channel has at least one key");
-    if (!channel_object_kind(row->target, &kind) && channel->object)
+    if (!channel_object_kind(row->target, &kind) && channel->value.object)
         return edit_error(place, ERROR_INVALID, ".object", "the view is no object, so this must be 0");
     return true;
 }

@@ -29,12 +29,12 @@ static bool is_finite(const float point[3])
 static bool extend_by_deformed(const struct scene *scene, const struct scene_pose *pose,
                                const struct scene_instance *instance, float lower[3], float upper[3])
 {
-    const struct scene_mesh *mesh = scene_mesh(scene, instance->node->object);
+    const struct scene_mesh *mesh = scene_mesh(scene, instance->node->value.object);
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
-    float *positions = malloc((size_t)mesh->vertex_count * 3 * sizeof(*positions));
+    float *positions = malloc((size_t)mesh->value.vertex_count * 3 * sizeof(*positions));
     bool found = false;
     if (positions && scene_deform(scene, pose, instance->node, positions, NULL, NULL)) {
-        for (size_t i = 0; i < (size_t)mesh->triangle_count * 3; i++) {
+        for (size_t i = 0; i < (size_t)mesh->value.triangle_count * 3; i++) {
             float point[3];
             affine_point(point, instance->world_from_object, positions + (size_t)indices[i] * 3);
             if (!is_finite(point))
@@ -50,8 +50,9 @@ static bool extend_by_deformed(const struct scene *scene, const struct scene_pos
 /* Subtracts the cost of deforming a mesh from the budget. False: the budget does not suffice. */
 static bool afford(const struct scene_mesh *mesh, uint64_t *left)
 {
-    uint64_t cost = (uint64_t)mesh->vertex_count * (1 + mesh->target_count + mesh->influence_count) +
-                    (uint64_t)mesh->triangle_count * 3;
+    uint64_t cost =
+        (uint64_t)mesh->value.vertex_count * (1 + mesh->value.target_count + mesh->value.influence_count) +
+        (uint64_t)mesh->value.triangle_count * 3;
     if (cost > *left)
         return false;
     *left -= cost;
@@ -62,7 +63,7 @@ static bool afford(const struct scene_mesh *mesh, uint64_t *left)
 static bool is_below(const struct scene *scene, const struct scene_node *node, uint32_t root)
 {
     while (node && root != 0 && node->base.id != root)
-        node = node->parent ? scene_node(scene, node->parent) : NULL;
+        node = node->value.parent ? scene_node(scene, node->value.parent) : NULL;
     return node != NULL;
 }
 
@@ -78,7 +79,7 @@ static bool extend_by_kind(const struct scene *scene, const struct scene_pose *p
     for (size_t i = 0; i < count; i++) {
         if (instances[i].singular || !is_below(scene, instances[i].node, root))
             continue;
-        uint32_t id = instances[i].node->object;
+        uint32_t id = instances[i].node->value.object;
         const float *object_lower, *object_upper;
         if (kind == NODE_MESH) {
             const struct scene_mesh *mesh = scene_mesh(scene, id);
@@ -109,10 +110,10 @@ static bool extend_by_discs(const struct scene *scene, float lower[3], float upp
         const struct scene_disc *disc = value;
         float disc_lower[3], disc_upper[3];
         for (int axis = 0; axis < 3; axis++) {
-            float n = disc->normal_world[axis];
-            float reach = disc->radius * sqrtf(fmaxf(0.0f, 1.0f - n * n));
-            disc_lower[axis] = disc->centre_world[axis] - reach;
-            disc_upper[axis] = disc->centre_world[axis] + reach;
+            float n = disc->value.normal_world[axis];
+            float reach = disc->value.radius * sqrtf(fmaxf(0.0f, 1.0f - n * n));
+            disc_lower[axis] = disc->value.centre_world[axis] - reach;
+            disc_upper[axis] = disc->value.centre_world[axis] + reach;
         }
         extend(lower, upper, disc_lower, disc_upper);
         found = true;
@@ -239,7 +240,7 @@ static void reach_vertices(struct reach *reach, const struct scene_mesh *mesh)
     double most[SCENE_SUPPORTS_MAX];
     for (size_t i = 0; i < reach->count; i++)
         most[i] = -INFINITY;
-    for (uint32_t k = 0; k < mesh->vertex_count; k++, p += 3) {
+    for (uint32_t k = 0; k < mesh->value.vertex_count; k++, p += 3) {
         if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
             p[2] > upper[2])
             continue;
@@ -259,24 +260,24 @@ static void reach_vertices(struct reach *reach, const struct scene_mesh *mesh)
 /* Processes a deforming mesh. False: out of memory. */
 static bool reach_deformed(struct reach *reach, const struct scene_instance *instance)
 {
-    const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->object);
-    float *positions = malloc((size_t)mesh->vertex_count * 3 * sizeof(*positions));
+    const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->value.object);
+    float *positions = malloc((size_t)mesh->value.vertex_count * 3 * sizeof(*positions));
     const bool deformed =
         positions && scene_deform(reach->scene, reach->pose, instance->node, positions, NULL, NULL);
     if (deformed)
         reach_points(reach, positions, (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data,
-                     (size_t)mesh->triangle_count * 3);
+                     (size_t)mesh->value.triangle_count * 3);
     free(positions);
     return deformed;
 }
 
 static void reach_mesh(struct reach *reach, const struct scene_instance *instance)
 {
-    const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->object);
-    const size_t corners = (size_t)mesh->triangle_count * 3;
+    const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->value.object);
+    const size_t corners = (size_t)mesh->value.triangle_count * 3;
     if (scene_node_deforms(instance->node, mesh) && afford(mesh, &reach->left) && reach_deformed(reach, instance))
         return;
-    if (mesh->vertex_count < corners)
+    if (mesh->value.vertex_count < corners)
         reach_vertices(reach, mesh);
     else
         reach_points(reach, (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data,
@@ -289,7 +290,7 @@ static void reach_spheres(struct reach *reach, const struct scene_spheres *spher
     const struct direction *own = reach->own;
     /* Mean scale, as spheres stay spheres. */
     const double scale = sqrt((double)(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]));
-    for (uint32_t k = 0; reach->axis && k < spheres->sphere_count; k++) {
+    for (uint32_t k = 0; reach->axis && k < spheres->value.sphere_count; k++) {
         double world[3];
         to_world(reach, sphere + 4 * k, world);
         for (size_t i = 0; i < reach->count; i++)
@@ -298,7 +299,7 @@ static void reach_spheres(struct reach *reach, const struct scene_spheres *spher
     for (size_t i = 0; !reach->axis && i < reach->count; i++) {
         const double *d = own[i].object, length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         double most = -INFINITY;
-        for (uint32_t k = 0; k < spheres->sphere_count; k++)
+        for (uint32_t k = 0; k < spheres->value.sphere_count; k++)
             most = fmax(most, dot(d, sphere + 4 * k) + length * (double)sphere[4 * k + 3]);
         note(reach, i, most + own[i].offset);
     }
@@ -339,8 +340,8 @@ static void reach_kind(struct reach *reach, enum node_kind kind, uint32_t root)
         const struct scene_node *node = instances[i].node;
         if (instances[i].singular || !is_below(reach->scene, node, root))
             continue;
-        const struct scene_mesh *mesh = kind == NODE_MESH ? scene_mesh(reach->scene, node->object) : NULL;
-        const struct scene_spheres *spheres = mesh ? NULL : scene_spheres(reach->scene, node->object);
+        const struct scene_mesh *mesh = kind == NODE_MESH ? scene_mesh(reach->scene, node->value.object) : NULL;
+        const struct scene_spheres *spheres = mesh ? NULL : scene_spheres(reach->scene, node->value.object);
         take_instance(reach, instances[i].world_from_object);
         if (!(mesh && scene_node_deforms(node, mesh)) &&
             !goes_beyond(reach, mesh ? mesh->lower : spheres->lower, mesh ? mesh->upper : spheres->upper))
@@ -358,7 +359,7 @@ static void reach_kind(struct reach *reach, enum node_kind kind, uint32_t root)
  * farther. */
 static void turn_disc(struct reach *reach, const struct scene_disc *disc)
 {
-    const float *n = disc->normal_world;
+    const float *n = disc->value.normal_world;
     const int least =
         fabsf(n[0]) < fabsf(n[1]) ? (fabsf(n[0]) < fabsf(n[2]) ? 0 : 2) : (fabsf(n[1]) < fabsf(n[2]) ? 1 : 2);
     const int b = (least + 1) % 3, c = (least + 2) % 3;
@@ -373,8 +374,8 @@ static void turn_disc(struct reach *reach, const struct scene_disc *disc)
     for (unsigned k = 0; k < RIM_PLACES; k++) {
         const double angle = 2.0 * PI * k / RIM_PLACES;
         for (int i = 0; i < 3; i++)
-            place[i] = (double)disc->centre_world[i] +
-                       (double)disc->radius * (cos(angle) * across[i] + sin(angle) * other[i]);
+            place[i] = (double)disc->value.centre_world[i] +
+                       (double)disc->value.radius * (cos(angle) * across[i] + sin(angle) * other[i]);
         for (size_t i = 0; i < reach->count; i++)
             note(reach, i, turning_support(reach, i, place, 0.0));
     }
@@ -389,9 +390,9 @@ static void reach_discs(struct reach *reach)
         if (reach->axis)
             turn_disc(reach, disc);
         for (size_t i = 0; !reach->axis && i < reach->count; i++) {
-            const double *d = reach->directions[i], along = dot(d, disc->normal_world);
+            const double *d = reach->directions[i], along = dot(d, disc->value.normal_world);
             const double across = fmax(0.0, d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along);
-            note(reach, i, dot(d, disc->centre_world) + (double)disc->radius * sqrt(across));
+            note(reach, i, dot(d, disc->value.centre_world) + (double)disc->value.radius * sqrt(across));
         }
         reach->found = true;
     }

@@ -54,21 +54,21 @@ bool channel_object_kind(enum channel_target target, enum object_kind *kind)
 
 uint32_t channel_key_floats(const struct scene_channel *channel)
 {
-    bool has_controls =
-        channel->interpolation == INTERPOLATION_CUBIC_SPLINE || channel->interpolation == INTERPOLATION_BEZIER;
-    return channel->width * (has_controls ? 3u : 1u);
+    bool has_controls = channel->value.interpolation == INTERPOLATION_CUBIC_SPLINE ||
+                        channel->value.interpolation == INTERPOLATION_BEZIER;
+    return channel->value.width * (has_controls ? 3u : 1u);
 }
 
 struct curve channel_curve(const struct scene_channel *channel, const struct scene_clip *clip)
 {
     const float *floats = (const float *)(const void *)clip->floats->data;
     return (struct curve){
-        .times = floats + channel->first_time,
-        .values = floats + channel->first_value,
+        .times = floats + channel->value.first_time,
+        .values = floats + channel->value.first_value,
         .time_stride = 1,
         .key_stride = channel_key_floats(channel),
-        .key_count = channel->key_count,
-        .width = channel->width,
-        .interpolation = channel->interpolation,
+        .key_count = channel->value.key_count,
+        .width = channel->value.width,
+        .interpolation = channel->value.interpolation,
     };
 }

@@ -50,9 +50,9 @@ static bool shape_check(const struct scene_edit *edit, const struct edit_place *
 
 static bool is_same_content(const struct scene_mesh *a, const struct scene_mesh *b)
 {
-    return memcmp(a->arrays, b->arrays, sizeof(a->arrays)) == 0 && a->vertex_count == b->vertex_count &&
-           a->triangle_count == b->triangle_count && a->influence_count == b->influence_count &&
-           a->target_count == b->target_count;
+    return memcmp(a->arrays, b->arrays, sizeof(a->arrays)) == 0 &&
+           a->value.vertex_count == b->value.vertex_count && a->value.triangle_count == b->value.triangle_count &&
+           a->value.influence_count == b->value.influence_count && a->value.target_count == b->value.target_count;
 }
 
 /* Checks a mesh's arrays; those that several meshes share are read once. */
@@ -108,8 +108,8 @@ static void keep_image(const struct draft *draft, struct scene_environment *envi
     struct blob *texels = blob_ref(before->texels);
     blob_unref(environment->texels);
     environment->texels = texels;
-    environment->width = before->width;
-    environment->height = before->height;
+    environment->value.width = before->value.width;
+    environment->value.height = before->value.height;
 }
 
 /* Makes an edit the last one of its object. */
@@ -117,7 +117,7 @@ static bool take_edit(struct draft *draft, struct scene_edit *edit)
 {
     struct edit_place place = draft_place(draft, edit);
     if (edit->kind == EDIT_SET_ENVIRONMENT) {
-        if (edit->set.environment.keeps_image)
+        if (edit->set.environment.value.keeps_image)
             keep_image(draft, &edit->set.environment);
         draft->last_environment = edit;
         return true;
@@ -285,9 +285,10 @@ static void give_room_back(struct draft *draft)
 static void touch_node(struct scene *scene, const struct scene_node *node)
 {
     bool alone = node->child_count == 0;
-    if (!alone || scene->objects[OBJECT_SKIN].count || node->kind == NODE_MESH || node->kind == NODE_SPHERES)
+    if (!alone || scene->objects[OBJECT_SKIN].count || node->value.kind == NODE_MESH ||
+        node->value.kind == NODE_SPHERES)
         scene->instances_revision = scene->revision;
-    if (!alone || node->kind == NODE_LIGHT)
+    if (!alone || node->value.kind == NODE_LIGHT)
         scene->lights_revision = scene->revision;
 }
 
@@ -306,7 +307,7 @@ static void touch_kind(struct scene *scene, enum object_kind kind)
 /* Notes that nodes with this mesh may begin or cease to deform. */
 static void touch_mesh(struct scene *scene, const struct scene_mesh *mesh)
 {
-    if (mesh->influence_count || mesh->target_count)
+    if (mesh->value.influence_count || mesh->value.target_count)
         scene->instances_revision = scene->revision;
 }
 
@@ -324,10 +325,10 @@ static void apply_set(struct scene *scene, struct scene_edit *edit)
         struct scene_node *node = (struct scene_node *)object, *next = &edit->set.node;
         next->child_count = node->child_count;
         if (object->revision) {
-            count_child(scene, node->parent, -1);
+            count_child(scene, node->value.parent, -1);
             touch_node(scene, node);
         }
-        count_child(scene, next->parent, +1);
+        count_child(scene, next->value.parent, +1);
         touch_node(scene, next);
     }
     if (edit->object == OBJECT_MESH) {
@@ -350,7 +351,7 @@ static void apply_remove(struct scene *scene, enum object_kind kind, uint32_t id
     if (kind == OBJECT_NODE) {
         const struct scene_node *node = (const struct scene_node *)object;
         touch_node(scene, node);
-        count_child(scene, node->parent, -1);
+        count_child(scene, node->value.parent, -1);
     }
     touch_kind(scene, kind);
     object_release(kind, object);
@@ -374,7 +375,7 @@ static void apply(struct draft *draft, const struct size *size)
         } else {
             blob_unref(scene->environment.texels);
             scene->environment = edit->set.environment;
-            scene->environment.keeps_image = false;
+            scene->environment.value.keeps_image = false;
             scene->environment.revision = scene->lights_revision = scene->revision;
             memset(&edit->set, 0, sizeof(edit->set));
         }

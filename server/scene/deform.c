@@ -25,11 +25,11 @@ static bool normalise(double v[3])
 static void morph(const struct scene_mesh *mesh, enum mesh_array base, enum mesh_array added, const float *weights,
                   float *out)
 {
-    size_t count = (size_t)mesh->vertex_count * 3;
+    size_t count = (size_t)mesh->value.vertex_count * 3;
     const float *from = floats_of(mesh->arrays[base]), *targets = floats_of(mesh->arrays[added]);
     for (size_t i = 0; i < count; i++) {
         double sum = (double)from[i];
-        for (uint32_t target = 0; targets && target < mesh->target_count; target++)
+        for (uint32_t target = 0; targets && target < mesh->value.target_count; target++)
             sum += (double)weights[target] * (double)targets[target * count + i];
         out[i] = (float)sum;
     }
@@ -38,7 +38,7 @@ static void morph(const struct scene_mesh *mesh, enum mesh_array base, enum mesh
 /* Mean of the joints' matrices, weighted for the vertex. False: it has no weights, and stays unchanged. */
 static bool blend(const struct scene_mesh *mesh, const float *world_from_mesh, size_t vertex, double m[12])
 {
-    uint32_t count = mesh->influence_count;
+    uint32_t count = mesh->value.influence_count;
     const uint16_t *joints = (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data + vertex * count;
     const float *weights = floats_of(mesh->arrays[MESH_WEIGHTS]) + vertex * count;
     double sum = 0.0;
@@ -96,7 +96,7 @@ static void move_normal(const double m[12], float normal[3])
 static void skin_vertices(const struct scene_mesh *mesh, const float *world_from_mesh, float *positions,
                           float *normals)
 {
-    for (size_t vertex = 0; vertex < mesh->vertex_count; vertex++) {
+    for (size_t vertex = 0; vertex < mesh->value.vertex_count; vertex++) {
         double m[12];
         if (!blend(mesh, world_from_mesh, vertex, m))
             continue;
@@ -109,12 +109,13 @@ static void skin_vertices(const struct scene_mesh *mesh, const float *world_from
 bool scene_deform(const struct scene *scene, const struct scene_pose *pose, const struct scene_node *node,
                   float *positions, float *normals, struct error *error)
 {
-    const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
+    const struct scene_mesh *mesh = node->value.kind == NODE_MESH ? scene_mesh(scene, node->value.object) : NULL;
     if (!mesh)
         return error_set(error, ERROR_INVALID, "node", "node %u shows no mesh", node->base.id);
-    const struct scene_skin *skin = node->skin && mesh->influence_count ? scene_skin(scene, node->skin) : NULL;
-    float *matrices = skin ? malloc((size_t)skin->joint_count * 12 * sizeof(*matrices)) : NULL;
-    float *weights = malloc(((size_t)mesh->target_count + 1) * sizeof(*weights));
+    const struct scene_skin *skin =
+        node->value.skin && mesh->value.influence_count ? scene_skin(scene, node->value.skin) : NULL;
+    float *matrices = skin ? malloc((size_t)skin->value.joint_count * 12 * sizeof(*matrices)) : NULL;
+    float *weights = malloc(((size_t)mesh->value.target_count + 1) * sizeof(*weights));
     bool fine = weights && (!skin || matrices);
     if (!fine)
         error_set(error, ERROR_OUT_OF_MEMORY, "node", "no memory to deform the mesh of node %u", node->base.id);
@@ -126,7 +127,7 @@ bool scene_deform(const struct scene *scene, const struct scene_pose *pose, cons
         morph(mesh, MESH_POSITIONS, MESH_TARGET_POSITIONS, weights, positions);
         if (moved_normals) {
             morph(mesh, MESH_NORMALS, MESH_TARGET_NORMALS, weights, moved_normals);
-            make_unit(moved_normals, mesh->vertex_count);
+            make_unit(moved_normals, mesh->value.vertex_count);
         }
         if (skin)
             skin_vertices(mesh, matrices, positions, moved_normals);

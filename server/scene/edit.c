@@ -77,7 +77,7 @@ size_t first_bad_float(const float *values, size_t count, float maximum)
     return i;
 }
 
-bool ranges_check(const struct material_range *ranges, uint32_t range_count, uint32_t primitive_count,
+bool ranges_check(const struct record_material_range *ranges, uint32_t range_count, uint32_t primitive_count,
                   const struct edit_place *place)
 {
     uint32_t done = 0; /* primitives before this one belong to earlier ranges */
@@ -121,7 +121,7 @@ static uint64_t blob_bytes(const struct blob *blob)
  * clip, and their poses are large all the same. */
 static uint64_t channel_pose_bytes(const struct scene_channel *channel)
 {
-    const struct channel_row *row = channel_row(channel->path);
+    const struct channel_row *row = channel_row(channel->value.path);
     uint64_t bytes = 0;
     if (!row)
         return 0;
@@ -130,7 +130,7 @@ static uint64_t channel_pose_bytes(const struct scene_channel *channel)
         bytes = sizeof(struct pose_node);
         break;
     case TARGET_WEIGHTS:
-        bytes = sizeof(struct pose_weights) + channel->width * sizeof(float);
+        bytes = sizeof(struct pose_weights) + channel->value.width * sizeof(float);
         break;
     case TARGET_LIGHT:
         bytes = sizeof(struct scene_light);
@@ -159,7 +159,7 @@ uint64_t object_table_bytes(enum object_kind kind, const void *object)
     } else if (kind == OBJECT_CHANNEL) {
         pose_bytes = channel_pose_bytes(object);
     }
-    return object_struct_bytes(kind) + slot_bytes + range_count * sizeof(struct material_range) +
+    return object_struct_bytes(kind) + slot_bytes + range_count * sizeof(struct record_material_range) +
            weight_count * sizeof(float) + pose_bytes;
 }
 

@@ -41,7 +41,7 @@ bool environment_check_content(const struct scene_environment *environment, cons
 
 /* Helpers that several kinds of edits share. */
 #define COORDINATE_MAX 1e18f /* beyond it, squares leave the range of floats */
-bool ranges_check(const struct material_range *ranges, uint32_t range_count, uint32_t primitive_count,
+bool ranges_check(const struct record_material_range *ranges, uint32_t range_count, uint32_t primitive_count,
                   const struct edit_place *place);
 /* Weights of morph targets. */
 bool weights_check(const float *weights, uint32_t count, const struct edit_place *place);

@@ -51,7 +51,8 @@ bool hierarchy_init(struct hierarchy *hierarchy, const struct scene_node **nodes
     if (!is_sorted(nodes, count))
         qsort(nodes, count, sizeof(const struct scene_node *), compare_ids);
     for (size_t i = 0; i < count; i++)
-        hierarchy->parents[i] = nodes[i]->parent ? position_of(hierarchy, nodes[i]->parent) : HIERARCHY_NONE;
+        hierarchy->parents[i] =
+            nodes[i]->value.parent ? position_of(hierarchy, nodes[i]->value.parent) : HIERARCHY_NONE;
     return true;
 }
 

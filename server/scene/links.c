@@ -58,15 +58,16 @@ static bool has_numbers(const struct scene_clip *clip, uint64_t first, uint64_t 
 static bool first_unordered(struct ascents *ascents, const struct scene_channel *channel,
                             const struct scene_clip *clip, uint32_t *key)
 {
-    const float *times = (const float *)(const void *)clip->floats->data + channel->first_time;
-    ascents->compared += channel->key_count;
+    const float *times = (const float *)(const void *)clip->floats->data + channel->value.first_time;
+    ascents->compared += channel->value.key_count;
     if (ascents->compared > COMPARED_TIMES_MAX) {
         const uint32_t *lengths = ascents_of(ascents, clip);
-        *key = !lengths || lengths[channel->first_time] > channel->key_count ? channel->key_count
-                                                                             : lengths[channel->first_time];
+        *key = !lengths || lengths[channel->value.first_time] > channel->value.key_count
+                   ? channel->value.key_count
+                   : lengths[channel->value.first_time];
         return lengths != NULL;
     }
-    for (*key = 1; *key < channel->key_count && times[*key] > times[*key - 1];)
+    for (*key = 1; *key < channel->value.key_count && times[*key] > times[*key - 1];)
         ++*key;
     return true;
 }
@@ -78,21 +79,22 @@ static bool channel_fits(struct ascents *ascents, const struct scene_channel *ch
     bool own = whose->edit->object == OBJECT_CHANNEL;
     char text[160];
     const char *path = own ? ".first_time" : ".arrays[0] (times and values)";
-    uint64_t value_floats = (uint64_t)channel->key_count * channel_key_floats(channel);
+    uint64_t value_floats = (uint64_t)channel->value.key_count * channel_key_floats(channel);
     uint64_t floats = clip->floats->size_bytes / sizeof(float);
-    if (!has_numbers(clip, channel->first_time, channel->key_count)) {
+    if (!has_numbers(clip, channel->value.first_time, channel->value.key_count)) {
         snprintf(text, sizeof(text), "its %u times from %u on reach beyond the %" PRIu64 " numbers of clip %u",
-                 channel->key_count, channel->first_time, floats, channel->clip);
-    } else if (!has_numbers(clip, channel->first_value, value_floats)) {
+                 channel->value.key_count, channel->value.first_time, floats, channel->value.clip);
+    } else if (!has_numbers(clip, channel->value.first_value, value_floats)) {
         path = own ? ".first_value" : path;
         snprintf(text, sizeof(text),
                  "its %" PRIu64 " numbers of values from %u on reach beyond the %" PRIu64 " numbers of clip %u",
-                 value_floats, channel->first_value, floats, channel->clip);
+                 value_floats, channel->value.first_value, floats, channel->value.clip);
     } else {
         uint32_t unordered;
         if (!first_unordered(ascents, channel, clip, &unordered))
-            return edit_error(whose, ERROR_OUT_OF_MEMORY, path, "no memory to look at clip %u", channel->clip);
-        if (unordered == channel->key_count)
+            return edit_error(whose, ERROR_OUT_OF_MEMORY, path, "no memory to look at clip %u",
+                              channel->value.clip);
+        if (unordered == channel->value.key_count)
             return true;
         snprintf(text, sizeof(text), "its key %u is not after the one before it", unordered);
     }
@@ -105,7 +107,7 @@ static bool channels_of_set_clips(struct draft *draft, struct ascents *ascents)
     size_t cursor = 0;
     const struct scene_channel *channel;
     while (draft->last[OBJECT_CLIP].count && (channel = draft_next_untouched(draft, OBJECT_CHANNEL, &cursor))) {
-        const struct scene_edit *edit = hashmap_get(&draft->last[OBJECT_CLIP], channel->clip);
+        const struct scene_edit *edit = hashmap_get(&draft->last[OBJECT_CLIP], channel->value.clip);
         if (!edit || edit->kind != EDIT_SET)
             continue;
         struct edit_place place = draft_place(draft, edit);
@@ -119,9 +121,9 @@ static bool channels_of_set_clips(struct draft *draft, struct ascents *ascents)
 
 static bool node_fits(struct draft *draft, const struct scene_node *node, const struct scene_edit *whose)
 {
-    const struct scene_mesh *mesh = draft_find(draft, OBJECT_MESH, node->object);
-    const struct scene_skin *skin = draft_find(draft, OBJECT_SKIN, node->skin);
-    if (!mesh || !skin || mesh->joint_places <= skin->joint_count)
+    const struct scene_mesh *mesh = draft_find(draft, OBJECT_MESH, node->value.object);
+    const struct scene_skin *skin = draft_find(draft, OBJECT_SKIN, node->value.skin);
+    if (!mesh || !skin || mesh->joint_places <= skin->value.joint_count)
         return true;
     struct edit_place place = draft_place(draft, whose);
     const char *path = whose->object == OBJECT_NODE   ? ".skin"
@@ -129,7 +131,8 @@ static bool node_fits(struct draft *draft, const struct scene_node *node, const 
                                                       : ".joint_count";
     edit_error(&place, ERROR_INVALID, path,
                "mesh %u refers to joint %u, but skin %u has %u; node %u shows that mesh with that skin",
-               node->object, mesh->joint_places - 1, node->skin, skin->joint_count, node->base.id);
+               node->value.object, mesh->joint_places - 1, node->value.skin, skin->value.joint_count,
+               node->base.id);
     return error_remedy(draft->error, "change the node, the mesh or the skin in the same transaction");
 }
 
@@ -147,11 +150,11 @@ static bool nodes_of_set_objects(struct draft *draft)
     if (!any_skin || !(draft->last[OBJECT_MESH].count || draft->last[OBJECT_SKIN].count))
         return true;
     while ((node = draft_next_untouched(draft, OBJECT_NODE, &cursor))) {
-        if (!node->skin)
+        if (!node->value.skin)
             continue;
-        const struct scene_edit *edit = set_edit(draft, OBJECT_MESH, node->object);
+        const struct scene_edit *edit = set_edit(draft, OBJECT_MESH, node->value.object);
         if (!edit)
-            edit = set_edit(draft, OBJECT_SKIN, node->skin);
+            edit = set_edit(draft, OBJECT_SKIN, node->value.skin);
         if (edit && !node_fits(draft, node, edit))
             return false;
     }
@@ -166,13 +169,13 @@ static bool set_objects_check(struct draft *draft, struct ascents *ascents)
             return false;
         if (edit->kind != EDIT_SET || !draft_counts(draft, edit))
             continue;
-        if (edit->object == OBJECT_NODE && edit->set.node.skin && !node_fits(draft, &edit->set.node, edit))
+        if (edit->object == OBJECT_NODE && edit->set.node.value.skin && !node_fits(draft, &edit->set.node, edit))
             return false;
         if (edit->object != OBJECT_CHANNEL)
             continue;
         const struct scene_channel *channel = &edit->set.channel;
         struct edit_place place = draft_place(draft, edit);
-        if (!channel_fits(ascents, channel, draft_find(draft, OBJECT_CLIP, channel->clip), &place))
+        if (!channel_fits(ascents, channel, draft_find(draft, OBJECT_CLIP, channel->value.clip), &place))
             return false;
     }
     return true;

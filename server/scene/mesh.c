@@ -52,7 +52,7 @@ static const struct array_row array_rows[MESH_ARRAY_COUNT] = {
 bool mesh_has_wide_colours(const struct scene_mesh *mesh)
 {
     return mesh->arrays[MESH_COLOURS] &&
-           mesh->arrays[MESH_COLOURS]->size_bytes == 4 * sizeof(uint16_t) * (uint64_t)mesh->vertex_count;
+           mesh->arrays[MESH_COLOURS]->size_bytes == 4 * sizeof(uint16_t) * (uint64_t)mesh->value.vertex_count;
 }
 
 /* Elements of an array; neither product overflows 64 bits. */
@@ -60,15 +60,15 @@ static uint64_t element_count(const struct scene_mesh *mesh, const struct array_
 {
     switch (row->of) {
     case PER_TRIANGLE:
-        return mesh->triangle_count;
+        return mesh->value.triangle_count;
     case PER_INFLUENCE:
-        return (uint64_t)mesh->vertex_count * mesh->influence_count;
+        return (uint64_t)mesh->value.vertex_count * mesh->value.influence_count;
     case PER_TARGET:
-        return (uint64_t)mesh->vertex_count * mesh->target_count;
+        return (uint64_t)mesh->value.vertex_count * mesh->value.target_count;
     case PER_VERTEX:
         break;
     }
-    return mesh->vertex_count;
+    return mesh->value.vertex_count;
 }
 
 /* Whether arrays and counts agree: joints come with weights, targets with offsets. */
@@ -77,7 +77,7 @@ static bool company_check(const struct scene_mesh *mesh, const struct edit_place
     for (int i = MESH_JOINTS; i < MESH_ARRAY_COUNT; i++) {
         bool of_joints = i == MESH_JOINTS || i == MESH_WEIGHTS;
         const char *count_name = of_joints ? "influence_count" : "target_count";
-        uint32_t count = of_joints ? mesh->influence_count : mesh->target_count;
+        uint32_t count = of_joints ? mesh->value.influence_count : mesh->value.target_count;
         bool needed = of_joints || i == MESH_TARGET_POSITIONS;
         if (count && needed && !mesh->arrays[i])
             return edit_error(place, ERROR_INVALID, array_rows[i].path, "%s is %u, so a mesh needs this array",
@@ -86,11 +86,11 @@ static bool company_check(const struct scene_mesh *mesh, const struct edit_place
             return edit_error(place, ERROR_INVALID, array_rows[i].path, "%s is 0, so this array must be missing",
                               count_name);
     }
-    if (mesh->influence_count > MESH_INFLUENCES_MAX)
-        return edit_error(place, ERROR_INVALID, ".influence_count", "%u is more than %d", mesh->influence_count,
-                          MESH_INFLUENCES_MAX);
-    if (mesh->target_count > MESH_TARGETS_MAX)
-        return edit_error(place, ERROR_INVALID, ".target_count", "%u is more than %d", mesh->target_count,
+    if (mesh->value.influence_count > MESH_INFLUENCES_MAX)
+        return edit_error(place, ERROR_INVALID, ".influence_count", "%u is more than %d",
+                          mesh->value.influence_count, MESH_INFLUENCES_MAX);
+    if (mesh->value.target_count > MESH_TARGETS_MAX)
+        return edit_error(place, ERROR_INVALID, ".target_count", "%u is more than %d", mesh->value.target_count,
                           MESH_TARGETS_MAX);
     return true;
 }
@@ -117,9 +117,11 @@ static bool sizes_check(const struct scene_mesh *mesh, const struct edit_place *
 static void name_element(const struct scene_mesh *mesh, const struct array_row *row, size_t element, char name[64])
 {
     if (row->of == PER_TARGET)
-        snprintf(name, 64, "vertex %zu of target %zu", element % mesh->vertex_count, element / mesh->vertex_count);
+        snprintf(name, 64, "vertex %zu of target %zu", element % mesh->value.vertex_count,
+                 element / mesh->value.vertex_count);
     else
-        snprintf(name, 64, "vertex %zu", row->of == PER_INFLUENCE ? element / mesh->influence_count : element);
+        snprintf(name, 64, "vertex %zu",
+                 row->of == PER_INFLUENCE ? element / mesh->value.influence_count : element);
 }
 
 static bool floats_check(const struct scene_mesh *mesh, const struct edit_place *place)
@@ -136,7 +138,7 @@ static bool floats_check(const struct scene_mesh *mesh, const struct edit_place 
         char name[64];
         name_element(mesh, row, bad / row->components, name);
         edit_error(place, ERROR_INVALID, row->path, "%s has %g as component %zu", name, (double)values[bad],
-                   row->of == PER_INFLUENCE ? bad % mesh->influence_count : bad % row->components);
+                   row->of == PER_INFLUENCE ? bad % mesh->value.influence_count : bad % row->components);
         return error_remedy(place->error, "numbers must be finite%s",
                             row->max > 0.0f ? " and not beyond 1e18" : "");
     }
@@ -147,11 +149,11 @@ static bool floats_check(const struct scene_mesh *mesh, const struct edit_place 
 static bool influences_check(struct scene_mesh *mesh, const struct edit_place *place)
 {
     mesh->joint_places = 0;
-    if (!mesh->influence_count)
+    if (!mesh->value.influence_count)
         return true;
     const uint16_t *joints = (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data;
     const float *weights = (const float *)(const void *)mesh->arrays[MESH_WEIGHTS]->data;
-    size_t count = (size_t)mesh->vertex_count * mesh->influence_count;
+    size_t count = (size_t)mesh->value.vertex_count * mesh->value.influence_count;
     uint16_t maximum = 0;
     float minimum = 0.0f;
     for (size_t i = 0; i < count; i++)
@@ -165,7 +167,7 @@ static bool influences_check(struct scene_mesh *mesh, const struct edit_place *p
     while (weights[bad] >= 0.0f)
         bad++;
     return edit_error(place, ERROR_INVALID, array_rows[MESH_WEIGHTS].path, "vertex %zu has the weight %g",
-                      bad / mesh->influence_count, (double)weights[bad]);
+                      bad / mesh->value.influence_count, (double)weights[bad]);
 }
 
 /* Length of a block: it is constant, so that the compiler processes several indices at a time. */
@@ -253,8 +255,8 @@ static bool indices_check(struct scene_mesh *mesh, const struct edit_place *plac
 {
     struct parts parts = {.indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data,
                           .positions = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data,
-                          .count = (size_t)mesh->triangle_count * 3,
-                          .vertex_count = mesh->vertex_count};
+                          .count = (size_t)mesh->value.triangle_count * 3,
+                          .vertex_count = mesh->value.vertex_count};
     const uint32_t part_count = (uint32_t)((parts.count + PART - 1) / PART);
     parts.parts = malloc(part_count * sizeof(*parts.parts));
     if (!parts.parts)
@@ -270,19 +272,19 @@ static bool indices_check(struct scene_mesh *mesh, const struct edit_place *plac
         unite(mesh, &parts.parts[i].bounds);
     }
     free(parts.parts);
-    return bad == SIZE_MAX ||
-           edit_error(place, ERROR_INVALID, array_rows[MESH_INDICES].path,
-                      "triangle %zu refers to vertex %u of %u", bad / 3, parts.indices[bad], mesh->vertex_count);
+    return bad == SIZE_MAX || edit_error(place, ERROR_INVALID, array_rows[MESH_INDICES].path,
+                                         "triangle %zu refers to vertex %u of %u", bad / 3, parts.indices[bad],
+                                         mesh->value.vertex_count);
 }
 
 bool mesh_check_shape(const struct scene_mesh *mesh, const struct edit_place *place)
 {
-    if (!mesh->vertex_count || !mesh->triangle_count)
-        return edit_error(place, ERROR_INVALID, mesh->vertex_count ? ".triangle_count" : ".vertex_count",
+    if (!mesh->value.vertex_count || !mesh->value.triangle_count)
+        return edit_error(place, ERROR_INVALID, mesh->value.vertex_count ? ".triangle_count" : ".vertex_count",
                           "a mesh has at least one triangle");
     return company_check(mesh, place) && sizes_check(mesh, place) &&
            weights_check(mesh->weights, mesh->weight_count, place) &&
-           ranges_check(mesh->ranges, mesh->range_count, mesh->triangle_count, place);
+           ranges_check(mesh->ranges, mesh->range_count, mesh->value.triangle_count, place);
 }
 
 bool mesh_check_content(struct scene_mesh *mesh, const struct edit_place *place)

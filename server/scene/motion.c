@@ -124,8 +124,8 @@ static int joinable(const interval_turns sum, int maximum)
 
 static bool is_drawn_rigid(const struct scene *scene, const struct scene_node *node)
 {
-    const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
-    return node->kind == NODE_SPHERES || (mesh && !(node->skin && mesh->influence_count));
+    const struct scene_mesh *mesh = node->value.kind == NODE_MESH ? scene_mesh(scene, node->value.object) : NULL;
+    return node->value.kind == NODE_SPHERES || (mesh && !(node->value.skin && mesh->value.influence_count));
 }
 
 /* Number of the finest intervals that may be joined: 8, 4, 2 or 1; 0: out of memory. */

@@ -51,11 +51,11 @@ static void world_resolve(struct world *world, const struct hierarchy *hierarchy
         const struct scene_node *node = hierarchy->nodes[i];
         bool hidden = scene_pose_hidden(world->pose, node);
         const double *parent = root;
-        world->light_groups[i] = (uint8_t)node->light_group;
+        world->light_groups[i] = (uint8_t)node->value.light_group;
         if (above != HIERARCHY_NONE) {
             parent = world->world_from_node[above];
             hidden = hidden || world->state[above] == WORLD_HIDDEN;
-            if (node->light_group == 0)
+            if (node->value.light_group == 0)
                 world->light_groups[i] = world->light_groups[above];
         }
         affine_double_multiply(world->world_from_node[i], parent, scene_pose_parent_from_node(world->pose, node));
@@ -67,8 +67,9 @@ static void world_resolve(struct world *world, const struct hierarchy *hierarchy
 /* Whether joints place the vertices, in world space. */
 static bool is_skinned(const struct scene *scene, const struct scene_node *node)
 {
-    const struct scene_mesh *mesh = node->skin && node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
-    return mesh && mesh->influence_count;
+    const struct scene_mesh *mesh =
+        node->value.skin && node->value.kind == NODE_MESH ? scene_mesh(scene, node->value.object) : NULL;
+    return mesh && mesh->value.influence_count;
 }
 
 static void fill_instance(struct scene_instance *instance, const struct scene *scene,
@@ -96,7 +97,7 @@ bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enu
         return false;
     size_t shown = 0;
     for (size_t i = 0; i < hierarchy.count; i++)
-        shown += hierarchy.nodes[i]->kind == kind;
+        shown += hierarchy.nodes[i]->value.kind == kind;
     if (!shown) {
         hierarchy_finish(&hierarchy);
         return true;
@@ -106,7 +107,7 @@ bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enu
     bool complete = world_init(&world, pose, hierarchy.count) && list;
     size_t used = 0;
     for (uint32_t i = 0; complete && i < hierarchy.count; i++) {
-        if (hierarchy.nodes[i]->kind != kind)
+        if (hierarchy.nodes[i]->value.kind != kind)
             continue;
         world_resolve(&world, &hierarchy, i);
         if (world.state[i] != WORLD_VISIBLE)
@@ -135,7 +136,7 @@ bool scene_world_from_node(const struct scene *scene, const struct scene_pose *p
         return false;
     while (above && length < SCENE_DEPTH_MAX) {
         chain[length++] = above;
-        above = above->parent ? scene_node(scene, above->parent) : NULL;
+        above = above->value.parent ? scene_node(scene, above->value.parent) : NULL;
     }
     double world[12];
     affine_double_identity(world);

@@ -19,8 +19,8 @@ static int compare_tracks(const void *a, const void *b)
     const struct player_track *x = a, *y = b;
     if (x->target != y->target)
         return x->target < y->target ? -1 : 1;
-    if (x->channel->object != y->channel->object)
-        return x->channel->object < y->channel->object ? -1 : 1;
+    if (x->channel->value.object != y->channel->value.object)
+        return x->channel->value.object < y->channel->value.object ? -1 : 1;
     if (x->use != y->use)
         return x->use < y->use ? -1 : 1;
     uint32_t id_x = x->channel->base.id, id_y = y->channel->base.id;
@@ -42,7 +42,7 @@ static size_t group_end(const struct player *player, size_t first)
     const struct player_track *track = &player->tracks[first];
     size_t end = first + 1;
     while (end < player->track_count && player->tracks[end].target == track->target &&
-           player->tracks[end].channel->object == track->channel->object)
+           player->tracks[end].channel->value.object == track->channel->value.object)
         end++;
     return end;
 }
@@ -50,7 +50,7 @@ static size_t group_end(const struct player *player, size_t first)
 static double last_key_s(const struct scene_channel *channel, const struct scene_clip *clip)
 {
     const float *floats = (const float *)(const void *)clip->floats->data;
-    return (double)floats[(size_t)channel->first_time + channel->key_count - 1];
+    return (double)floats[(size_t)channel->value.first_time + channel->value.key_count - 1];
 }
 
 /* Finds the last use of a clip, which overrides all earlier ones. */
@@ -68,15 +68,15 @@ static bool last_use(const struct player *player, uint32_t clip, uint32_t *use)
 static void take_channel(struct player *player, const struct scene_channel *channel)
 {
     uint32_t use;
-    const struct channel_row *row = channel_row(channel->path);
-    const struct scene_clip *clip = scene_clip(player->scene, channel->clip);
-    if (!row || !clip || !last_use(player, channel->clip, &use))
+    const struct channel_row *row = channel_row(channel->value.path);
+    const struct scene_clip *clip = scene_clip(player->scene, channel->value.clip);
+    if (!row || !clip || !last_use(player, channel->value.clip, &use))
         return;
     player->durations_s[use] = fmax(player->durations_s[use], last_key_s(channel, clip));
     player->tracks[player->track_count++] = (struct player_track){channel, clip, row->target, use};
     player->target_tracks[row->target]++;
     if (row->target == TARGET_WEIGHTS)
-        player->weight_count += channel->width;
+        player->weight_count += channel->value.width;
 }
 
 static bool uses_check(const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
@@ -131,7 +131,7 @@ double scene_clip_duration_s(const struct scene *scene, uint32_t clip_id)
     void *value;
     while (clip && hashmap_next(&scene->objects[OBJECT_CHANNEL], &cursor, NULL, &value)) {
         const struct scene_channel *channel = value;
-        if (channel->clip == clip_id)
+        if (channel->value.clip == clip_id)
             duration_s = fmax(duration_s, last_key_s(channel, clip));
     }
     return duration_s;
@@ -153,7 +153,7 @@ static void set_times(struct player *player, double time_s)
 /* Evaluates a track, clamped to the protocol's range. */
 static void evaluate(const struct player *player, const struct player_track *track, float *out)
 {
-    const struct channel_row *row = channel_row(track->channel->path);
+    const struct channel_row *row = channel_row(track->channel->value.path);
     struct curve curve = channel_curve(track->channel, track->clip);
     double value[CURVE_WIDTH_MAX];
     curve_at(&curve, player->times_s[track->use], value);
@@ -166,37 +166,37 @@ static void change_transform(const struct player *player, const struct player_tr
 {
     struct curve curve = channel_curve(track->channel, track->clip);
     double value[CURVE_WIDTH_MAX], time_s = player->times_s[track->use];
-    if (track->channel->path == CHANNEL_NODE_ROTATION) {
+    if (track->channel->value.path == CHANNEL_NODE_ROTATION) {
         curve_rotation_at(&curve, time_s, value);
         local_transform_set_rotation(transform, value);
         return;
     }
     curve_at(&curve, time_s, value);
-    memcpy(track->channel->path == CHANNEL_NODE_TRANSLATION ? transform->translation : transform->scale, value,
-           3 * sizeof(*value));
+    memcpy(track->channel->value.path == CHANNEL_NODE_TRANSLATION ? transform->translation : transform->scale,
+           value, 3 * sizeof(*value));
 }
 
 /* Poses a node by `count` tracks of one object. */
 static void pose_node(const struct player *player, const struct player_track *tracks, size_t count,
                       struct scene_pose *pose)
 {
-    const struct scene_node *node = scene_node(player->scene, tracks->channel->object);
+    const struct scene_node *node = scene_node(player->scene, tracks->channel->value.object);
     if (!node)
         return;
     struct pose_node *posed = &pose->nodes[pose->node_count++];
     struct local_transform transform;
     bool moves = false;
-    *posed = (struct pose_node){.node = node->base.id, .hidden = node->hidden};
-    memcpy(posed->parent_from_node, node->parent_from_node, sizeof(posed->parent_from_node));
+    *posed = (struct pose_node){.node = node->base.id, .hidden = node->value.hidden};
+    memcpy(posed->parent_from_node, node->value.parent_from_node, sizeof(posed->parent_from_node));
     for (size_t i = 0; i < count; i++) {
-        if (tracks[i].channel->path == CHANNEL_NODE_HIDDEN) {
+        if (tracks[i].channel->value.path == CHANNEL_NODE_HIDDEN) {
             float hidden;
             evaluate(player, &tracks[i], &hidden);
             posed->hidden = hidden >= 0.5f;
             continue;
         }
         if (!moves)
-            local_transform_from_matrix(&transform, node->parent_from_node);
+            local_transform_from_matrix(&transform, node->value.parent_from_node);
         moves = true;
         change_transform(player, &tracks[i], &transform);
     }
@@ -209,54 +209,54 @@ static void pose_weights(const struct player *player, const struct player_track 
 {
     const struct player_track *track = &tracks[count - 1];
     struct pose_weights *posed = &pose->morphs[pose->morph_count++];
-    *posed = (struct pose_weights){track->channel->object, pose->weight_count, track->channel->width};
+    *posed = (struct pose_weights){track->channel->value.object, pose->weight_count, track->channel->value.width};
     evaluate(player, track, pose->weights + pose->weight_count);
-    pose->weight_count += track->channel->width;
+    pose->weight_count += track->channel->value.width;
 }
 
 static void pose_light(const struct player *player, const struct player_track *tracks, size_t count,
                        struct scene_pose *pose)
 {
-    const struct scene_light *light = scene_light(player->scene, tracks->channel->object);
+    const struct scene_light *light = scene_light(player->scene, tracks->channel->value.object);
     if (!light)
         return;
     struct scene_light *posed = &pose->lights[pose->light_count++];
     *posed = *light;
     for (size_t i = 0; i < count; i++)
         evaluate(player, &tracks[i],
-                 tracks[i].channel->path == CHANNEL_LIGHT_COLOUR ? posed->colour : posed->size);
-    for (int i = 0; i < 2 && (light->kind == LIGHT_RECTANGLE || light->kind == LIGHT_SPHERE); i++)
-        posed->size[i] = fmaxf(posed->size[i], LIGHT_SIZE_MIN);
+                 tracks[i].channel->value.path == CHANNEL_LIGHT_COLOUR ? posed->value.colour : posed->value.size);
+    for (int i = 0; i < 2 && (light->value.kind == LIGHT_RECTANGLE || light->value.kind == LIGHT_SPHERE); i++)
+        posed->value.size[i] = fmaxf(posed->value.size[i], LIGHT_SIZE_MIN);
 }
 
 static float *material_value(struct scene_material *material, enum channel_path path)
 {
     switch (path) {
     case CHANNEL_MATERIAL_BASE_COLOUR:
-        return material->base_colour;
+        return material->value.base_colour;
     case CHANNEL_MATERIAL_EMISSION:
-        return material->emission;
+        return material->value.emission;
     case CHANNEL_MATERIAL_METALLIC:
-        return &material->metallic;
+        return &material->value.metallic;
     case CHANNEL_MATERIAL_ROUGHNESS:
-        return &material->roughness;
+        return &material->value.roughness;
     case CHANNEL_MATERIAL_TRANSMISSION:
-        return &material->transmission;
+        return &material->value.transmission;
     default:
-        return &material->ior;
+        return &material->value.ior;
     }
 }
 
 static void pose_material(const struct player *player, const struct player_track *tracks, size_t count,
                           struct scene_pose *pose)
 {
-    const struct scene_material *material = scene_material(player->scene, tracks->channel->object);
+    const struct scene_material *material = scene_material(player->scene, tracks->channel->value.object);
     if (!material)
         return;
     struct scene_material *posed = &pose->materials[pose->material_count++];
     *posed = *material;
     for (size_t i = 0; i < count; i++)
-        evaluate(player, &tracks[i], material_value(posed, tracks[i].channel->path));
+        evaluate(player, &tracks[i], material_value(posed, tracks[i].channel->value.path));
 }
 
 static float *view_value(struct pose_view *view, enum channel_path path, unsigned *given)
@@ -291,7 +291,7 @@ static void pose_view(const struct player *player, const struct player_track *tr
 {
     for (size_t i = 0; i < count; i++) {
         unsigned given;
-        evaluate(player, &tracks[i], view_value(&pose->view, tracks[i].channel->path, &given));
+        evaluate(player, &tracks[i], view_value(&pose->view, tracks[i].channel->value.path, &given));
         pose->view.given |= given;
     }
 }
@@ -336,7 +336,7 @@ static double track_turn_bound(struct player *player, const struct player_track 
                                double from_s, double to_s)
 {
     for (size_t i = count; i-- > 0;) {
-        if (tracks[i].channel->path != CHANNEL_NODE_ROTATION)
+        if (tracks[i].channel->value.path != CHANNEL_NODE_ROTATION)
             continue;
         struct curve curve = channel_curve(tracks[i].channel, tracks[i].clip);
         set_times(player, from_s);
@@ -357,7 +357,7 @@ void player_turn_bounds(struct player *player, double from_s, double to_s, doubl
     uint32_t node = 0;
     for (size_t first = 0, end; first < player->target_tracks[TARGET_NODE]; first = end) {
         end = group_end(player, first);
-        if (scene_node(player->scene, player->tracks[first].channel->object))
+        if (scene_node(player->scene, player->tracks[first].channel->value.object))
             bounds[node++] = track_turn_bound(player, &player->tracks[first], end - first, from_s, to_s);
     }
 }

@@ -62,13 +62,13 @@ const struct pose_node *scene_pose_node(const struct scene_pose *pose, uint32_t 
 const float *scene_pose_parent_from_node(const struct scene_pose *pose, const struct scene_node *node)
 {
     const struct pose_node *posed = scene_pose_node(pose, node->base.id);
-    return posed ? posed->parent_from_node : node->parent_from_node;
+    return posed ? posed->parent_from_node : node->value.parent_from_node;
 }
 
 bool scene_pose_hidden(const struct scene_pose *pose, const struct scene_node *node)
 {
     const struct pose_node *posed = scene_pose_node(pose, node->base.id);
-    return posed ? posed->hidden : node->hidden;
+    return posed ? posed->hidden : node->value.hidden;
 }
 
 const struct scene_light *scene_pose_light(const struct scene_pose *pose, const struct scene_light *light)
@@ -94,11 +94,11 @@ void scene_pose_weights(const struct scene_pose *pose, const struct scene_node *
         from = pose->weights + pose->morphs[i].first;
         count = pose->morphs[i].count;
     }
-    for (uint32_t target = 0; target < mesh->target_count; target++)
+    for (uint32_t target = 0; target < mesh->value.target_count; target++)
         weights[target] = target < count ? from[target] : 0.0f;
 }
 
 bool scene_node_deforms(const struct scene_node *node, const struct scene_mesh *mesh)
 {
-    return (node->skin && mesh->influence_count) || mesh->target_count;
+    return (node->value.skin && mesh->value.influence_count) || mesh->value.target_count;
 }

@@ -35,7 +35,7 @@ static bool node_kind_object(enum node_kind kind, enum object_kind *object)
     return false;
 }
 
-static bool next_in_ranges(const struct material_range *ranges, uint32_t count, uint32_t *cursor,
+static bool next_in_ranges(const struct record_material_range *ranges, uint32_t count, uint32_t *cursor,
                            struct reference *reference)
 {
     while (*cursor < count) {
@@ -65,18 +65,18 @@ static bool next_in_material(const struct scene_material *material, uint32_t *cu
 static bool next_in_node(const struct scene_node *node, uint32_t *cursor, struct reference *reference)
 {
     if ((*cursor)++ == 0) {
-        *reference = (struct reference){.id = node->object, .path = ".object"};
-        if (node_kind_object(node->kind, &reference->kind))
+        *reference = (struct reference){.id = node->value.object, .path = ".object"};
+        if (node_kind_object(node->value.kind, &reference->kind))
             return true;
         (*cursor)++;
     }
-    *reference = (struct reference){.kind = OBJECT_SKIN, .id = node->skin, .path = ".skin"};
-    return *cursor == 2 && node->skin;
+    *reference = (struct reference){.kind = OBJECT_SKIN, .id = node->value.skin, .path = ".skin"};
+    return *cursor == 2 && node->value.skin;
 }
 
 static bool next_in_skin(const struct scene_skin *skin, uint32_t *cursor, struct reference *reference)
 {
-    if (*cursor >= skin->joint_count)
+    if (*cursor >= skin->value.joint_count)
         return false;
     uint32_t i = (*cursor)++;
     const uint32_t *joints = (const uint32_t *)(const void *)skin->joints->data;
@@ -87,12 +87,12 @@ static bool next_in_skin(const struct scene_skin *skin, uint32_t *cursor, struct
 
 static bool next_in_channel(const struct scene_channel *channel, uint32_t *cursor, struct reference *reference)
 {
-    const struct channel_row *row = channel_row(channel->path);
+    const struct channel_row *row = channel_row(channel->value.path);
     if ((*cursor)++ == 0) {
-        *reference = (struct reference){.kind = OBJECT_CLIP, .id = channel->clip, .path = ".clip"};
+        *reference = (struct reference){.kind = OBJECT_CLIP, .id = channel->value.clip, .path = ".clip"};
         return true;
     }
-    *reference = (struct reference){.id = channel->object, .path = ".object"};
+    *reference = (struct reference){.id = channel->value.object, .path = ".object"};
     return *cursor == 2 && row && channel_object_kind(row->target, &reference->kind);
 }
 
@@ -115,7 +115,7 @@ static bool next_reference(enum object_kind kind, const void *object, uint32_t *
         return next_in_material(object, cursor, reference);
     case OBJECT_DISC:
         *reference =
-            (struct reference){OBJECT_MATERIAL, ((const struct scene_disc *)object)->material, ".material"};
+            (struct reference){OBJECT_MATERIAL, ((const struct scene_disc *)object)->value.material, ".material"};
         return (*cursor)++ == 0 && reference->id;
     case OBJECT_SKIN:
         return next_in_skin(object, cursor, reference);
@@ -135,7 +135,7 @@ static bool next_reference(enum object_kind kind, const void *object, uint32_t *
 static bool set_check(struct draft *draft, const struct scene_edit *edit)
 {
     struct edit_place place = draft_place(draft, edit);
-    if (edit->object == OBJECT_NODE && edit->set.node.kind == NODE_GROUP && edit->set.node.object)
+    if (edit->object == OBJECT_NODE && edit->set.node.value.kind == NODE_GROUP && edit->set.node.value.object)
         return edit_error(&place, ERROR_INVALID, ".object", "a group shows nothing, so this must be 0");
     struct reference reference;
     uint32_t cursor = 0;

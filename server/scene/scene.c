@@ -55,14 +55,14 @@ const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id
 float scene_material_absorption(const struct scene_material *material, int channel)
 {
     const float least = 1e-6f; /* black would be infinite */
-    if (!(material->attenuation_distance > 0.0f))
+    if (!(material->value.attenuation_distance > 0.0f))
         return 0.0f;
-    return -logf(fmaxf(material->attenuation[channel], least)) / material->attenuation_distance;
+    return -logf(fmaxf(material->value.attenuation_colour[channel], least)) / material->value.attenuation_distance;
 }
 
 float scene_material_body_tint(const struct scene_material *material, int channel)
 {
-    return expf(-0.5f * material->thickness * scene_material_absorption(material, channel));
+    return expf(-0.5f * material->value.thickness * scene_material_absorption(material, channel));
 }
 
 const struct scene_material *scene_material(const struct scene *scene, uint32_t id)
@@ -103,7 +103,7 @@ static void read_environment(const struct scene *scene, struct scene_edit *edit)
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment = scene->environment;
     edit->set.environment.texels = NULL;
-    edit->set.environment.keeps_image = true;
+    edit->set.environment.value.keeps_image = true;
 }
 
 bool scene_read_object(const struct scene *scene, enum object_kind kind, uint32_t id, struct scene_edit *edit,

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The scene that clients describe: revisioned, edited in transactions. Knows neither GL nor the protocol. Not
- * thread-safe: a scene belongs to the thread that owns GL. */
+/* The scene that clients describe: revisioned, edited in transactions. Objects hold the
+ * records of protocol/values.def. Knows neither GL nor messages. Not thread-safe: a scene belongs to the thread
+ * that owns GL. */
 #ifndef FARLIGHT_SCENE_SCENE_H
 #define FARLIGHT_SCENE_SCENE_H
 
 #include "base/blob.h"
 #include "base/error.h"
 #include "base/hashmap.h"
+#include "protocol/values.h"
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -37,11 +39,6 @@ enum mesh_array {
 };
 #define MATERIAL_TEXTURE_COUNT MATERIAL_COUNT /* count of base/words.h */
 
-struct material_range {
-    uint32_t first, count; /* triangles or spheres */
-    uint32_t material;     /* 0: the default material */
-};
-
 /* Head of every object; `revision` is that of the transaction that last changed it. */
 struct scene_object {
     uint32_t id;
@@ -51,108 +48,65 @@ struct scene_object {
 
 struct scene_node {
     struct scene_object base;
-    uint32_t parent; /* 0: the root */
-    enum node_kind kind;
-    uint32_t object; /* mesh, spheres, light, camera */
-    bool hidden;
-    float parent_from_node[12]; /* 3x4 row-major */
-    uint32_t skin;              /* skin of a mesh with joints; 0: none. With one, the joints place the vertices
-                                   in world space, whatever the node's transform */
-    float *weights;             /* weights of the mesh's morph targets, owned; NULL: the mesh's own */
+    struct record_node value;
+    float *weights; /* weights of the mesh's morph targets, owned; NULL: the mesh's own */
     uint32_t weight_count;
-    uint32_t light_group; /* group of lights and emissive surfaces here and below, 1 .. 7; 0: the parent's */
     uint32_t child_count; /* number of direct children, maintained by the scene */
 };
 
 struct scene_mesh {
     struct scene_object base;
-    uint32_t vertex_count, triangle_count;
+    struct record_mesh value;
     struct blob *arrays[MESH_ARRAY_COUNT]; /* NULL: missing. Checked: sizes fit the counts, indices are in range,
                                               positions finite */
-    uint32_t influence_count;              /* joints per vertex, 0 .. MESH_INFLUENCES_MAX */
     uint32_t joint_places;                 /* places in a skin that MESH_JOINTS uses; filled by the check */
-    uint32_t target_count;                 /* morph targets, 0 .. MESH_TARGETS_MAX */
     float *weights;                        /* weights of the targets for nodes without their own; owned; missing
                                               ones are 0 */
     uint32_t weight_count;
-    struct material_range *ranges;
+    struct record_material_range *ranges; /* owned */
     uint32_t range_count;
-    bool closed; /* its triangles bound a body; stated by the client, used by sampled structures only */
     float lower[3], upper[3]; /* bounds of the undeformed mesh in object space */
 };
 
 struct scene_spheres {
     struct scene_object base;
-    uint32_t sphere_count;
+    struct record_spheres value;
     struct blob *centres_radii; /* 4 f32 per sphere; checked: finite, radius > 0 */
-    struct material_range *ranges;
+    struct record_material_range *ranges;
     uint32_t range_count;
     float lower[3], upper[3];
 };
 
-struct texture_use {
-    uint32_t texture; /* 0: none */
-    uint32_t texcoord_set;
-    float uv_transform[6]; /* rows (a b c), (d e f) */
-    float strength;
-};
-
 struct scene_material {
     struct scene_object base;
-    enum alpha_mode alpha_mode;
-    bool double_sided, unlit;
-    bool emission_seen_only; /* emission is visible only: a light shines in its place */
-    float base_colour[4], emission[3];
-    float metallic, roughness, transmission, ior, alpha_cutoff;
-    float anisotropy, anisotropy_rotation; /* radians */
-    float specular, specular_colour[3];    /* strength and colour of a dielectric's reflection; 1: by Fresnel's
-                                              equations */
-    /* Transmission of a body of glass over the distance, metres; 0: it is clear. `thickness` of the body is for
-     * shadow rays, which pass two of its surfaces. */
-    float attenuation[3], attenuation_distance, thickness;
-    float clearcoat, clearcoat_roughness;
-    float sheen[3], sheen_roughness;
-    float iridescence, iridescence_ior, iridescence_minimum_nm, iridescence_maximum_nm; /* thickness of the film */
-    float dispersion;                                                                   /* 20 / Abbe number */
-    float diffuse_transmission, diffuse_transmission_colour[3];
-    bool thin_walled;
-    struct texture_use textures[MATERIAL_TEXTURE_COUNT];
+    struct record_material value;
+    struct record_texture_use textures[MATERIAL_TEXTURE_COUNT];
 };
 
 struct scene_texture {
     struct scene_object base;
-    uint32_t width, height;
-    enum texture_format format;
-    enum wrap wrap_u, wrap_v;
-    bool nearest;
+    struct record_texture value;
     struct blob *texels; /* width x height x 4 bytes, rows from the top */
 };
 
 struct scene_light {
     struct scene_object base;
-    enum light_kind kind;
-    float colour[3];
-    float range;                  /* metres, 0: unlimited */
-    float inner_cone, outer_cone; /* radians, half angles */
-    float size[2];                /* rectangle: width, height; sphere: radius */
+    struct record_light value;
 };
 
 struct scene_camera {
     struct scene_object base;
-    float fov_y;  /* radians; 0: orthographic */
-    float height; /* metres, orthographic */
-    float near;   /* metres */
+    struct record_camera value;
 };
 
 struct scene_disc {
     struct scene_object base;
-    uint32_t material;
-    float centre_world[3], normal_world[3], radius;
+    struct record_disc value;
 };
 
 struct scene_skin {
     struct scene_object base;
-    uint32_t joint_count;
+    struct record_skin value;
     struct blob *joints;          /* u32 node ids; checked: the nodes exist */
     struct blob *joint_from_mesh; /* 12 f32 each, 3x4 row-major; NULL: identity */
 };
@@ -164,25 +118,13 @@ struct scene_clip {
 
 struct scene_channel {
     struct scene_object base;
-    uint32_t clip;
-    enum channel_path path;
-    uint32_t object; /* node, light, material; 0: the view */
-    enum interpolation interpolation;
-    uint32_t width; /* numbers per value */
-    uint32_t key_count;
-    uint32_t first_time, first_value; /* in the clip's floats; checked: all of them exist, times ascend */
+    struct record_channel value; /* checked: all its floats are in the clip, times ascend */
 };
 
 struct scene_environment {
     uint64_t revision;
-    float colour[3];
-    float rotation; /* radians, about +y */
-    uint32_t width, height;
-    struct blob *texels;  /* 4 half floats a texel; NULL: constant colour */
-    bool backdrop;        /* the constant colour is visible and lights nothing */
-    bool display_values;  /* applies to the scene: colours and light are display values, not linear */
-    uint32_t light_group; /* 1 .. 7; 0: none */
-    bool keeps_image;     /* edits only: the present image is kept */
+    struct record_environment value;
+    struct blob *texels; /* 4 half floats a texel; NULL: constant colour */
 };
 
 /* An edit of a transaction. Its pointers (blobs, ranges) move to the scene with a successful commit and stay

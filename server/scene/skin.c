@@ -48,7 +48,7 @@ static bool place(struct placed_nodes *placed, const struct scene *scene, const 
         return error_set(error, ERROR_INTERNAL, "skin", "node %u, a joint, is not there", joint);
     while (node && length < SCENE_DEPTH_MAX && !(above = find(placed, node->base.id))) {
         chain[length++] = node;
-        node = node->parent ? scene_node(scene, node->parent) : NULL;
+        node = node->value.parent ? scene_node(scene, node->value.parent) : NULL;
     }
     if (above)
         memcpy(world_from_joint, above, 12 * sizeof(*above));
@@ -73,7 +73,7 @@ bool scene_skin_matrices(const struct scene *scene, const struct scene_pose *pos
         skin->joint_from_mesh ? (const float *)(const void *)skin->joint_from_mesh->data : NULL;
     struct placed_nodes placed = {0};
     bool fine = true;
-    for (size_t i = 0; fine && i < skin->joint_count; i++) {
+    for (size_t i = 0; fine && i < skin->value.joint_count; i++) {
         double matrix[12];
         fine = place(&placed, scene, pose, joints[i], matrix, error);
         if (fine && joint_from_mesh)

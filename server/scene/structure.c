@@ -31,7 +31,7 @@ static bool is_restructured(const struct draft *draft)
     while (hashmap_next(&draft->last[OBJECT_NODE], &cursor, &id, &value)) {
         const struct scene_edit *edit = value;
         const struct scene_node *now = scene_node(draft->scene, (uint32_t)id);
-        if (edit->kind == EDIT_REMOVE || !now || now->parent != edit->set.node.parent)
+        if (edit->kind == EDIT_REMOVE || !now || now->value.parent != edit->set.node.value.parent)
             return true;
     }
     return false;
@@ -71,7 +71,7 @@ static bool chain_error(struct traversal *traversal, enum error_code kind, const
         const struct scene_edit *edit = node_edit(traversal->draft, node->base.id);
         if (edit) {
             struct edit_place place = draft_place(traversal->draft, edit);
-            return edit_error(&place, kind, ".parent", "with node %u as its parent, %s", node->parent, what);
+            return edit_error(&place, kind, ".parent", "with node %u as its parent, %s", node->value.parent, what);
         }
         position = traversal->hierarchy.parents[position];
     }
@@ -96,11 +96,11 @@ static bool missing_parent(struct traversal *traversal, const struct scene_node 
     if (!edit)
         return true; /* unedited, below a removed node: it is removed too */
     struct edit_place place = draft_place(traversal->draft, edit);
-    if (!node_edit(traversal->draft, node->parent))
-        edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u does not exist", node->parent);
+    if (!node_edit(traversal->draft, node->value.parent))
+        edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u does not exist", node->value.parent);
     else
         edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed by the same transaction",
-                   node->parent);
+                   node->value.parent);
     return error_remedy(traversal->draft->error, "make the parent in the same transaction, or use 0 for the root");
 }
 
@@ -110,7 +110,8 @@ static bool fallen_parent(struct traversal *traversal, const struct scene_node *
     if (!edit)
         return true;
     struct edit_place place = draft_place(traversal->draft, edit);
-    edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed along with one above it", node->parent);
+    edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed along with one above it",
+               node->value.parent);
     return error_remedy(traversal->draft->error, "give it a parent that remains");
 }
 
@@ -137,7 +138,7 @@ static bool resolve(struct traversal *traversal, uint32_t start)
             if (hierarchy->parents[position] != HIERARCHY_NONE && !fallen_parent(traversal, node))
                 return false;
         }
-        if (node->parent && hierarchy->parents[position] == HIERARCHY_NONE) {
+        if (node->value.parent && hierarchy->parents[position] == HIERARCHY_NONE) {
             if (!missing_parent(traversal, node))
                 return false;
             state = FALLEN;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One function per edit message: its fields into a struct scene_edit. The decoder has checked each field; how
- * they fit together is for the scene to check when the transaction is applied. */
+/* Edit messages as edits of the scene, which keeps their values. The decoder has checked each field; how they fit
+ * together is for the scene to check when the transaction is applied. */
 #include "session/edits.h"
 
 #include <stdio.h>
@@ -17,34 +17,37 @@ static void begin_set(struct scene_edit *edit, enum object_kind kind, struct sce
     snprintf(base->name, sizeof(base->name), "%s", name);
 }
 
-static bool take_ranges(struct material_range **ranges, uint32_t *range_count,
-                        const struct record_material_range *from, uint32_t count, struct error *error)
+/* A copy of an array that the scene is to own; NULL where it is empty. */
+static bool keep_array(void **kept, uint32_t *kept_count, const void *array, uint32_t count, size_t element_bytes,
+                       struct error *error)
 {
     if (!count)
         return true;
-    *ranges = malloc(count * sizeof(**ranges));
-    if (!*ranges)
-        return error_set(error, ERROR_OUT_OF_MEMORY, "ranges", "no memory");
-    for (uint32_t i = 0; i < count; i++) {
-        (*ranges)[i] =
-            (struct material_range){.first = from[i].first, .count = from[i].count, .material = from[i].material};
-    }
-    *range_count = count;
+    *kept = malloc(count * element_bytes);
+    if (!*kept)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "edit", "no memory for its arrays");
+    memcpy(*kept, array, count * element_bytes);
+    *kept_count = count;
     return true;
 }
 
-static bool take_weights(float **weights, uint32_t *weight_count, const struct record_morph_weight *from,
+static bool keep_ranges(struct record_material_range **ranges, uint32_t *range_count,
+                        const struct record_material_range *array, uint32_t count, struct error *error)
+{
+    void *kept = NULL;
+    const bool done = keep_array(&kept, range_count, array, count, sizeof(*array), error);
+    *ranges = kept;
+    return done;
+}
+
+static bool keep_weights(float **weights, uint32_t *weight_count, const struct record_morph_weight *array,
                          uint32_t count, struct error *error)
 {
-    if (!count)
-        return true;
-    *weights = malloc(count * sizeof(**weights));
-    if (!*weights)
-        return error_set(error, ERROR_OUT_OF_MEMORY, "weights", "no memory");
-    for (uint32_t i = 0; i < count; i++)
-        (*weights)[i] = from[i].weight;
-    *weight_count = count;
-    return true;
+    _Static_assert(sizeof(*array) == sizeof(**weights), "a weight is one float");
+    void *kept = NULL;
+    const bool done = keep_array(&kept, weight_count, array, count, sizeof(*array), error);
+    *weights = kept;
+    return done;
 }
 
 /* "set_mesh 7.arrays[2]" */
@@ -62,14 +65,8 @@ static bool from_node(const struct message_set_node *message, struct scene_edit 
 {
     struct scene_node *node = &edit->set.node;
     begin_set(edit, OBJECT_NODE, &node->base, message->node, message->name);
-    node->parent = message->parent;
-    node->kind = (enum node_kind)message->kind;
-    node->object = message->object;
-    node->hidden = message->hidden;
-    memcpy(node->parent_from_node, message->parent_from_node, sizeof(node->parent_from_node));
-    node->skin = message->skin;
-    node->light_group = message->light_group;
-    return take_weights(&node->weights, &node->weight_count, message->weights, message->weights_count, error);
+    node->value = message->value;
+    return keep_weights(&node->weights, &node->weight_count, message->weights, message->weights_count, error);
 }
 
 static bool from_mesh(const struct edit_source *source, const struct message_set_mesh *message,
@@ -77,18 +74,14 @@ static bool from_mesh(const struct edit_source *source, const struct message_set
 {
     struct scene_mesh *mesh = &edit->set.mesh;
     begin_set(edit, OBJECT_MESH, &mesh->base, message->mesh, message->name);
-    mesh->vertex_count = message->vertex_count;
-    mesh->triangle_count = message->triangle_count;
-    mesh->influence_count = message->influence_count;
-    mesh->target_count = message->target_count;
-    mesh->closed = message->closed != 0;
+    mesh->value = message->value;
     for (uint32_t i = 0; i < MESH_ARRAY_COUNT; i++) {
         if (!take_blob(source, message->arrays, message->arrays_count, i, "set_mesh", message->mesh,
                        &mesh->arrays[i], error))
             return false;
     }
-    return take_ranges(&mesh->ranges, &mesh->range_count, message->ranges, message->ranges_count, error) &&
-           take_weights(&mesh->weights, &mesh->weight_count, message->weights, message->weights_count, error);
+    return keep_ranges(&mesh->ranges, &mesh->range_count, message->ranges, message->ranges_count, error) &&
+           keep_weights(&mesh->weights, &mesh->weight_count, message->weights, message->weights_count, error);
 }
 
 static bool from_spheres(const struct edit_source *source, const struct message_set_spheres *message,
@@ -96,91 +89,49 @@ static bool from_spheres(const struct edit_source *source, const struct message_
 {
     struct scene_spheres *spheres = &edit->set.spheres;
     begin_set(edit, OBJECT_SPHERES, &spheres->base, message->spheres, message->name);
-    spheres->sphere_count = message->sphere_count;
+    spheres->value = message->value;
     return take_blob(source, message->arrays, message->arrays_count, 0, "set_spheres", message->spheres,
                      &spheres->centres_radii, error) &&
-           take_ranges(&spheres->ranges, &spheres->range_count, message->ranges, message->ranges_count, error);
+           keep_ranges(&spheres->ranges, &spheres->range_count, message->ranges, message->ranges_count, error);
 }
 
 static void from_disc(const struct message_set_disc *message, struct scene_edit *edit)
 {
     struct scene_disc *disc = &edit->set.disc;
     begin_set(edit, OBJECT_DISC, &disc->base, message->disc, message->name);
-    disc->material = message->material;
-    memcpy(disc->centre_world, message->centre_world, sizeof(disc->centre_world));
-    memcpy(disc->normal_world, message->normal_world, sizeof(disc->normal_world));
-    disc->radius = message->radius;
+    disc->value = message->value;
 }
 
 static void from_material(const struct message_set_material *message, struct scene_edit *edit)
 {
     struct scene_material *material = &edit->set.material;
     begin_set(edit, OBJECT_MATERIAL, &material->base, message->material, message->name);
-    material->alpha_mode = (enum alpha_mode)message->alpha_mode;
-    material->double_sided = message->double_sided;
-    material->unlit = message->unlit;
-    memcpy(material->base_colour, message->base_colour, sizeof(material->base_colour));
-    memcpy(material->emission, message->emission, sizeof(material->emission));
-    material->metallic = message->metallic;
-    material->roughness = message->roughness;
-    material->transmission = message->transmission;
-    material->ior = message->ior;
-    material->alpha_cutoff = message->alpha_cutoff;
-    material->anisotropy = message->anisotropy;
-    material->anisotropy_rotation = message->anisotropy_rotation;
-    material->emission_seen_only = message->emission_seen_only;
-    material->specular = message->specular;
-    material->specular_colour[0] = message->specular_red;
-    material->specular_colour[1] = message->specular_green;
-    material->specular_colour[2] = message->specular_blue;
-    const float attenuation[3] = {message->attenuation_red, message->attenuation_green, message->attenuation_blue};
-    memcpy(material->attenuation, attenuation, sizeof(attenuation));
-    material->attenuation_distance = message->attenuation_distance;
-    material->thickness = message->thickness;
-    material->clearcoat = message->clearcoat;
-    material->clearcoat_roughness = message->clearcoat_roughness;
-    memcpy(material->sheen, message->sheen, sizeof(material->sheen));
-    material->sheen_roughness = message->sheen_roughness;
-    material->iridescence = message->iridescence;
-    material->iridescence_ior = message->iridescence_ior;
-    material->iridescence_minimum_nm = message->iridescence_minimum_nm;
-    material->iridescence_maximum_nm = message->iridescence_maximum_nm;
-    material->dispersion = message->dispersion;
-    material->diffuse_transmission = message->diffuse_transmission;
-    const float through[3] = {message->diffuse_transmission_red, message->diffuse_transmission_green,
-                              message->diffuse_transmission_blue};
-    memcpy(material->diffuse_transmission_colour, through, sizeof(through));
-    material->thin_walled = message->thin_walled;
-    for (uint32_t i = 0; i < message->textures_count && i < MATERIAL_TEXTURE_COUNT; i++) {
-        const struct record_texture_use *from = &message->textures[i];
-        struct texture_use *use = &material->textures[i];
-        use->texture = from->texture;
-        use->texcoord_set = from->texcoord_set;
-        memcpy(use->uv_transform, from->uv_transform, sizeof(use->uv_transform));
-        use->strength = from->strength;
-    }
+    material->value = message->value;
+    for (uint32_t i = 0; i < message->textures_count && i < MATERIAL_TEXTURE_COUNT; i++)
+        material->textures[i] = message->textures[i];
 }
 
-static const char texture_remedy[] = "make it smaller, or raise limits.texture_edge in the daemon's configuration";
+static bool check_texels(const struct edit_source *source, const char *field, const char *what, uint32_t width,
+                         uint32_t height, struct error *error)
+{
+    const uint32_t limit = source->texture_edge_texels;
+    if (width <= limit && height <= limit)
+        return true;
+    error_set(error, ERROR_LIMIT, field, "%s has %u x %u texels, the limit is %u a side", what, width, height,
+              limit);
+    return error_remedy(error, "make it smaller, or raise limits.texture_edge in the daemon's configuration");
+}
 
 static bool from_texture(const struct edit_source *source, const struct message_set_texture *message,
                          struct scene_edit *edit, struct error *error)
 {
     struct scene_texture *texture = &edit->set.texture;
+    char what[32];
     begin_set(edit, OBJECT_TEXTURE, &texture->base, message->texture, message->name);
-    uint32_t limit_texels = source->texture_edge_texels;
-    if (message->width > limit_texels || message->height > limit_texels) {
-        error_set(error, ERROR_LIMIT, "set_texture", "texture %u has %u x %u texels, the limit is %u a side",
-                  message->texture, message->width, message->height, limit_texels);
-        return error_remedy(error, texture_remedy);
-    }
-    texture->width = message->width;
-    texture->height = message->height;
-    texture->format = (enum texture_format)message->format;
-    texture->wrap_u = (enum wrap)message->wrap_u;
-    texture->wrap_v = (enum wrap)message->wrap_v;
-    texture->nearest = message->nearest;
-    return take_blob(source, message->arrays, message->arrays_count, 0, "set_texture", message->texture,
+    snprintf(what, sizeof(what), "texture %u", message->texture);
+    texture->value = message->value;
+    return check_texels(source, "set_texture", what, texture->value.width, texture->value.height, error) &&
+           take_blob(source, message->arrays, message->arrays_count, 0, "set_texture", message->texture,
                      &texture->texels, error);
 }
 
@@ -188,21 +139,14 @@ static void from_light(const struct message_set_light *message, struct scene_edi
 {
     struct scene_light *light = &edit->set.light;
     begin_set(edit, OBJECT_LIGHT, &light->base, message->light, message->name);
-    light->kind = (enum light_kind)message->kind;
-    memcpy(light->colour, message->colour, sizeof(light->colour));
-    light->range = message->range;
-    light->inner_cone = message->inner_cone;
-    light->outer_cone = message->outer_cone;
-    memcpy(light->size, message->size, sizeof(light->size));
+    light->value = message->value;
 }
 
 static void from_camera(const struct message_set_camera *message, struct scene_edit *edit)
 {
     struct scene_camera *camera = &edit->set.camera;
     begin_set(edit, OBJECT_CAMERA, &camera->base, message->camera, message->name);
-    camera->fov_y = message->fov_y;
-    camera->height = message->height;
-    camera->near = message->near;
+    camera->value = message->value;
 }
 
 static bool from_environment(const struct edit_source *source, const struct message_set_environment *message,
@@ -210,23 +154,14 @@ static bool from_environment(const struct edit_source *source, const struct mess
 {
     struct scene_environment *environment = &edit->set.environment;
     edit->kind = EDIT_SET_ENVIRONMENT;
-    memcpy(environment->colour, message->colour, sizeof(environment->colour));
-    environment->rotation = message->rotation;
-    environment->backdrop = message->backdrop != 0;
-    environment->display_values = message->display_values != 0;
-    environment->light_group = message->light_group;
-    environment->keeps_image = message->keeps_image != 0;
-    if (environment->keeps_image)
+    environment->value = message->value;
+    if (environment->value.keeps_image) {
+        environment->value.width = environment->value.height = 0;
         return true;
-    uint32_t limit_texels = source->texture_edge_texels;
-    if (message->width > limit_texels || message->height > limit_texels) {
-        error_set(error, ERROR_LIMIT, "set_environment", "%u x %u texels, the limit is %u a side", message->width,
-                  message->height, limit_texels);
-        return error_remedy(error, texture_remedy);
     }
-    environment->width = message->width;
-    environment->height = message->height;
-    return take_blob(source, message->arrays, message->arrays_count, 0, "set_environment", 0, &environment->texels,
+    return check_texels(source, "set_environment", "the image", environment->value.width,
+                        environment->value.height, error) &&
+           take_blob(source, message->arrays, message->arrays_count, 0, "set_environment", 0, &environment->texels,
                      error);
 }
 
@@ -235,7 +170,7 @@ static bool from_skin(const struct edit_source *source, const struct message_set
 {
     struct scene_skin *skin = &edit->set.skin;
     begin_set(edit, OBJECT_SKIN, &skin->base, message->skin, message->name);
-    skin->joint_count = message->joint_count;
+    skin->value = message->value;
     return take_blob(source, message->arrays, message->arrays_count, 0, "set_skin", message->skin, &skin->joints,
                      error) &&
            take_blob(source, message->arrays, message->arrays_count, 1, "set_skin", message->skin,
@@ -255,14 +190,7 @@ static void from_channel(const struct message_set_channel *message, struct scene
 {
     struct scene_channel *channel = &edit->set.channel;
     begin_set(edit, OBJECT_CHANNEL, &channel->base, message->channel, "");
-    channel->clip = message->clip;
-    channel->path = (enum channel_path)message->path;
-    channel->object = message->object;
-    channel->interpolation = (enum interpolation)message->interpolation;
-    channel->width = message->width;
-    channel->key_count = message->key_count;
-    channel->first_time = message->first_time;
-    channel->first_value = message->first_value;
+    channel->value = message->value;
 }
 
 bool edit_from_message(const struct edit_source *source, const struct message *message, struct scene_edit *edit,

@@ -21,11 +21,7 @@ struct sink {
     const atomic_bool *abandoned;
     size_t objects;
     bool failed;
-    /* Of the message that is being made. */
-    struct record_blob_ref arrays[MESH_ARRAY_COUNT];
-    struct record_material_range *ranges; /* owned */
-    struct record_morph_weight *weights;  /* owned */
-    size_t range_capacity, weight_capacity;
+    struct record_blob_ref arrays[MESH_ARRAY_COUNT]; /* of the message that is being made */
 };
 
 static bool fail(struct sink *sink)
@@ -89,27 +85,11 @@ static uint16_t put_blobs(struct sink *sink, struct blob *const *blobs, uint16_t
     return used;
 }
 
-static uint16_t put_ranges(struct sink *sink, const struct material_range *ranges, uint32_t count)
+/* The scene's weights as the message has them, which only reads them. */
+static struct record_morph_weight *weights_of(float *weights)
 {
-    void *array = sink->ranges;
-    if (count > UINT16_MAX || !grow(sink, &array, &sink->range_capacity, count, sizeof(*sink->ranges)))
-        return (uint16_t)fail(sink);
-    sink->ranges = array;
-    for (uint32_t i = 0; i < count; i++)
-        sink->ranges[i] = (struct record_material_range){
-            .first = ranges[i].first, .count = ranges[i].count, .material = ranges[i].material};
-    return (uint16_t)count;
-}
-
-static uint16_t put_weights(struct sink *sink, const float *weights, uint32_t count)
-{
-    void *array = sink->weights;
-    if (count > UINT16_MAX || !grow(sink, &array, &sink->weight_capacity, count, sizeof(*sink->weights)))
-        return (uint16_t)fail(sink);
-    sink->weights = array;
-    for (uint32_t i = 0; i < count; i++)
-        sink->weights[i] = (struct record_morph_weight){.weight = weights[i]};
-    return (uint16_t)count;
+    _Static_assert(sizeof(struct record_morph_weight) == sizeof(float), "a weight is one float");
+    return (struct record_morph_weight *)(void *)weights;
 }
 
 static void put_node(struct sink *sink, const struct scene_node *node)
@@ -118,15 +98,9 @@ static void put_node(struct sink *sink, const struct scene_node *node)
     message_init(&message, MESSAGE_SET_NODE);
     struct message_set_node *set = &message.set_node;
     set->node = node->base.id;
-    set->parent = node->parent;
-    set->kind = (enum protocol_node_kind)node->kind;
-    set->object = node->object;
-    set->hidden = node->hidden;
-    memcpy(set->parent_from_node, node->parent_from_node, sizeof(set->parent_from_node));
-    set->skin = node->skin;
-    set->light_group = node->light_group;
-    set->weights_count = put_weights(sink, node->weights, node->weight_count);
-    set->weights = sink->weights;
+    set->value = node->value;
+    set->weights = weights_of(node->weights);
+    set->weights_count = node->weight_count;
     set->name = node->base.name;
     put(sink, &message);
 }
@@ -137,17 +111,13 @@ static void put_mesh(struct sink *sink, const struct scene_mesh *mesh)
     message_init(&message, MESSAGE_SET_MESH);
     struct message_set_mesh *set = &message.set_mesh;
     set->mesh = mesh->base.id;
-    set->vertex_count = mesh->vertex_count;
-    set->triangle_count = mesh->triangle_count;
-    set->influence_count = mesh->influence_count;
-    set->target_count = mesh->target_count;
-    set->closed = mesh->closed;
+    set->value = mesh->value;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, mesh->arrays, MESH_ARRAY_COUNT);
-    set->ranges_count = put_ranges(sink, mesh->ranges, mesh->range_count);
-    set->ranges = sink->ranges;
-    set->weights_count = put_weights(sink, mesh->weights, mesh->weight_count);
-    set->weights = sink->weights;
+    set->ranges = mesh->ranges;
+    set->ranges_count = mesh->range_count;
+    set->weights = weights_of(mesh->weights);
+    set->weights_count = mesh->weight_count;
     set->name = mesh->base.name;
     put(sink, &message);
 }
@@ -158,11 +128,11 @@ static void put_spheres(struct sink *sink, const struct scene_spheres *spheres)
     message_init(&message, MESSAGE_SET_SPHERES);
     struct message_set_spheres *set = &message.set_spheres;
     set->spheres = spheres->base.id;
-    set->sphere_count = spheres->sphere_count;
+    set->value = spheres->value;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &spheres->centres_radii, 1);
-    set->ranges_count = put_ranges(sink, spheres->ranges, spheres->range_count);
-    set->ranges = sink->ranges;
+    set->ranges = spheres->ranges;
+    set->ranges_count = spheres->range_count;
     set->name = spheres->base.name;
     put(sink, &message);
 }
@@ -173,10 +143,7 @@ static void put_disc(struct sink *sink, const struct scene_disc *disc)
     message_init(&message, MESSAGE_SET_DISC);
     struct message_set_disc *set = &message.set_disc;
     set->disc = disc->base.id;
-    set->material = disc->material;
-    memcpy(set->centre_world, disc->centre_world, sizeof(set->centre_world));
-    memcpy(set->normal_world, disc->normal_world, sizeof(set->normal_world));
-    set->radius = disc->radius;
+    set->value = disc->value;
     set->name = disc->base.name;
     put(sink, &message);
 }
@@ -188,49 +155,11 @@ static void put_material(struct sink *sink, const struct scene_material *materia
     message_init(&message, MESSAGE_SET_MATERIAL);
     struct message_set_material *set = &message.set_material;
     set->material = material->base.id;
-    set->alpha_mode = (enum protocol_alpha_mode)material->alpha_mode;
-    set->double_sided = material->double_sided;
-    set->unlit = material->unlit;
-    memcpy(set->base_colour, material->base_colour, sizeof(set->base_colour));
-    memcpy(set->emission, material->emission, sizeof(set->emission));
-    set->metallic = material->metallic;
-    set->roughness = material->roughness;
-    set->transmission = material->transmission;
-    set->ior = material->ior;
-    set->alpha_cutoff = material->alpha_cutoff;
-    set->anisotropy = material->anisotropy;
-    set->anisotropy_rotation = material->anisotropy_rotation;
-    set->emission_seen_only = material->emission_seen_only;
-    set->specular = material->specular;
-    set->specular_red = material->specular_colour[0];
-    set->specular_green = material->specular_colour[1];
-    set->specular_blue = material->specular_colour[2];
-    set->attenuation_distance = material->attenuation_distance;
-    set->attenuation_red = material->attenuation[0];
-    set->attenuation_green = material->attenuation[1];
-    set->attenuation_blue = material->attenuation[2];
-    set->thickness = material->thickness;
-    set->clearcoat = material->clearcoat;
-    set->clearcoat_roughness = material->clearcoat_roughness;
-    memcpy(set->sheen, material->sheen, sizeof(set->sheen));
-    set->sheen_roughness = material->sheen_roughness;
-    set->iridescence = material->iridescence;
-    set->iridescence_ior = material->iridescence_ior;
-    set->iridescence_minimum_nm = material->iridescence_minimum_nm;
-    set->iridescence_maximum_nm = material->iridescence_maximum_nm;
-    set->dispersion = material->dispersion;
-    set->diffuse_transmission = material->diffuse_transmission;
-    set->diffuse_transmission_red = material->diffuse_transmission_colour[0];
-    set->diffuse_transmission_green = material->diffuse_transmission_colour[1];
-    set->diffuse_transmission_blue = material->diffuse_transmission_colour[2];
-    set->thin_walled = material->thin_walled;
-    for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++) {
-        const struct texture_use *use = &material->textures[i];
-        textures[i] = (struct record_texture_use){
-            .texture = use->texture, .texcoord_set = use->texcoord_set, .strength = use->strength};
-        memcpy(textures[i].uv_transform, use->uv_transform, sizeof(textures[i].uv_transform));
-        if (use->texture)
-            set->textures_count = (uint16_t)(i + 1);
+    set->value = material->value;
+    memcpy(textures, material->textures, sizeof(textures));
+    for (uint32_t i = 0; i < MATERIAL_TEXTURE_COUNT; i++) {
+        if (material->textures[i].texture)
+            set->textures_count = i + 1;
     }
     set->textures = textures;
     set->name = material->base.name;
@@ -243,12 +172,7 @@ static void put_texture(struct sink *sink, const struct scene_texture *texture)
     message_init(&message, MESSAGE_SET_TEXTURE);
     struct message_set_texture *set = &message.set_texture;
     set->texture = texture->base.id;
-    set->width = texture->width;
-    set->height = texture->height;
-    set->format = (enum protocol_texture_format)texture->format;
-    set->wrap_u = (enum protocol_wrap)texture->wrap_u;
-    set->wrap_v = (enum protocol_wrap)texture->wrap_v;
-    set->nearest = texture->nearest;
+    set->value = texture->value;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &texture->texels, 1);
     set->name = texture->base.name;
@@ -261,12 +185,7 @@ static void put_light(struct sink *sink, const struct scene_light *light)
     message_init(&message, MESSAGE_SET_LIGHT);
     struct message_set_light *set = &message.set_light;
     set->light = light->base.id;
-    set->kind = (enum protocol_light_kind)light->kind;
-    memcpy(set->colour, light->colour, sizeof(set->colour));
-    set->range = light->range;
-    set->inner_cone = light->inner_cone;
-    set->outer_cone = light->outer_cone;
-    memcpy(set->size, light->size, sizeof(set->size));
+    set->value = light->value;
     set->name = light->base.name;
     put(sink, &message);
 }
@@ -277,9 +196,7 @@ static void put_camera(struct sink *sink, const struct scene_camera *camera)
     message_init(&message, MESSAGE_SET_CAMERA);
     struct message_set_camera *set = &message.set_camera;
     set->camera = camera->base.id;
-    set->fov_y = camera->fov_y;
-    set->height = camera->height;
-    set->near = camera->near;
+    set->value = camera->value;
     set->name = camera->base.name;
     put(sink, &message);
 }
@@ -291,7 +208,7 @@ static void put_skin(struct sink *sink, const struct scene_skin *skin)
     message_init(&message, MESSAGE_SET_SKIN);
     struct message_set_skin *set = &message.set_skin;
     set->skin = skin->base.id;
-    set->joint_count = skin->joint_count;
+    set->value = skin->value;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, arrays, 2);
     set->name = skin->base.name;
@@ -315,14 +232,7 @@ static void put_channel(struct sink *sink, const struct scene_channel *channel)
     message_init(&message, MESSAGE_SET_CHANNEL);
     struct message_set_channel *set = &message.set_channel;
     set->channel = channel->base.id;
-    set->clip = channel->clip;
-    set->path = (enum protocol_channel_path)channel->path;
-    set->object = channel->object;
-    set->interpolation = (enum protocol_interpolation)channel->interpolation;
-    set->width = channel->width;
-    set->key_count = channel->key_count;
-    set->first_time = channel->first_time;
-    set->first_value = channel->first_value;
+    set->value = channel->value;
     put(sink, &message);
 }
 
@@ -331,14 +241,7 @@ static void put_environment(struct sink *sink, const struct scene_environment *e
     struct message message;
     message_init(&message, MESSAGE_SET_ENVIRONMENT);
     struct message_set_environment *set = &message.set_environment;
-    memcpy(set->colour, environment->colour, sizeof(set->colour));
-    set->rotation = environment->rotation;
-    set->width = environment->width;
-    set->height = environment->height;
-    set->backdrop = environment->backdrop ? 1 : 0;
-    set->keeps_image = environment->keeps_image ? 1 : 0;
-    set->display_values = environment->display_values ? 1 : 0;
-    set->light_group = environment->light_group;
+    set->value = environment->value;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &environment->texels, 1);
     put(sink, &message);
@@ -404,8 +307,6 @@ bool scene_record_object(const struct scene_edit *object,
 {
     struct sink sink = {.take = take, .context = context};
     put_object(&sink, object->object, &object->set);
-    free(sink.ranges);
-    free(sink.weights);
     return !sink.failed;
 }
 
@@ -427,8 +328,6 @@ bool scene_record_write(struct store_record *record, const struct scene *scene, 
         put_objects(&sink, (enum object_kind)kind, &scene->objects[kind]);
     if (scene->environment.revision)
         put_environment(&sink, &scene->environment);
-    free(sink.ranges);
-    free(sink.weights);
     return !sink.failed;
 }
 

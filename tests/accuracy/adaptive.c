@@ -12,8 +12,8 @@ enum { WIDTH = 64, HEIGHT = 32, ACROSS = WIDTH / 8, TILES = ACROSS * (HEIGHT / 8
 static void half_noisy(struct fixture *fixture)
 {
     struct scene_material *flat = fixture_material(fixture), *wall = fixture_material(fixture);
-    flat->unlit = true;
-    flat->base_colour[0] = 0.5f;
+    flat->value.unlit = true;
+    flat->value.base_colour[0] = 0.5f;
     const float before[12] = {1, 0, 0, -10, 0, 1, 0, 0, 0, 0, 1, 1.0f};
     fixture_square(fixture, 10.0f, flat->base.id, before);
     fixture_square(fixture, 10.0f, wall->base.id, NULL);
@@ -210,7 +210,7 @@ TEST(a_picture_without_noise_has_the_fewest_samples_and_is_handed_out_again)
 {
     struct fixture *fixture = *state;
     struct scene_material *flat = fixture_material(fixture);
-    flat->unlit = true;
+    flat->value.unlit = true;
     fixture_square(fixture, 10.0f, flat->base.id, NULL);
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 1.0f;

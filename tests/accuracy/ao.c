@@ -150,8 +150,8 @@ TEST(blended_panes_count_by_half)
     const float above[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.0f};
     begin(fixture, TRACER_BVH);
     struct scene_material *pane = fixture_material(fixture);
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.5f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.5f;
     fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
     fixture_square(fixture, 400.0f, pane->base.id, above);
     look_down(fixture, 1.0f);

@@ -148,7 +148,7 @@ static void make_at_vertices(struct arena *arena)
         if (!mesh)
             continue;
         const float *vertex = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data +
-                              3 * (size_t)(test_random(&seed) % mesh->vertex_count);
+                              3 * (size_t)(test_random(&seed) % mesh->value.vertex_count);
         float direction[3];
         for (int k = 0; k < 3; k++) {
             const float *m = instance->world_from_object[k];

@@ -24,14 +24,14 @@ static struct scene_material *a_checker(struct fixture *fixture, const float pla
     path_begin(fixture, TRACER_BVH, 2);
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = TEXELS;
-    texture->format = TEXTURE_RGBA8_LINEAR;
-    texture->nearest = true;
+    texture->value.width = texture->value.height = TEXELS;
+    texture->value.format = TEXTURE_RGBA8_LINEAR;
+    texture->value.nearest = true;
     texture->texels = fixture_blob(texels, sizeof(texels));
     struct scene_material *material = fixture_material(fixture), *dark = fixture_material(fixture);
-    material->textures[MATERIAL_BASE_COLOUR] =
-        (struct texture_use){.texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
-    dark->base_colour[0] = dark->base_colour[1] = dark->base_colour[2] = 0.0f;
+    material->textures[MATERIAL_BASE_COLOUR] = (struct record_texture_use){
+        .texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
+    dark->value.base_colour[0] = dark->value.base_colour[1] = dark->value.base_colour[2] = 0.0f;
     fixture_square(fixture, 1.0f, material->base.id, place);
     fixture_sphere(fixture, 1.5f, 0.0f, 0.5f * place[10] + place[11], 0.5f, dark->base.id);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
@@ -104,7 +104,7 @@ TEST(an_exposure_for_what_is_dark_filters_no_less)
 {
     struct fixture *fixture = *state;
     struct scene_material *wall = a_checker(fixture, FRONT);
-    wall->base_colour[0] = wall->base_colour[1] = wall->base_colour[2] = 1.0f / 32.0f;
+    wall->value.base_colour[0] = wall->value.base_colour[1] = wall->value.base_colour[2] = 1.0f / 32.0f;
     struct frame_result noisy = rendered(fixture, DENOISE_OFF, 16, 1),
                         usual = rendered(fixture, DENOISE_ON, 16, 1);
     fixture->request.exposure_stops = 5.0f;
@@ -124,8 +124,8 @@ TEST_LONG(so_it_does_in_a_mirror)
     struct fixture *fixture = *state;
     a_checker(fixture, BACK);
     struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
     fixture_square(fixture, 1.0f, mirror->base.id, FRONT);
     expect_detail_without_noise(fixture);
 }

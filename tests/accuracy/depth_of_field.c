@@ -12,7 +12,7 @@ enum { WIDTH = 64, HEIGHT = 32 };
 static void an_edge(struct fixture *fixture)
 {
     struct scene_material *material = fixture_material(fixture);
-    material->unlit = true;
+    material->value.unlit = true;
     const float parent_from_node[12] = {1, 0, 0, 50, 0, 1, 0, 0, 0, 0, 1, EDGE_Z};
     fixture_square(fixture, 50.0f, material->base.id, parent_from_node);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 1.0f); /* so that there is no default sky */
@@ -132,7 +132,7 @@ TEST(nothing_before_the_near_plane_is_seen_through_a_lens)
 {
     struct fixture *fixture = *state;
     struct scene_material *material = fixture_material(fixture);
-    material->unlit = true;
+    material->value.unlit = true;
     fixture_square(fixture, 50.0f, material->base.id, NULL);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 1.0f);
     fixture->request.aperture = 2.0f;

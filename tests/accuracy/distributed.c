@@ -11,8 +11,8 @@
 static void a_light(struct fixture *fixture, enum light_kind kind, float x, float y, float z, float power)
 {
     struct scene_light *light = fixture_light(fixture, kind, x, y, z, power);
-    light->size[0] = light->size[1] = 0.8f;
-    light->outer_cone = 1.2f;
+    light->value.size[0] = light->value.size[1] = 0.8f;
+    light->value.outer_cone = 1.2f;
 }
 
 /* Diffuse, mirror and glass, all smooth, a pane that is half open, and lights without a size. */
@@ -21,18 +21,18 @@ static void smooth_things(struct fixture *fixture)
     struct scene_material *ground = fixture_material(fixture), *mirror = fixture_material(fixture),
                           *glass = fixture_material(fixture), *pane = fixture_material(fixture),
                           *varnish = fixture_material(fixture);
-    ground->base_colour[1] = 0.6f;
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
-    mirror->base_colour[2] = 0.5f;
-    glass->transmission = 1.0f;
-    glass->roughness = 0.0f;
-    glass->ior = 1.5f;
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.5f;
-    varnish->roughness = 0.0f;
-    varnish->ior = 1.6f;
-    varnish->base_colour[0] = 0.3f;
+    ground->value.base_colour[1] = 0.6f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
+    mirror->value.base_colour[2] = 0.5f;
+    glass->value.transmission = 1.0f;
+    glass->value.roughness = 0.0f;
+    glass->value.ior = 1.5f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.5f;
+    varnish->value.roughness = 0.0f;
+    varnish->value.ior = 1.6f;
+    varnish->value.base_colour[0] = 0.3f;
     fixture_sphere(fixture, -0.8f, 0.3f, 0.0f, 0.5f, mirror->base.id);
     fixture_sphere(fixture, 0.5f, 0.4f, 0.5f, 0.5f, glass->base.id);
     fixture_sphere(fixture, 0.2f, -0.7f, 0.2f, 0.4f, varnish->base.id);
@@ -61,10 +61,10 @@ static void a_soft_shadow(struct fixture *fixture)
 static void gloss(struct fixture *fixture)
 {
     struct scene_material *wall = fixture_material(fixture), *glow = fixture_material(fixture);
-    wall->metallic = 1.0f;
-    wall->roughness = 0.35f;
-    glow->unlit = true;
-    glow->base_colour[1] = 0.3f;
+    wall->value.metallic = 1.0f;
+    wall->value.roughness = 0.35f;
+    glow->value.unlit = true;
+    glow->value.base_colour[1] = 0.3f;
     fixture_square(fixture, 4.0f, wall->base.id, NULL);
     fixture_sphere(fixture, 1.3f, 0.2f, 0.8f, 0.6f, glow->base.id);
     fixture_sphere(fixture, -1.4f, -0.4f, 0.6f, 0.5f, glow->base.id);
@@ -75,10 +75,10 @@ static void gloss(struct fixture *fixture)
 static void frosted_glass(struct fixture *fixture)
 {
     struct scene_material *glass = fixture_material(fixture), *glow = fixture_material(fixture);
-    glass->transmission = 1.0f;
-    glass->roughness = 0.4f;
-    glass->ior = 1.4f;
-    glow->unlit = true;
+    glass->value.transmission = 1.0f;
+    glass->value.roughness = 0.4f;
+    glass->value.ior = 1.4f;
+    glow->value.unlit = true;
     fixture_sphere(fixture, 0.0f, 0.0f, 1.0f, 0.9f, glass->base.id);
     for (int i = 0; i < 5; i++)
         fixture_sphere(fixture, -1.6f + 0.8f * (float)i, (i % 2 ? 0.5f : -0.5f), -1.0f, 0.4f, glow->base.id);
@@ -101,8 +101,8 @@ static void in_motion(struct fixture *fixture)
 {
     a_soft_shadow(fixture);
     struct scene_material *glow = fixture_material(fixture);
-    glow->unlit = true;
-    glow->base_colour[1] = 0.8f;
+    glow->value.unlit = true;
+    glow->value.base_colour[1] = 0.8f;
     fixture_sphere(fixture, -0.6f, 0.0f, 0.8f, 0.3f, glow->base.id);
     for (int i = 0; i < 2; i++) {
         fall[i] =
@@ -216,7 +216,7 @@ TEST(a_moving_surface_covers_a_pixel_for_the_share_of_time_it_is_in_it)
     enum { WIDTH = 16, SAMPLES = 256 };
     fixture_clear(state);
     struct scene_material *glow = fixture_material(fixture);
-    glow->unlit = true;
+    glow->value.unlit = true;
     const float square[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     fixture_square(fixture, 0.5f, glow->base.id, square); /* 1 high */
     uint32_t node = fixture->next_id - 1;

@@ -26,10 +26,10 @@ static struct scene_material *a_lamp(struct fixture *fixture, float half, float 
 {
     struct scene_material *glow = a_square(fixture, half, x, z, 1.0f);
     for (int c = 0; c < 3; c++) {
-        glow->base_colour[c] = 0.0f;
-        glow->emission[c] = radiance;
+        glow->value.base_colour[c] = 0.0f;
+        glow->value.emission[c] = radiance;
     }
-    glow->alpha_mode = ALPHA_MASK;
+    glow->value.alpha_mode = ALPHA_MASK;
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 0.0f);
     return glow;
 }
@@ -85,8 +85,8 @@ TEST(what_one_rough_surface_or_smooth_ones_scatter_stays_to_the_byte)
             begin(fixture, integrators[i], smooth ? 4 : 1);
             struct scene_material *floor = a_square(fixture, 2.0f, 0.0f, 0.0f, 1.0f),
                                   *ceiling = a_square(fixture, 2.0f, 1.0f, 3.0f, -1.0f);
-            floor->metallic = ceiling->metallic = smooth ? 1.0f : 0.5f;
-            floor->roughness = ceiling->roughness = smooth ? 0.0f : 0.4f;
+            floor->value.metallic = ceiling->value.metallic = smooth ? 1.0f : 0.5f;
+            floor->value.roughness = ceiling->value.roughness = smooth ? 0.0f : 0.4f;
             a_lamp(fixture, 0.2f, 0.0f, 2.0f, 1000.0f);
             fixture_look(fixture, 0.5f, -2.5f, 2.0f, 0.8f);
             float *off = picture(fixture, 0.0f, 4, 1), *on = picture(fixture, 1.0f, 4, 1);
@@ -128,7 +128,7 @@ TEST(a_lamp_that_nearly_touches_a_surface_makes_no_specks)
     struct fixture *fixture = *state;
     begin(fixture, INTEGRATOR_DISTRIBUTED, 1);
     a_square(fixture, 2.0f, 0.0f, 0.0f, 1.0f);
-    a_lamp(fixture, 0.3f, 0.0f, 0.01f, 1.0f)->alpha_mode = ALPHA_OPAQUE;
+    a_lamp(fixture, 0.3f, 0.0f, 0.01f, 1.0f)->value.alpha_mode = ALPHA_OPAQUE;
     fixture_look(fixture, 1.0f, 0.2f, 0.5f, 0.6f);
     const struct summary off = summary_of(fixture, 0.0f, 4), on = summary_of(fixture, 10.0f, 4);
     print_message("maximum %.3f, mean %.4f\n", off.most, off.mean);
@@ -162,12 +162,12 @@ TEST_LONG(mirrors_behind_rough_surfaces_cast_their_light_with_less_noise)
     begin(fixture, INTEGRATOR_PATH, 2);
     a_square(fixture, 30.0f, 0.0f, 0.0f, 1.0f);
     struct scene_material *mirror = a_square(fixture, 30.0f, 0.0f, 2.0f, -1.0f);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
     struct scene_material *plate = a_square(fixture, 0.5f, 0.0f, 0.9f, -1.0f);
-    plate->base_colour[0] = plate->base_colour[1] = plate->base_colour[2] = 0.0f;
+    plate->value.base_colour[0] = plate->value.base_colour[1] = plate->value.base_colour[2] = 0.0f;
     struct scene_light *light = fixture_light(fixture, LIGHT_SPHERE, 0.0f, 0.0f, 1.0f, 100.0f);
-    light->size[0] = 0.05f;
+    light->value.size[0] = 0.05f;
     fixture_look(fixture, 0.0f, 0.0f, 0.8f, 0.0f);
     fixture->request.camera.ortho_height = 6.0f;
     const double sharp = noise_of(fixture, 0.0f, 64, &mean), blurred = noise_of(fixture, 1e6f, 64, &means[1]);

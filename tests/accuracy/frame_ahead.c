@@ -179,8 +179,8 @@ TEST(rays_behind_the_last_queued_wave_are_not_lost)
 {
     struct fixture *fixture = *state;
     struct scene_material *pane = fixture_material(fixture);
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.1f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.1f;
     for (int i = 0; i < PANES; i++) {
         const float at[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -0.05f * (float)i};
         fixture_square(fixture, 1.0f, pane->base.id, at);

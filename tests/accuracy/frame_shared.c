@@ -10,13 +10,13 @@ static uint32_t build_scene(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture), *mirror = fixture_material(fixture),
                           *glass = fixture_material(fixture);
-    ground->roughness = 0.4f;
-    ground->ior = 1.5f;
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.1f;
-    glass->transmission = 1.0f;
-    glass->roughness = 0.0f;
-    glass->ior = 1.5f;
+    ground->value.roughness = 0.4f;
+    ground->value.ior = 1.5f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.1f;
+    glass->value.transmission = 1.0f;
+    glass->value.roughness = 0.0f;
+    glass->value.ior = 1.5f;
     fixture_square(fixture, 6.0f, ground->base.id, NULL);
     uint32_t node = fixture->next_id - 1;
     fixture_sphere(fixture, -0.7f, 0.2f, 0.7f, 0.6f, mirror->base.id);

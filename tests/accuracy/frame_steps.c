@@ -36,15 +36,15 @@ static void a_crowded_scene(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture), *mirror = fixture_material(fixture),
                           *glass = fixture_material(fixture), *pane = fixture_material(fixture);
-    ground->roughness = 0.2f;
-    ground->ior = 1.5f;
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
-    glass->transmission = 1.0f;
-    glass->roughness = 0.0f;
-    glass->ior = 1.5f;
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.5f;
+    ground->value.roughness = 0.2f;
+    ground->value.ior = 1.5f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
+    glass->value.transmission = 1.0f;
+    glass->value.roughness = 0.0f;
+    glass->value.ior = 1.5f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.5f;
     const float before[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.5f};
     fixture_square(fixture, 9.0f, ground->base.id, NULL);
     fixture_square(fixture, 1.0f, pane->base.id, before);
@@ -182,13 +182,13 @@ static void a_field(struct fixture *fixture, uint32_t material, uint32_t columns
     }
     struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
-    mesh->vertex_count = vertices;
-    mesh->triangle_count = 2 * squares;
+    mesh->value.vertex_count = vertices;
+    mesh->value.triangle_count = 2 * squares;
     mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, vertices * sizeof(*positions));
     mesh->arrays[MESH_INDICES] = fixture_blob(indices, squares * sizeof(*indices));
     mesh->ranges = calloc(1, sizeof(*mesh->ranges));
     assert_non_null(mesh->ranges);
-    *mesh->ranges = (struct material_range){0, 2 * squares, material};
+    *mesh->ranges = (struct record_material_range){0, 2 * squares, material};
     mesh->range_count = 1;
     fixture_node(fixture, NODE_MESH, mesh->base.id, NULL);
     const float above[12] = {0.4f, 0, 0, 0.3f, 0, 0.4f, 0, 0.2f, 0, 0, 0.4f, 0.5f}; /* a second instance */
@@ -221,7 +221,7 @@ TEST(many_triangles_are_drawn_in_parts_and_none_is_left_out)
 {
     struct fixture *fixture = *state;
     struct scene_material *ground = fixture_material(fixture), *ball = fixture_material(fixture);
-    ball->base_colour[0] = 0.2f;
+    ball->value.base_colour[0] = 0.2f;
     a_field(fixture, ground->base.id, 400, 300);                     /* more than are drawn in one step */
     fixture_sphere(fixture, -0.8f, 0.4f, 0.4f, 0.4f, ball->base.id); /* drawn after all triangles */
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);
@@ -251,8 +251,8 @@ TEST(many_triangles_are_drawn_in_parts_and_none_is_left_out)
 static void a_field_and_a_ball(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture), *ball = fixture_material(fixture);
-    ball->metallic = 1.0f;
-    ball->roughness = 0.1f;
+    ball->value.metallic = 1.0f;
+    ball->value.roughness = 0.1f;
     a_field(fixture, ground->base.id, 200, 150);
     fixture_sphere(fixture, -0.8f, 0.4f, 0.4f, 0.4f, ball->base.id);
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);

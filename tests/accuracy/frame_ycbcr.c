@@ -13,13 +13,13 @@
 static void build_scene(struct fixture *fixture)
 {
     struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
     fixture_sphere(fixture, 0.0f, 0.0f, 0.8f, 0.5f, mirror->base.id);
     for (int i = 0; i < 12; i++) {
         struct scene_material *glow = fixture_material(fixture);
         for (int k = 0; k < 3; k++)
-            glow->emission[k] = (float)((i * (k + 3) + k) % 7) / (i < 9 ? 6.0f : 2.0f);
+            glow->value.emission[k] = (float)((i * (k + 3) + k) % 7) / (i < 9 ? 6.0f : 2.0f);
         float angle = (float)i * 0.5236f;
         fixture_sphere(fixture, 1.1f * cosf(angle), 1.1f * sinf(angle), 0.0f, 0.45f, glow->base.id);
     }

@@ -17,8 +17,8 @@ static void begin(struct fixture *fixture, enum integrator_kind integrator)
 {
     fixture_clear((void **)&fixture);
     struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, (float)RADIUS, mirror->base.id);
     fixture->request.width = fixture->request.height = EDGE;
     fixture->request.filter = FILTER_BOX;
@@ -35,7 +35,7 @@ static void sun(struct fixture *fixture, float irradiance)
 {
     const float down[12] = {1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0};
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, irradiance);
-    memcpy(fixture->edits[fixture->edit_count - 1].set.node.parent_from_node, down, sizeof(down));
+    memcpy(fixture->edits[fixture->edit_count - 1].set.node.value.parent_from_node, down, sizeof(down));
 }
 
 /* Where the ray through a place of the picture meets the ground: its distance from the axis below the sphere.

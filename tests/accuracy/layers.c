@@ -94,10 +94,10 @@ TEST(planes_are_where_they_are_and_look_to_the_eye)
     for (int way = 0; way < 4; way++) { /* which side, and how first hits are found */
         if (way == 2) {
             const float away[12] = {-c, 0, -s, 0, 0, 1, 0, 0.3f, s, 0, -c, -1};
-            memcpy(fixture_edit(fixture, OBJECT_NODE)->set.node.parent_from_node, away, sizeof(away));
+            memcpy(fixture_edit(fixture, OBJECT_NODE)->set.node.value.parent_from_node, away, sizeof(away));
             fixture->edits[0].set.node.base.id = node;
-            fixture->edits[0].set.node.kind = NODE_MESH;
-            fixture->edits[0].set.node.object = node - 1;
+            fixture->edits[0].set.node.value.kind = NODE_MESH;
+            fixture->edits[0].set.node.value.object = node - 1;
         }
         fixture->request.primary = way % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
         for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? sizeof(tracers) / sizeof(tracers[0]) : 1); i++) {
@@ -131,7 +131,7 @@ TEST_LONG(sampled_structures_have_layers_too)
     const float c = cosf(0.3f), s = sinf(0.3f);
     const float at[12] = {c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, -1}, normal[3] = {s, 0, c}, middle[3] = {0, 0, -1};
     struct scene_material *red = fixture_material(fixture);
-    memcpy(red->base_colour, (float[4]){0.5f, 0.25f, 0.125f, 1}, sizeof(red->base_colour));
+    memcpy(red->value.base_colour, (float[4]){0.5f, 0.25f, 0.125f, 1}, sizeof(red->value.base_colour));
     uint32_t material = red->base.id;
     fixture_square(fixture, 5, material, at);
     fixture->request.primary = PRIMARY_TRACE;
@@ -159,14 +159,14 @@ TEST(albedo_is_the_textures_colour_and_covers_what_is_seen)
         {255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 255, 255}, {51, 102, 204, 255}};
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = 2;
-    texture->format = TEXTURE_RGBA8_LINEAR;
-    texture->nearest = true;
+    texture->value.width = texture->value.height = 2;
+    texture->value.format = TEXTURE_RGBA8_LINEAR;
+    texture->value.nearest = true;
     texture->texels = fixture_blob(texels, sizeof(texels));
     uint32_t image = texture->base.id;
     struct scene_material *material = fixture_material(fixture);
-    material->metallic = 1;
-    material->base_colour[0] = 0.5f;
+    material->value.metallic = 1;
+    material->value.base_colour[0] = 0.5f;
     use_texture(material, MATERIAL_BASE_COLOUR, image);
     fixture_square(fixture, 1, material->base.id, NULL);
     for (uint32_t samples = 1; samples <= 16; samples *= 16) {
@@ -196,8 +196,8 @@ TEST(glass_and_what_is_blended_is_what_is_seen)
     struct fixture *fixture = *state;
     const float behind[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -1};
     struct scene_material *veil = fixture_material(fixture);
-    veil->alpha_mode = ALPHA_BLEND;
-    memcpy(veil->base_colour, (float[4]){0.25f, 0.5f, 0.75f, 0.125f}, sizeof(veil->base_colour));
+    veil->value.alpha_mode = ALPHA_BLEND;
+    memcpy(veil->value.base_colour, (float[4]){0.25f, 0.5f, 0.75f, 0.125f}, sizeof(veil->value.base_colour));
     uint32_t material = veil->base.id;
     fixture_square(fixture, 5, 0, behind);
     fixture_square(fixture, 5, material, NULL);
@@ -231,10 +231,10 @@ TEST(identifiers_are_the_clients)
     uint32_t sphere_node = fixture->next_id - 1;
     struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
     disc->base.id = fixture->next_id++;
-    disc->material = materials[2];
-    disc->normal_world[2] = 1;
-    disc->centre_world[0] = 1;
-    disc->radius = 0.4f;
+    disc->value.material = materials[2];
+    disc->value.normal_world[2] = 1;
+    disc->value.centre_world[0] = 1;
+    disc->value.radius = 0.4f;
     fixture_commit(fixture);
     const unsigned tracers[] = {TRACER_BVH, TRACER_NAIVE, TRACER_BVH};
     for (int i = 0; i < 3; i++) {

@@ -45,7 +45,7 @@ static void build_mixture(struct fixture *fixture)
 {
     const float above[12] = {1, 0, 0, 0, 0, 0, -1, 2, 0, 1, 0, 0};
     struct scene_material *glow = fixture_material(fixture);
-    glow->emission[0] = glow->emission[1] = glow->emission[2] = 3.0f;
+    glow->value.emission[0] = glow->value.emission[1] = glow->value.emission[2] = 3.0f;
     fixture_square(fixture, 0.5f, glow->base.id, above);
     fixture_mixture(fixture);
     fixture->request.width = 24;
@@ -109,18 +109,19 @@ static void build_things(struct fixture *fixture)
                                                           turned ? -c : 0, 0, turned ? c : 1, 0};
         struct scene_material *material = fixture_material(fixture);
         if (i == MIRROR || turned) {
-            material->metallic = 1.0f;
-            material->roughness = 0.0f;
+            material->value.metallic = 1.0f;
+            material->value.roughness = 0.0f;
         } else if (i == GLOW) {
-            material->emission[0] = material->emission[1] = material->emission[2] = 2.0f;
-            material->base_colour[0] = material->base_colour[1] = material->base_colour[2] = 0.0f;
+            material->value.emission[0] = material->value.emission[1] = material->value.emission[2] = 2.0f;
+            material->value.base_colour[0] = material->value.base_colour[1] = material->value.base_colour[2] =
+                0.0f;
         } else if (i == GLASS) {
-            material->transmission = 1.0f;
-            material->roughness = 0.0f;
-            material->ior = 1.5f;
+            material->value.transmission = 1.0f;
+            material->value.roughness = 0.0f;
+            material->value.ior = 1.5f;
         } else if (i == VEIL) {
-            material->alpha_mode = ALPHA_BLEND;
-            memcpy(material->base_colour, (float[4]){0, 0, 0, 0.5f}, sizeof(material->base_colour));
+            material->value.alpha_mode = ALPHA_BLEND;
+            memcpy(material->value.base_colour, (float[4]){0, 0, 0, 0.5f}, sizeof(material->value.base_colour));
         }
         fixture_square(fixture, 0.9f, material->base.id, at);
     }
@@ -181,11 +182,11 @@ static void put_into_groups(struct fixture *fixture)
         struct scene_edit *edit = &fixture->edits[i];
         struct scene_node *node = &edit->set.node;
         if (edit->kind == EDIT_SET_ENVIRONMENT)
-            edit->set.environment.light_group = 4;
-        else if (edit->object == OBJECT_NODE && node->kind == NODE_LIGHT)
-            node->light_group = ++lights;
-        else if (edit->object == OBJECT_NODE && node->kind == NODE_MESH && squares++ == 0)
-            node->light_group = 3;
+            edit->set.environment.value.light_group = 4;
+        else if (edit->object == OBJECT_NODE && node->value.kind == NODE_LIGHT)
+            node->value.light_group = ++lights;
+        else if (edit->object == OBJECT_NODE && node->value.kind == NODE_MESH && squares++ == 0)
+            node->value.light_group = 3;
     }
 }
 
@@ -267,14 +268,14 @@ static void leave_group(struct fixture *fixture, uint32_t group)
         struct scene_edit *edit = &fixture->edits[i];
         if (edit->kind == EDIT_SET_ENVIRONMENT && group != 4)
             for (int c = 0; c < 3; c++)
-                edit->set.environment.colour[c] = 1e-9f;
+                edit->set.environment.value.colour[c] = 1e-9f;
         else if (edit->kind == EDIT_SET && edit->object == OBJECT_LIGHT && group > 2)
-            memset(edit->set.light.colour, 0, sizeof(edit->set.light.colour));
+            memset(edit->set.light.value.colour, 0, sizeof(edit->set.light.value.colour));
         else if (edit->kind == EDIT_SET && edit->object == OBJECT_LIGHT &&
-                 (edit->set.light.kind == LIGHT_POINT) != (group == 1))
-            memset(edit->set.light.colour, 0, sizeof(edit->set.light.colour));
+                 (edit->set.light.value.kind == LIGHT_POINT) != (group == 1))
+            memset(edit->set.light.value.colour, 0, sizeof(edit->set.light.value.colour));
         else if (edit->kind == EDIT_SET && edit->object == OBJECT_MATERIAL && group != 3)
-            memset(edit->set.material.emission, 0, sizeof(edit->set.material.emission));
+            memset(edit->set.material.value.emission, 0, sizeof(edit->set.material.value.emission));
     }
 }
 
@@ -327,7 +328,7 @@ TEST(light_that_does_not_add_up_has_no_layers)
     fixture_square(fixture, 1, 0, NULL);
     struct scene_edit *edit = fixture_edit(fixture, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
-    edit->set.environment.display_values = true;
+    edit->set.environment.value.display_values = true;
     fixture_commit(fixture);
     fixture->request.layers = ALL;
     fixture->request.integrator = INTEGRATOR_WHITTED;

@@ -48,10 +48,10 @@ static struct scene_material *a_glow(struct fixture *fixture, float half, float 
 {
     struct scene_material *glow = fixture_material(fixture);
     for (int c = 0; c < 3; c++) {
-        glow->base_colour[c] = 0.0f;
-        glow->emission[c] = radiance;
+        glow->value.base_colour[c] = 0.0f;
+        glow->value.emission[c] = radiance;
     }
-    glow->alpha_mode = sampled ? ALPHA_OPAQUE : ALPHA_MASK;
+    glow->value.alpha_mode = sampled ? ALPHA_OPAQUE : ALPHA_MASK;
     fixture_square(fixture, half, glow->base.id, place);
     return glow;
 }
@@ -147,11 +147,11 @@ static void add_light(struct fixture *fixture, enum kind kind)
         a_glow(fixture, HALF, 1.0f, kind == EMITTER, above);
     } else {
         struct scene_light *light = fixture_light(fixture, kinds[kind], 0.0f, 0.0f, HEIGHT, powers[kind]);
-        light->size[0] = light->size[1] = kind == RECTANGLE ? 2.0f * HALF : HALF;
-        light->inner_cone = 0.2f;
-        light->outer_cone = 0.6f;
+        light->value.size[0] = light->value.size[1] = kind == RECTANGLE ? 2.0f * HALF : HALF;
+        light->value.inner_cone = 0.2f;
+        light->value.outer_cone = 0.6f;
         if (kind == DIRECTION)
-            memcpy(fixture->edits[fixture->edit_count - 1].set.node.parent_from_node, slant, sizeof(slant));
+            memcpy(fixture->edits[fixture->edit_count - 1].set.node.value.parent_from_node, slant, sizeof(slant));
     }
 }
 
@@ -230,8 +230,8 @@ TEST(lights_are_visible_in_mirrors_and_not_directly)
     for (enum kind kind = RECTANGLE; kind <= SPHERE; kind++) {
         path_begin(fixture, TRACER_BVH, 1);
         struct scene_material *mirror = a_floor(fixture, 5.0f); /* the light is between */
-        mirror->metallic = 1.0f;
-        mirror->roughness = 0.0f;
+        mirror->value.metallic = 1.0f;
+        mirror->value.roughness = 0.0f;
         add_light(fixture, kind);
         struct frame_result result = fixture_render(fixture);
         for (uint32_t i = 0; i < PIXELS; i++) {
@@ -251,7 +251,7 @@ TEST(lights_are_shadowed_end_at_their_range_and_come_in_batches)
     struct fixture *fixture = *state;
     fixture->request.tracer = TRACER_BVH;
     struct scene_material *material = a_floor(fixture, 5.0f);
-    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 2.0f, 7.0f)->range = 1.5f;
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 2.0f, 7.0f)->value.range = 1.5f;
     fixture_light(fixture, LIGHT_POINT, 6.0f, 0.0f, 4.0f, 20.0f);
     fixture_sphere(fixture, 3.0f, 0.0f, 2.0f, 0.5f,
                    material->base.id); /* from the light through it to the origin */
@@ -282,10 +282,10 @@ TEST_LONG(light_through_glass_is_not_counted_twice)
             path_begin(fixture, TRACER_REFERENCE, 4);
             a_floor(fixture, 1.0f);
             struct scene_material *glass = fixture_material(fixture);
-            glass->transmission = 1.0f;
-            glass->roughness = 0.0f;
+            glass->value.transmission = 1.0f;
+            glass->value.roughness = 0.0f;
             for (int c = 0; c < 3; c++)
-                glass->base_colour[c] = 0.8f;
+                glass->value.base_colour[c] = 0.8f;
             fixture_square(fixture, 2000.0f, glass->base.id, roof);
             add_light(fixture, kinds[k]);
             fixture->request.samples = 16;
@@ -314,8 +314,8 @@ static void an_image(struct fixture *fixture, uint16_t grey, uint32_t u, uint32_
                 texels[y][x][c] = y == v && x == u ? sun : grey;
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     struct scene_environment *environment = &fixture->edits[fixture->edit_count - 1].set.environment;
-    environment->width = COLUMNS;
-    environment->height = ROWS;
+    environment->value.width = COLUMNS;
+    environment->value.height = ROWS;
     environment->texels = fixture_blob(texels, sizeof(texels));
 }
 
@@ -425,11 +425,11 @@ static void glow_by_a_texture(struct fixture *fixture, struct scene_material *ma
                 texels[y][x][c] = c == 3 || x > y + 2 ? 255 : c == 0 ? 40 : 0;
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = SIZE;
-    texture->format = TEXTURE_RGBA8_SRGB;
+    texture->value.width = texture->value.height = SIZE;
+    texture->value.format = TEXTURE_RGBA8_SRGB;
     texture->texels = fixture_blob(texels, sizeof(texels));
-    material->textures[MATERIAL_EMISSION] =
-        (struct texture_use){.texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
+    material->textures[MATERIAL_EMISSION] = (struct record_texture_use){
+        .texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
 }
 
 /* More triangles than leaves of the tree of lights, so that several make one; of many sizes. */
@@ -454,11 +454,11 @@ static void make_fine(struct scene_mesh *mesh)
     blob_unref(mesh->arrays[MESH_INDICES]);
     blob_unref(mesh->arrays[MESH_TEXCOORDS_0]);
     mesh->arrays[MESH_TEXCOORDS_0] = NULL;
-    mesh->vertex_count = EDGES * EDGES;
-    mesh->triangle_count = CELLS * CELLS * 2;
+    mesh->value.vertex_count = EDGES * EDGES;
+    mesh->value.triangle_count = CELLS * CELLS * 2;
     mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, EDGES * EDGES * sizeof(*positions));
     mesh->arrays[MESH_INDICES] = fixture_blob(indices, CELLS * CELLS * 2 * sizeof(*indices));
-    mesh->ranges[0].count = mesh->triangle_count;
+    mesh->ranges[0].count = mesh->value.triangle_count;
     free(positions);
     free(indices);
 }
@@ -474,11 +474,11 @@ static void a_box(struct fixture *fixture, enum inside inside, bool sampled)
     };
     float place[12];
     struct scene_material *material = fixture_material(fixture);
-    material->metallic = inside == METAL ? 1.0f : 0.0f;
-    material->roughness = inside == METAL ? 0.3f : 0.6f;
-    material->ior = 1.5f;
+    material->value.metallic = inside == METAL ? 1.0f : 0.0f;
+    material->value.roughness = inside == METAL ? 0.3f : 0.6f;
+    material->value.ior = 1.5f;
     for (int c = 0; c < 3; c++)
-        material->base_colour[c] = 0.7f;
+        material->value.base_colour[c] = 0.7f;
     for (int i = 0; i < 5; i++)
         fixture_square(fixture, 1.0f, material->base.id, walls[i]);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 0.0f);
@@ -489,12 +489,12 @@ static void a_box(struct fixture *fixture, enum inside inside, bool sampled)
     }
     if (inside >= GLASS && inside <= VEIL) {
         struct scene_material *pane = fixture_material(fixture);
-        pane->ior = 1.5f;
-        pane->base_colour[1] = 0.8f;
-        pane->roughness = inside == GLASS ? 0.0f : 0.4f;
-        pane->transmission = inside == VEIL ? 0.0f : 1.0f;
-        pane->alpha_mode = inside == VEIL ? ALPHA_BLEND : ALPHA_OPAQUE;
-        pane->base_colour[3] = inside == VEIL ? 0.4f : 1.0f;
+        pane->value.ior = 1.5f;
+        pane->value.base_colour[1] = 0.8f;
+        pane->value.roughness = inside == GLASS ? 0.0f : 0.4f;
+        pane->value.transmission = inside == VEIL ? 0.0f : 1.0f;
+        pane->value.alpha_mode = inside == VEIL ? ALPHA_BLEND : ALPHA_OPAQUE;
+        pane->value.base_colour[3] = inside == VEIL ? 0.4f : 1.0f;
         facing_down(0.0f, 0.5f, 0.0f, place);
         fixture_square(fixture, 0.6f, pane->base.id, place);
     }
@@ -560,13 +560,13 @@ TEST(a_lamp_that_moves_or_is_switched_lights_from_where_it_is)
             struct scene_edit *edit = fixture_edit(fixture, OBJECT_NODE);
             edit->set.node = *scene_node(fixture->scene, last);
             edit->set.node.weights = NULL;
-            memcpy(edit->set.node.parent_from_node, place, sizeof(place));
+            memcpy(edit->set.node.value.parent_from_node, place, sizeof(place));
             struct scene_material *material = &fixture_edit(fixture, OBJECT_MATERIAL)->set.material;
             *material = *scene_material(fixture->scene, last - 2);
-            material->emission[1] = 20.0f;
+            material->value.emission[1] = 20.0f;
         } else {
-            memcpy(fixture->edits[fixture->edit_count - 1].set.node.parent_from_node, place, sizeof(place));
-            fixture->edits[fixture->edit_count - 3].set.material.emission[1] = 20.0f;
+            memcpy(fixture->edits[fixture->edit_count - 1].set.node.value.parent_from_node, place, sizeof(place));
+            fixture->edits[fixture->edit_count - 3].set.material.value.emission[1] = 20.0f;
         }
         means[edited] = mean_of_seeds(fixture, whole);
     }
@@ -616,12 +616,12 @@ TEST(emission_that_is_seen_only_shows_in_mirrors_and_lights_nothing)
                 path_begin(fixture, TRACER_BVH, 3);
                 fixture->request.integrator = integrator ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_PATH;
                 struct scene_material *floor = a_floor(fixture, 0.5f);
-                floor->metallic = (float)mirror;
-                floor->roughness = 1.0f - (float)mirror;
+                floor->value.metallic = (float)mirror;
+                floor->value.roughness = 1.0f - (float)mirror;
                 fixture->request.camera.ortho_height = 0.5f;
                 fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 0.9f, 1.0f);
                 struct scene_material *glow = a_glow(fixture, 1.0f, i == 0 ? 0.0f : 2.0f, true, above);
-                glow->emission_seen_only = i == 1;
+                glow->value.emission_seen_only = i == 1;
                 fixture->request.samples = 4;
                 struct frame_result result = fixture_render(fixture);
                 means[i] = whole(&result);
@@ -684,11 +684,11 @@ static void a_rough_mirror(struct fixture *fixture, unsigned integrator, enum mi
     path_begin(fixture, TRACER_BVH, what == LAMP_BEHIND_GLASS ? 2 : 1);
     fixture->request.integrator = integrator;
     struct scene_material *floor = a_floor(fixture, 1.0f);
-    floor->roughness = look[0];
-    floor->metallic = look[1];
-    floor->anisotropy = look[2];
-    floor->anisotropy_rotation = 0.5f;
-    floor->ior = 1.5f;
+    floor->value.roughness = look[0];
+    floor->value.metallic = look[1];
+    floor->value.anisotropy = look[2];
+    floor->value.anisotropy_rotation = 0.5f;
+    floor->value.ior = 1.5f;
     fixture_look(fixture, 1.5f, -1.5f, 1.2f, 0.8f);
     if (what >= SUN)
         an_image(fixture, 0x2c00, 3, 13, 0x6400); /* 1/16 and 1024 */
@@ -700,11 +700,11 @@ static void a_rough_mirror(struct fixture *fixture, unsigned integrator, enum mi
         fixture_light(fixture, LIGHT_POINT, -0.5f, 0.3f, 1.5f, 0.3f);
     if (what == LAMP_BEHIND_VEIL || what == LAMP_BEHIND_GLASS) {
         struct scene_material *pane = fixture_material(fixture);
-        pane->roughness = 0.0f;
-        pane->base_colour[1] = 0.8f;
-        pane->base_colour[3] = 0.4f;
-        pane->transmission = what == LAMP_BEHIND_GLASS ? 1.0f : 0.0f;
-        pane->alpha_mode = what == LAMP_BEHIND_GLASS ? ALPHA_OPAQUE : ALPHA_BLEND;
+        pane->value.roughness = 0.0f;
+        pane->value.base_colour[1] = 0.8f;
+        pane->value.base_colour[3] = 0.4f;
+        pane->value.transmission = what == LAMP_BEHIND_GLASS ? 1.0f : 0.0f;
+        pane->value.alpha_mode = what == LAMP_BEHIND_GLASS ? ALPHA_OPAQUE : ALPHA_BLEND;
         fixture_square(fixture, 5.0f, pane->base.id, below);
     }
 }

@@ -57,29 +57,29 @@ _Static_assert(KINDS == SIDE * SIDE, "a ball for each");
 static uint32_t a_material(struct fixture *fixture, const struct kind *kind, float roughness, float base)
 {
     struct scene_material *material = fixture_material(fixture);
-    material->metallic = kind->metallic;
-    material->transmission = kind->transmission;
-    material->ior = kind->ior;
-    material->roughness = roughness;
+    material->value.metallic = kind->metallic;
+    material->value.transmission = kind->transmission;
+    material->value.ior = kind->ior;
+    material->value.roughness = roughness;
     if (kind->specular_colour > 0.0f)
-        material->specular = 0.5f;
+        material->value.specular = 0.5f;
     for (int i = 0; i < 3; i++) {
-        material->base_colour[i] = base;
-        material->specular_colour[i] = kind->specular_colour > 0.0f ? kind->specular_colour : 1.0f;
-        material->sheen[i] = kind->sheen;
-        material->diffuse_transmission_colour[i] = base;
+        material->value.base_colour[i] = base;
+        material->value.specular_colour[i] = kind->specular_colour > 0.0f ? kind->specular_colour : 1.0f;
+        material->value.sheen[i] = kind->sheen;
+        material->value.diffuse_transmission_colour[i] = base;
     }
-    material->sheen_roughness = fmaxf(roughness, 0.2f);
-    material->iridescence = kind->film;
-    material->iridescence_ior = 1.8f;
-    material->iridescence_maximum_nm = 400.0f;
-    material->anisotropy = kind->grain;
-    material->anisotropy_rotation = 0.5f;
-    material->clearcoat = kind->coat;
-    material->clearcoat_roughness = fmodf(roughness + 0.5f, 1.0f);
-    material->diffuse_transmission = kind->leaf;
-    material->dispersion = kind->dispersion;
-    material->thin_walled = kind->thin;
+    material->value.sheen_roughness = fmaxf(roughness, 0.2f);
+    material->value.iridescence = kind->film;
+    material->value.iridescence_ior = 1.8f;
+    material->value.iridescence_maximum_nm = 400.0f;
+    material->value.anisotropy = kind->grain;
+    material->value.anisotropy_rotation = 0.5f;
+    material->value.clearcoat = kind->coat;
+    material->value.clearcoat_roughness = fmodf(roughness + 0.5f, 1.0f);
+    material->value.diffuse_transmission = kind->leaf;
+    material->value.dispersion = kind->dispersion;
+    material->value.thin_walled = kind->thin;
     return material->base.id;
 }
 
@@ -184,7 +184,7 @@ static void expect_agreement(struct fixture *fixture, float roughness)
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 2.0f);
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 1.0f);
     const float slanted[12] = {0.8f, 0, 0.6f, 0, 0, 1, 0, 0, -0.6f, 0, 0.8f, 0};
-    memcpy(fixture->edits[fixture->edit_count - 1].set.node.parent_from_node, slanted, sizeof(slanted));
+    memcpy(fixture->edits[fixture->edit_count - 1].set.node.value.parent_from_node, slanted, sizeof(slanted));
     for (size_t w = 0; w < WARD; w++)
         render_tiles(fixture, &ways[w], 64, tiles[w]);
     for (int i = 0; i < KINDS; i++) {
@@ -239,8 +239,8 @@ TEST_LONG(a_sky_lights_all_materials_alike_in_all_integrators)
         all_materials(fixture, 0.2f + 0.4f * (float)step, 0.8f, true);
         fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
         struct scene_environment *environment = &fixture->edits[fixture->edit_count - 1].set.environment;
-        environment->width = SKY_WIDTH;
-        environment->height = SKY_HEIGHT;
+        environment->value.width = SKY_WIDTH;
+        environment->value.height = SKY_HEIGHT;
         environment->texels = fixture_blob(texels, sizeof(texels));
         for (size_t w = PATH; w <= WHITTED; w++)
             render_tiles(fixture, &ways[w], 256, tiles[w]);
@@ -272,16 +272,16 @@ TEST_LONG(normals_that_lean_lose_no_light)
                 fixture_clear(state);
                 fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
                 struct scene_material *material = fixture_material(fixture);
-                material->roughness = 0.0f;
-                material->ior = 1.5f;
-                material->transmission = (float)transmission;
+                material->value.roughness = 0.0f;
+                material->value.ior = 1.5f;
+                material->value.transmission = (float)transmission;
                 struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
                 texture->base.id = fixture->next_id++;
-                texture->width = texture->height = 1;
-                texture->format = TEXTURE_RGBA8_LINEAR;
+                texture->value.width = texture->value.height = 1;
+                texture->value.format = TEXTURE_RGBA8_LINEAR;
                 texture->texels = fixture_blob(texel, sizeof(texel));
-                material->textures[MATERIAL_NORMAL] =
-                    (struct texture_use){texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
+                material->textures[MATERIAL_NORMAL] = (struct record_texture_use){
+                    texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
                 fixture_square(fixture, 100.0f, material->base.id, NULL);
                 fixture->request.width = fixture->request.height = 3;
                 fixture_look(fixture, (float)(5.0 * sin(from)), 0.0f, (float)(5.0 * cos(from)), 0.01f);
@@ -314,11 +314,11 @@ static struct mean colour_by(struct fixture *fixture, const struct way *way, int
 static struct scene_material *a_leaf(struct fixture *fixture, float share)
 {
     struct scene_material *leaf = fixture_material(fixture);
-    leaf->diffuse_transmission = share;
-    leaf->base_colour[0] = leaf->base_colour[1] = leaf->base_colour[2] = 0.0f;
-    leaf->diffuse_transmission_colour[0] = 1.0f;
-    leaf->diffuse_transmission_colour[1] = 0.5f;
-    leaf->diffuse_transmission_colour[2] = 1.0f;
+    leaf->value.diffuse_transmission = share;
+    leaf->value.base_colour[0] = leaf->value.base_colour[1] = leaf->value.base_colour[2] = 0.0f;
+    leaf->value.diffuse_transmission_colour[0] = 1.0f;
+    leaf->value.diffuse_transmission_colour[1] = 0.5f;
+    leaf->value.diffuse_transmission_colour[2] = 1.0f;
     fixture_square(fixture, 500.0f, leaf->base.id, NULL);
     fixture_look(fixture, 0.0f, 0.0f, 4.0f, 0.01f);
     return leaf;
@@ -346,13 +346,14 @@ TEST_LONG(a_leaf_shines_with_the_light_behind_it)
             a_leaf(fixture, 0.4f);
             if (rows[k].kind <= LIGHT_SPHERE) {
                 struct scene_light *light = fixture_light(fixture, rows[k].kind, 0.0f, 0.0f, -4.0f, 20.0f);
-                light->size[0] = light->size[1] = 0.5f;
-                memcpy(fixture->edits[fixture->edit_count - 1].set.node.parent_from_node, behind, sizeof(behind));
+                light->value.size[0] = light->value.size[1] = 0.5f;
+                memcpy(fixture->edits[fixture->edit_count - 1].set.node.value.parent_from_node, behind,
+                       sizeof(behind));
             } else {
                 struct scene_material *panel = fixture_material(fixture);
                 for (int c = 0; c < 3; c++) {
-                    panel->base_colour[c] = 0.0f;
-                    panel->emission[c] = 3.0f;
+                    panel->value.base_colour[c] = 0.0f;
+                    panel->value.emission[c] = 3.0f;
                 }
                 fixture_square(fixture, 1.0f, panel->base.id, near);
             }
@@ -377,7 +378,7 @@ static double fresnel(double cosine, double n)
 static void look_at_a_mark(struct fixture *fixture, double slant, double angle)
 {
     struct scene_material *mark = fixture_material(fixture);
-    mark->unlit = true;
+    mark->value.unlit = true;
     fixture_sphere(fixture, (float)(-5.0 * sin(angle)), 0.0f, (float)(-5.0 * cos(angle)), 0.0085f, mark->base.id);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 900.0f, 1e-9f); /* else there is a sky */
     fixture_look(fixture, (float)(3.0 * sin(slant)), 0.0f, (float)(3.0 * cos(slant)), 0.0005f);
@@ -393,11 +394,11 @@ TEST_LONG(a_thin_pane_displaces_nothing)
         for (size_t w = PATH; w <= WHITTED; w++) {
             path_begin(fixture, TRACER_REFERENCE, 4);
             struct scene_material *pane = fixture_material(fixture);
-            pane->roughness = 0.0f;
-            pane->ior = 1.5f;
-            pane->base_colour[1] = 0.5f;
-            pane->transmission = 1.0f;
-            pane->thin_walled = true;
+            pane->value.roughness = 0.0f;
+            pane->value.ior = 1.5f;
+            pane->value.base_colour[1] = 0.5f;
+            pane->value.transmission = 1.0f;
+            pane->value.thin_walled = true;
             const float turned[12] = {(float)side, 0, 0, 0, 0, 1, 0, 0, 0, 0, (float)side, 0};
             fixture_square(fixture, 50.0f, pane->base.id, turned);
             look_at_a_mark(fixture, angle, angle);
@@ -416,10 +417,10 @@ TEST_LONG(each_colour_is_bent_by_its_own_index)
         for (int c = 0; c < 3; c++) {
             path_begin(fixture, TRACER_REFERENCE, 2);
             struct scene_material *glass = fixture_material(fixture);
-            glass->roughness = 0.0f;
-            glass->ior = 1.6f;
-            glass->transmission = 1.0f;
-            glass->dispersion = 4.0f;
+            glass->value.roughness = 0.0f;
+            glass->value.ior = 1.6f;
+            glass->value.transmission = 1.0f;
+            glass->value.dispersion = 4.0f;
             fixture_square(fixture, 50.0f, glass->base.id, NULL);
             look_at_a_mark(fixture, slant, asin(sin(slant) / (1.6 + apart * (c - 1))));
             for (int other = 0; other < 3; other++)

@@ -73,7 +73,7 @@ TEST(morph_targets_move_each_point_of_a_triangle)
     struct fixture *fixture = *state;
     const float target[12] = {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0}, weights[3] = {0.25f, 0, 1};
     struct scene_mesh *mesh = fixture_square(fixture, 2, 0, NULL);
-    mesh->target_count = 1;
+    mesh->value.target_count = 1;
     mesh->arrays[MESH_TARGET_POSITIONS] = fixture_blob(target, sizeof(target));
     const uint32_t node = fixture->next_id - 1;
     struct scene_motion motion;
@@ -100,14 +100,14 @@ TEST(joints_move_a_skin)
     const float ones[4] = {1, 1, 1, 1}, identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     const uint32_t joint = fixture_node(fixture, NODE_GROUP, 0, NULL);
     struct scene_mesh *mesh = fixture_square(fixture, 5, 0, NULL);
-    mesh->influence_count = 1;
+    mesh->value.influence_count = 1;
     mesh->arrays[MESH_JOINTS] = fixture_blob(joints, sizeof(joints));
     mesh->arrays[MESH_WEIGHTS] = fixture_blob(ones, sizeof(ones));
     struct scene_node *node = &fixture->edits[fixture->edit_count - 1].set.node;
-    node->skin = fixture->next_id++;
+    node->value.skin = fixture->next_id++;
     struct scene_skin *skin = &fixture_edit(fixture, OBJECT_SKIN)->set.skin;
-    skin->base.id = node->skin;
-    skin->joint_count = 1;
+    skin->base.id = node->value.skin;
+    skin->value.joint_count = 1;
     skin->joints = fixture_blob(&joint, sizeof(joint));
     skin->joint_from_mesh = fixture_blob(identity, sizeof(identity));
     struct scene_motion motion;

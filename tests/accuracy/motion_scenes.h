@@ -72,14 +72,14 @@ static inline void test_motion_of_two(struct scene_motion *motion, uint32_t pose
 /* Joints to a mesh that has been added: `count` a vertex, some without weight; its first vertices hang on none. */
 static inline void test_add_joints(struct scene_mesh *mesh, uint32_t count, uint64_t seed)
 {
-    size_t total = (size_t)mesh->vertex_count * count;
+    size_t total = (size_t)mesh->value.vertex_count * count;
     uint16_t *joints = malloc(total * sizeof(*joints));
     float *weights = malloc(total * sizeof(*weights));
     for (size_t i = 0; i < total; i++) {
         joints[i] = (uint16_t)(test_random(&seed) % TEST_JOINTS);
         weights[i] = i < 6 * count || test_random(&seed) % 4 == 0 ? 0.0f : test_uniform(&seed, 0.1f, 1.0f);
     }
-    mesh->influence_count = count;
+    mesh->value.influence_count = count;
     mesh->arrays[MESH_JOINTS] = test_blob(joints, total * sizeof(*joints));
     mesh->arrays[MESH_WEIGHTS] = test_blob(weights, total * sizeof(*weights));
     free(joints);
@@ -98,13 +98,14 @@ static inline struct blob *test_random_vectors(uint32_t count, float size, uint6
 
 static inline void test_add_targets(struct scene_mesh *mesh, uint64_t seed)
 {
-    mesh->target_count = TEST_TARGETS;
-    mesh->arrays[MESH_TARGET_POSITIONS] = test_random_vectors(mesh->vertex_count * TEST_TARGETS, 0.3f, seed);
+    mesh->value.target_count = TEST_TARGETS;
+    mesh->arrays[MESH_TARGET_POSITIONS] = test_random_vectors(mesh->value.vertex_count * TEST_TARGETS, 0.3f, seed);
     if (mesh->arrays[MESH_NORMALS])
-        mesh->arrays[MESH_TARGET_NORMALS] = test_random_vectors(mesh->vertex_count * TEST_TARGETS, 0.3f, seed + 1);
+        mesh->arrays[MESH_TARGET_NORMALS] =
+            test_random_vectors(mesh->value.vertex_count * TEST_TARGETS, 0.3f, seed + 1);
     if (mesh->arrays[MESH_TANGENTS])
         mesh->arrays[MESH_TARGET_TANGENTS] =
-            test_random_vectors(mesh->vertex_count * TEST_TARGETS, 0.3f, seed + 2);
+            test_random_vectors(mesh->value.vertex_count * TEST_TARGETS, 0.3f, seed + 2);
     mesh->weights = malloc(TEST_TARGETS * sizeof(*mesh->weights));
     mesh->weights[0] = 0.5f;
     mesh->weights[1] = -0.25f;
@@ -113,13 +114,13 @@ static inline void test_add_targets(struct scene_mesh *mesh, uint64_t seed)
 
 static inline void test_add_tangents(struct scene_mesh *mesh, uint64_t seed)
 {
-    float *v = malloc((size_t)mesh->vertex_count * 4 * sizeof(*v));
-    for (size_t i = 0; i < mesh->vertex_count; i++) {
+    float *v = malloc((size_t)mesh->value.vertex_count * 4 * sizeof(*v));
+    for (size_t i = 0; i < mesh->value.vertex_count; i++) {
         for (size_t k = 0; k < 3; k++)
             v[4 * i + k] = test_uniform(&seed, -1, 1);
         v[4 * i + 3] = test_random(&seed) % 2 ? 1.0f : -1.0f;
     }
-    mesh->arrays[MESH_TANGENTS] = test_blob(v, (size_t)mesh->vertex_count * 4 * sizeof(*v));
+    mesh->arrays[MESH_TANGENTS] = test_blob(v, (size_t)mesh->value.vertex_count * 4 * sizeof(*v));
     free(v);
 }
 
@@ -144,7 +145,7 @@ static inline void test_add_skin(struct test_edits *edits)
         test_transform(bind[j], 1, 1, 1, (int)j, -0.2f * (float)(j + 1), 0.1f * (float)j, -0.1f, 0);
     struct scene_skin *skin = &test_add(edits, OBJECT_SKIN)->set.skin;
     skin->base.id = 30;
-    skin->joint_count = TEST_JOINTS;
+    skin->value.joint_count = TEST_JOINTS;
     skin->joints = test_blob(nodes, sizeof(nodes));
     skin->joint_from_mesh = test_blob(bind, sizeof(bind));
 }
@@ -158,7 +159,7 @@ static inline struct scene *test_scene_deformed(void)
     float m[12];
     test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
     struct scene_material *cutout = test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    cutout->alpha_mode = ALPHA_MASK;
+    cutout->value.alpha_mode = ALPHA_MASK;
     test_add_skin(&edits);
     test_soup_mesh(&edits, 10, 40, 0.4f, 21);
     test_add_tangents(test_last_mesh(&edits), 51);
@@ -169,10 +170,10 @@ static inline struct scene *test_scene_deformed(void)
     test_soup_mesh(&edits, 8, 30, 0.4f, 23);
     test_add_joints(test_last_mesh(&edits), 1, 33);
     test_soup_mesh(&edits, 7, 20, 0.4f, 24);
-    test_node(&edits, 2, 0, NODE_MESH, 10, NULL)->skin = 30;
+    test_node(&edits, 2, 0, NODE_MESH, 10, NULL)->value.skin = 30;
     test_transform(m, 3, 2, 1, 0, 1, 50, 60, 70);
     test_node(&edits, 3, 0, NODE_GROUP, 0, m);
-    test_node(&edits, 4, 3, NODE_MESH, 8, NULL)->skin = 30;
+    test_node(&edits, 4, 3, NODE_MESH, 8, NULL)->value.skin = 30;
     test_transform(m, 1.2f, -0.7f, 1, 1, 0.4f, 1.8f, 0.4f, 0);
     test_node(&edits, 5, 0, NODE_MESH, 9, m);
     test_transform(m, 1, 1, 1, 1, 0.4f, -2.0f, 0.4f, 0);

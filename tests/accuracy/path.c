@@ -17,10 +17,10 @@ static void a_glowing_room(struct fixture *fixture, float albedo)
     };
     struct scene_material *material = fixture_material(fixture);
     for (int c = 0; c < 3; c++) {
-        material->base_colour[c] = albedo;
-        material->emission[c] = 1.0f;
+        material->value.base_colour[c] = albedo;
+        material->value.emission[c] = 1.0f;
     }
-    material->alpha_mode = ALPHA_MASK;
+    material->value.alpha_mode = ALPHA_MASK;
     for (int i = 0; i < 6; i++)
         fixture_square(fixture, 1.0f, material->base.id, walls[i]);
     fixture_look(fixture, 0.4f, 0.2f, 0.7f, 1.2f);
@@ -111,8 +111,8 @@ TEST(waves_are_sorted_where_their_directions_differ_and_the_picture_stays_the_sa
         path_begin(fixture, TRACER_BVH, 3);
         a_glowing_room(fixture, 0.7f);
         struct scene_material *material = &fixture->edits[0].set.material;
-        material->metallic = (float)mirrors;
-        material->roughness = mirrors ? 0.0f : 1.0f;
+        material->value.metallic = (float)mirrors;
+        material->value.roughness = mirrors ? 0.0f : 1.0f;
         fixture->request.width = fixture->request.height = 64;
         struct frame_result whole = fixture_render(fixture);
         frame_renderer_queue_ahead(fixture->renderer, true);

@@ -52,7 +52,7 @@ static bool shows_what_is_there(struct fixture *fixture, struct frame_renderer *
 static uint32_t add_scene(struct fixture *fixture)
 {
     struct scene_material *red = fixture_material(fixture);
-    red->base_colour[1] = red->base_colour[2] = 0.1f;
+    red->value.base_colour[1] = red->value.base_colour[2] = 0.1f;
     const uint32_t material = red->base.id;
     const uint32_t square = fixture_square(fixture, 1.0f, material, NULL)->base.id;
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 10.0f);
@@ -116,10 +116,10 @@ static void set_mover(struct fixture *fixture, uint32_t node, uint32_t mesh, flo
     const float m[12] = {0.3f, 0, 0, x, 0, 0.3f, 0, 0.3f, 0, 0, 0.3f, 0.5f};
     struct scene_node *moved = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     moved->base.id = node;
-    moved->kind = NODE_MESH;
-    moved->object = mesh;
-    moved->hidden = hidden;
-    memcpy(moved->parent_from_node, m, sizeof(m));
+    moved->value.kind = NODE_MESH;
+    moved->value.object = mesh;
+    moved->value.hidden = hidden;
+    memcpy(moved->value.parent_from_node, m, sizeof(m));
 }
 
 TEST(edits_and_poses_are_followed)

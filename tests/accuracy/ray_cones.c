@@ -254,7 +254,7 @@ TEST(a_sphere_tells_its_radius_and_how_densely_its_texture_lies)
 
 /* ---- pictures ---- */
 
-static struct texture_use checks(struct fixture *fixture, uint32_t size, float repeats)
+static struct record_texture_use checks(struct fixture *fixture, uint32_t size, float repeats)
 {
     uint8_t *texels = malloc((size_t)size * size * 4);
     assert_non_null(texels);
@@ -262,11 +262,11 @@ static struct texture_use checks(struct fixture *fixture, uint32_t size, float r
         memset(texels + (size_t)i * 4, (i % size / 4 + i / size / 4) % 2 ? 255 : 0, 4);
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = size;
-    texture->format = TEXTURE_RGBA8_LINEAR;
+    texture->value.width = texture->value.height = size;
+    texture->value.format = TEXTURE_RGBA8_LINEAR;
     texture->texels = fixture_blob(texels, (size_t)size * size * 4);
     free(texels);
-    return (struct texture_use){
+    return (struct record_texture_use){
         .texture = texture->base.id, .uv_transform = {repeats, 0, 0, 0, repeats, 0}, .strength = 1.0f};
 }
 
@@ -274,9 +274,9 @@ static struct texture_use checks(struct fixture *fixture, uint32_t size, float r
 static void floor_of_checks(struct fixture *fixture, float depth, float repeats)
 {
     const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -depth, 0, -1, 0, 0};
-    struct texture_use use = checks(fixture, 64, repeats);
+    struct record_texture_use use = checks(fixture, 64, repeats);
     struct scene_material *plain = fixture_material(fixture);
-    plain->unlit = true;
+    plain->value.unlit = true;
     plain->textures[MATERIAL_BASE_COLOUR] = use;
     fixture_square(fixture, 20.0f, plain->base.id, floor);
 }
@@ -286,10 +286,10 @@ static void checkered_floor(struct fixture *fixture, float metallic, float rough
 {
     floor_of_checks(fixture, 1.2f, 8.0f);
     struct scene_material *ball = fixture_material(fixture);
-    ball->metallic = metallic;
-    ball->roughness = roughness;
-    ball->transmission = transmission;
-    ball->ior = 1.5f;
+    ball->value.metallic = metallic;
+    ball->value.roughness = roughness;
+    ball->value.transmission = transmission;
+    ball->value.ior = 1.5f;
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.2f, ball->base.id);
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
     fixture->request.width = fixture->request.height = 64;
@@ -395,10 +395,10 @@ static void grazing_floor(struct fixture *fixture, bool glass)
 {
     floor_of_checks(fixture, 1.0f, 16.0f);
     struct scene_material *pane = fixture_material(fixture);
-    pane->metallic = glass ? 0.0f : 1.0f;
-    pane->transmission = glass ? 1.0f : 0.0f;
-    pane->roughness = 0.0f;
-    pane->ior = 1.5f;
+    pane->value.metallic = glass ? 0.0f : 1.0f;
+    pane->value.transmission = glass ? 1.0f : 0.0f;
+    pane->value.roughness = 0.0f;
+    pane->value.ior = 1.5f;
     fixture_square(fixture, 4.0f, pane->base.id, NULL);
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
     fixture->request.width = fixture->request.height = 64;
@@ -431,16 +431,17 @@ TEST(fine_patterns_on_spheres_and_discs_are_averaged_in_the_distance)
     struct fixture *fixture = *state;
     for (int is_disc = 0; is_disc < 2; is_disc++) {
         fixture_clear((void **)&fixture);
-        struct texture_use use = checks(fixture, 64, 16.0f); /* a pixel has more than a pair of them each way */
+        struct record_texture_use use =
+            checks(fixture, 64, 16.0f); /* a pixel has more than a pair of them each way */
         struct scene_material *material = fixture_material(fixture);
-        material->unlit = true;
+        material->value.unlit = true;
         material->textures[MATERIAL_BASE_COLOUR] = use;
         if (is_disc) {
             struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
             disc->base.id = fixture->next_id++;
-            disc->material = material->base.id;
-            disc->normal_world[2] = 1.0f;
-            disc->radius = 1.0f;
+            disc->value.material = material->base.id;
+            disc->value.normal_world[2] = 1.0f;
+            disc->value.radius = 1.0f;
         } else {
             fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, material->base.id);
         }
@@ -452,7 +453,7 @@ TEST(fine_patterns_on_spheres_and_discs_are_averaged_in_the_distance)
 TEST(fine_bumps_are_flat_in_the_distance)
 {
     struct fixture *fixture = *state;
-    struct texture_use use = checks(fixture, 64, 16.0f);
+    struct record_texture_use use = checks(fixture, 64, 16.0f);
     use.strength = 0.05f;
     struct scene_material *material = fixture_material(fixture);
     material->textures[MATERIAL_BUMP] = use;

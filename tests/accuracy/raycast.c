@@ -41,7 +41,7 @@ static struct scene_material *a_layer(struct fixture *fixture, uint32_t number, 
     const float at[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.0f - 0.1f * (float)number};
     struct scene_material *material = fixture_material(fixture);
     for (int c = 0; c < 3; c++)
-        material->base_colour[c] = grey;
+        material->value.base_colour[c] = grey;
     fixture_square(fixture, 3.0f, material->base.id, at);
     return material;
 }
@@ -74,7 +74,7 @@ TEST(layers_are_blended_front_to_back)
         for (int has_environment = 0; has_environment < 2; has_environment++) {
             begin(fixture, tracers[t]);
             for (uint32_t i = 0; i < LAYERS; i++)
-                a_layer(fixture, i, grey_of(i))->unlit = true;
+                a_layer(fixture, i, grey_of(i))->value.unlit = true;
             if (has_environment)
                 fixture_environment(fixture, 0.3f, 0.3f, 0.3f);
             else
@@ -102,7 +102,7 @@ TEST(faint_layers_go_on_until_nothing_is_left)
     double left = 1.0, radiance = 0.0;
     begin(fixture, TRACER_BVH);
     for (uint32_t i = 0; i < LAYERS; i++, left *= 0.95) {
-        a_layer(fixture, i, grey_of(i))->unlit = true;
+        a_layer(fixture, i, grey_of(i))->value.unlit = true;
         radiance += left * 0.05 * (double)grey_of(i);
     }
     no_light(fixture);
@@ -116,10 +116,10 @@ TEST(translucent_surfaces_transmit_their_transmittance)
     begin(fixture, TRACER_BVH);
     struct scene_material *pane = a_layer(fixture, 0, 0.4f), *glass = a_layer(fixture, 1, 0.8f),
                           *wall = a_layer(fixture, 2, 0.9f);
-    pane->unlit = glass->unlit = wall->unlit = true;
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.25f;
-    glass->transmission = 0.75f;
+    pane->value.unlit = glass->value.unlit = wall->value.unlit = true;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.25f;
+    glass->value.transmission = 0.75f;
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
     fixture->request.layer_opacity = 0.6f;
     double behind = 0.6 * 0.9 + 0.4 * 0.5;

@@ -98,9 +98,9 @@ static inline uint32_t fixture_node(struct fixture *fixture, enum node_kind kind
     static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     struct scene_node *node = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     node->base.id = fixture->next_id++;
-    node->kind = kind;
-    node->object = object;
-    memcpy(node->parent_from_node, parent_from_node ? parent_from_node : identity, sizeof(identity));
+    node->value.kind = kind;
+    node->value.object = object;
+    memcpy(node->value.parent_from_node, parent_from_node ? parent_from_node : identity, sizeof(identity));
     return node->base.id;
 }
 
@@ -110,13 +110,14 @@ static inline struct scene_material *fixture_material(struct fixture *fixture)
     struct scene_material *material = &fixture_edit(fixture, OBJECT_MATERIAL)->set.material;
     material->base.id = fixture->next_id++;
     for (int i = 0; i < 4; i++)
-        material->base_colour[i] = 1.0f;
-    material->roughness = 1.0f;
-    material->ior = 1.0f;
-    material->alpha_cutoff = 0.5f;
-    material->specular = material->specular_colour[0] = material->specular_colour[1] =
-        material->specular_colour[2] = 1.0f;
-    material->attenuation[0] = material->attenuation[1] = material->attenuation[2] = 1.0f;
+        material->value.base_colour[i] = 1.0f;
+    material->value.roughness = 1.0f;
+    material->value.ior = 1.0f;
+    material->value.alpha_cutoff = 0.5f;
+    material->value.specular = material->value.specular_colour[0] = material->value.specular_colour[1] =
+        material->value.specular_colour[2] = 1.0f;
+    material->value.attenuation_colour[0] = material->value.attenuation_colour[1] =
+        material->value.attenuation_colour[2] = 1.0f;
     return material;
 }
 
@@ -126,11 +127,11 @@ static inline void fixture_sphere(struct fixture *fixture, float x, float y, flo
     const float centre_radius[4] = {x, y, z, radius};
     struct scene_spheres *spheres = &fixture_edit(fixture, OBJECT_SPHERES)->set.spheres;
     spheres->base.id = fixture->next_id++;
-    spheres->sphere_count = 1;
+    spheres->value.sphere_count = 1;
     spheres->centres_radii = fixture_blob(centre_radius, sizeof(centre_radius));
     spheres->ranges = calloc(1, sizeof(*spheres->ranges));
     assert_non_null(spheres->ranges);
-    *spheres->ranges = (struct material_range){0, 1, material};
+    *spheres->ranges = (struct record_material_range){0, 1, material};
     spheres->range_count = 1;
     fixture_node(fixture, NODE_SPHERES, spheres->base.id, NULL);
 }
@@ -144,14 +145,14 @@ static inline struct scene_mesh *fixture_square(struct fixture *fixture, float h
     const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
-    mesh->vertex_count = 4;
-    mesh->triangle_count = 2;
+    mesh->value.vertex_count = 4;
+    mesh->value.triangle_count = 2;
     mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, sizeof(positions));
     mesh->arrays[MESH_INDICES] = fixture_blob(indices, sizeof(indices));
     mesh->arrays[MESH_TEXCOORDS_0] = fixture_blob(texcoords, sizeof(texcoords));
     mesh->ranges = calloc(1, sizeof(*mesh->ranges));
     assert_non_null(mesh->ranges);
-    *mesh->ranges = (struct material_range){0, 2, material};
+    *mesh->ranges = (struct record_material_range){0, 2, material};
     mesh->range_count = 1;
     fixture_node(fixture, NODE_MESH, mesh->base.id, parent_from_node);
     return mesh;
@@ -164,10 +165,10 @@ static inline struct scene_light *fixture_light(struct fixture *fixture, enum li
     const float parent_from_node[12] = {1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z};
     struct scene_light *light = &fixture_edit(fixture, OBJECT_LIGHT)->set.light;
     light->base.id = fixture->next_id++;
-    light->kind = kind;
-    light->colour[0] = light->colour[1] = light->colour[2] = power;
-    light->outer_cone = 0.5f;
-    light->size[0] = light->size[1] = 0.5f;
+    light->value.kind = kind;
+    light->value.colour[0] = light->value.colour[1] = light->value.colour[2] = power;
+    light->value.outer_cone = 0.5f;
+    light->value.size[0] = light->value.size[1] = 0.5f;
     fixture_node(fixture, NODE_LIGHT, light->base.id, parent_from_node);
     return light;
 }
@@ -176,30 +177,30 @@ static inline void fixture_environment(struct fixture *fixture, float r, float g
 {
     struct scene_edit *edit = fixture_edit(fixture, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
-    edit->set.environment.colour[0] = r;
-    edit->set.environment.colour[1] = g;
-    edit->set.environment.colour[2] = b;
+    edit->set.environment.value.colour[0] = r;
+    edit->set.environment.value.colour[1] = g;
+    edit->set.environment.value.colour[2] = b;
 }
 
 /* Mirrors, glass, blend, cutout, shadows, area light, discs: something of everything. */
 static inline void fixture_mixture(struct fixture *fixture)
 {
     struct scene_material *glass = fixture_material(fixture);
-    glass->transmission = 1.0f;
-    glass->roughness = 0.0f;
-    glass->ior = 1.5f;
+    glass->value.transmission = 1.0f;
+    glass->value.roughness = 0.0f;
+    glass->value.ior = 1.5f;
     struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.05f;
-    mirror->base_colour[2] = 0.6f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.05f;
+    mirror->value.base_colour[2] = 0.6f;
     struct scene_material *veil = fixture_material(fixture);
-    veil->alpha_mode = ALPHA_BLEND;
-    veil->base_colour[3] = 0.4f;
-    veil->base_colour[0] = 0.1f;
+    veil->value.alpha_mode = ALPHA_BLEND;
+    veil->value.base_colour[3] = 0.4f;
+    veil->value.base_colour[0] = 0.1f;
     struct scene_material *plain = fixture_material(fixture);
-    plain->ior = 1.5f;
-    plain->roughness = 0.4f;
-    plain->base_colour[1] = 0.5f;
+    plain->value.ior = 1.5f;
+    plain->value.roughness = 0.4f;
+    plain->value.base_colour[1] = 0.5f;
     fixture_sphere(fixture, -0.7f, 0.1f, 0.3f, 0.5f, glass->base.id);
     fixture_sphere(fixture, 0.6f, 0.0f, -0.2f, 0.6f, mirror->base.id);
     fixture_sphere(fixture, 0.1f, -0.3f, 0.9f, 0.2f, plain->base.id);
@@ -209,14 +210,14 @@ static inline void fixture_mixture(struct fixture *fixture)
     fixture_square(fixture, 0.4f, veil->base.id, veil_transform);
     struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
     disc->base.id = fixture->next_id++;
-    disc->material = plain->base.id;
-    disc->normal_world[2] = 1.0f;
-    disc->centre_world[2] = -3.0f;
-    disc->radius = 1.2f;
+    disc->value.material = plain->base.id;
+    disc->value.normal_world[2] = 1.0f;
+    disc->value.centre_world[2] = -3.0f;
+    disc->value.radius = 1.2f;
     fixture_environment(fixture, 0.3f, 0.4f, 0.5f);
     fixture_light(fixture, LIGHT_POINT, -2.0f, 3.0f, 3.0f, 20.0f);
     struct scene_light *sphere = fixture_light(fixture, LIGHT_SPHERE, 2.0f, 2.0f, 2.0f, 10.0f);
-    sphere->size[0] = 0.4f;
+    sphere->value.size[0] = 0.4f;
     fixture->request.width = 96;
     fixture->request.height = 72;
     fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);

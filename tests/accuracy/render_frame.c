@@ -66,7 +66,7 @@ TEST(they_agree_where_transforms_mirror_and_stretch)
     const float centre_radius[8] = {0.0f, 0.0f, 0.0f, 0.3f, 0.4f, 0.2f, 0.1f, 0.1f};
     struct scene_spheres *spheres = &fixture_edit(fixture, OBJECT_SPHERES)->set.spheres;
     spheres->base.id = fixture->next_id++;
-    spheres->sphere_count = 2;
+    spheres->value.sphere_count = 2;
     spheres->centres_radii = fixture_blob(centre_radius, sizeof(centre_radius));
     fixture_node(fixture, NODE_SPHERES, spheres->base.id, transform);
     primary_hits_agree_however_they_are_found(fixture, 0.002);
@@ -81,14 +81,14 @@ TEST(holes_are_cut_out_of_rasterised_triangles_too)
         memset(texels + i * 4, (i + i / 4) % 2 ? 255 : 0, 4);
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = 4;
-    texture->nearest = true;
+    texture->value.width = texture->value.height = 4;
+    texture->value.nearest = true;
     texture->texels = fixture_blob(texels, sizeof(texels));
     struct scene_material *material = fixture_material(fixture);
-    material->alpha_mode = ALPHA_MASK;
-    material->unlit = true;
-    material->textures[MATERIAL_BASE_COLOUR] =
-        (struct texture_use){.texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
+    material->value.alpha_mode = ALPHA_MASK;
+    material->value.unlit = true;
+    material->textures[MATERIAL_BASE_COLOUR] = (struct record_texture_use){
+        .texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
     fixture_square(fixture, 1.0f, material->base.id, NULL);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 5.0f, 1.0f);
     primary_hits_agree_however_they_are_found(fixture, 0.0);
@@ -183,7 +183,7 @@ TEST(an_edit_between_two_frames_is_seen_by_the_second)
 {
     struct fixture *fixture = *state;
     struct scene_material *material = fixture_material(fixture);
-    material->unlit = true;
+    material->value.unlit = true;
     uint32_t id = material->base.id;
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 0.5f, id);
     uint32_t node = fixture->next_id - 1;
@@ -194,7 +194,7 @@ TEST(an_edit_between_two_frames_is_seen_by_the_second)
     frame_result_finish(&result);
     struct scene_node *moved = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     *moved = *scene_node(fixture->scene, node);
-    moved->parent_from_node[3] = 1.0f;
+    moved->value.parent_from_node[3] = 1.0f;
     result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 16, 16)[3], 0.0, 0.0);
     assert_near(fixture_pixel(&result, 26, 16)[0], 1.0, 1e-6);

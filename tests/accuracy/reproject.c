@@ -15,8 +15,8 @@ static void a_corner(struct fixture *fixture)
     path_begin(fixture, TRACER_BVH, 2);
     const uint32_t white = fixture_material(fixture)->base.id, dark = fixture_material(fixture)->base.id;
     struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
     fixture_square(fixture, 3.0f, white, NULL);
     fixture_sphere(fixture, 0.8f, 0.0f, 0.5f, 0.5f, dark);
     fixture_sphere(fixture, -0.8f, 0.0f, 0.5f, 0.5f, mirror->base.id);

@@ -127,7 +127,7 @@ TEST_LONG(occlusion_of_open_shapes_is_like_the_references)
     for (int i = 0; i < 3; i++) {
         float m[12];
         uint32_t mesh = add_shape_mesh(fixture, (enum shape)i, 96, grey);
-        fixture->edits[fixture->edit_count - 1].set.mesh.closed = false;
+        fixture->edits[fixture->edit_count - 1].set.mesh.value.closed = false;
         turned(m, 0.7f, 0.4f * (float)i, 1.3f * (float)(i - 1), -0.4f, 0.3f * (float)(i - 1) - 0.6f);
         fixture_node(fixture, NODE_MESH, mesh, m);
     }

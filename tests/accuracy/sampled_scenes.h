@@ -73,16 +73,16 @@ static inline uint32_t add_shape_mesh(struct fixture *fixture, enum shape shape,
     }
     struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
-    mesh->vertex_count = vertices;
-    mesh->triangle_count = triangles;
-    mesh->closed = true;
+    mesh->value.vertex_count = vertices;
+    mesh->value.triangle_count = triangles;
+    mesh->value.closed = true;
     mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, vertices * sizeof(*positions));
     mesh->arrays[MESH_NORMALS] = fixture_blob(normals, vertices * sizeof(*normals));
     mesh->arrays[MESH_TEXCOORDS_0] = fixture_blob(texcoords, vertices * sizeof(*texcoords));
     mesh->arrays[MESH_INDICES] = fixture_blob(indices, 3 * (size_t)triangles * sizeof(*indices));
     mesh->ranges = calloc(1, sizeof(*mesh->ranges));
     assert_non_null(mesh->ranges);
-    *mesh->ranges = (struct material_range){0, triangles, material};
+    *mesh->ranges = (struct record_material_range){0, triangles, material};
     mesh->range_count = 1;
     free(positions);
     free(normals);
@@ -96,9 +96,9 @@ static inline void set_node(struct fixture *fixture, uint32_t node, uint32_t mes
 {
     struct scene_node *edit = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     edit->base.id = node;
-    edit->kind = NODE_MESH;
-    edit->object = mesh;
-    memcpy(edit->parent_from_node, parent_from_node, sizeof(edit->parent_from_node));
+    edit->value.kind = NODE_MESH;
+    edit->value.object = mesh;
+    memcpy(edit->value.parent_from_node, parent_from_node, sizeof(edit->value.parent_from_node));
 }
 
 /* Turned about x, scaled and moved. */
@@ -142,32 +142,32 @@ static inline uint32_t add_texture(struct fixture *fixture, bool holes)
     }
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = TEXELS;
-    texture->format = TEXTURE_RGBA8_SRGB;
+    texture->value.width = texture->value.height = TEXELS;
+    texture->value.format = TEXTURE_RGBA8_SRGB;
     texture->texels = fixture_blob(texels, sizeof(texels));
     return texture->base.id;
 }
 
 static inline void use_texture(struct scene_material *material, enum material_texture use, uint32_t texture)
 {
-    material->textures[use] = (struct texture_use){.texture = texture, .strength = 1.0f};
+    material->textures[use] = (struct record_texture_use){.texture = texture, .strength = 1.0f};
     material->textures[use].uv_transform[0] = material->textures[use].uv_transform[4] = 1.0f;
 }
 
 static inline uint32_t add_matte(struct fixture *fixture, float r, float g, float b)
 {
     struct scene_material *material = fixture_material(fixture);
-    memcpy(material->base_colour, (float[3]){r, g, b}, 3 * sizeof(float));
-    material->ior = 1.5f;
+    memcpy(material->value.base_colour, (float[3]){r, g, b}, 3 * sizeof(float));
+    material->value.ior = 1.5f;
     return material->base.id;
 }
 
 static inline uint32_t add_mirror(struct fixture *fixture, float r, float g, float b)
 {
     struct scene_material *material = fixture_material(fixture);
-    memcpy(material->base_colour, (float[3]){r, g, b}, 3 * sizeof(float));
-    material->metallic = 1.0f;
-    material->roughness = 0.05f;
+    memcpy(material->value.base_colour, (float[3]){r, g, b}, 3 * sizeof(float));
+    material->value.metallic = 1.0f;
+    material->value.roughness = 0.05f;
     return material->base.id;
 }
 
@@ -187,11 +187,11 @@ static inline void add_mirrors(struct fixture *fixture)
 static inline void add_textured(struct fixture *fixture)
 {
     uint32_t texture = add_texture(fixture, false), mirror = add_mirror(fixture, 0.9f, 0.9f, 0.9f);
-    fixture->edits[fixture->edit_count - 1].set.material.roughness = 0.0f;
+    fixture->edits[fixture->edit_count - 1].set.material.value.roughness = 0.0f;
     struct scene_material *checked = fixture_material(fixture);
     use_texture(checked, MATERIAL_BASE_COLOUR, texture);
     use_texture(checked, MATERIAL_EMISSION, texture);
-    checked->emission[0] = 0.2f;
+    checked->value.emission[0] = 0.2f;
     add_floor_and_lights(fixture, mirror);
     add_shape(fixture, SHAPE_SPHERE, 96, checked->base.id, 0.9f, 0.5f, -1.1f, 0, 0);
     add_shape(fixture, SHAPE_TORUS, 96, checked->base.id, 0.9f, 1.2f, 1.2f, 0, 0);
@@ -216,8 +216,8 @@ static inline uint32_t add_hills(struct fixture *fixture, bool normals)
     }
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = TEXELS;
-    texture->format = TEXTURE_RGBA8_LINEAR;
+    texture->value.width = texture->value.height = TEXELS;
+    texture->value.format = TEXTURE_RGBA8_LINEAR;
     texture->texels = fixture_blob(texels, sizeof(texels));
     return texture->base.id;
 }
@@ -227,10 +227,10 @@ static inline void add_every_texture(struct fixture *fixture)
 {
     uint32_t hills = add_hills(fixture, false), normals = add_hills(fixture, true);
     struct scene_material *rich = fixture_material(fixture);
-    rich->metallic = 1.0f;
-    rich->roughness = 0.9f;
-    rich->ior = 1.5f;
-    rich->emission[1] = 0.3f;
+    rich->value.metallic = 1.0f;
+    rich->value.roughness = 0.9f;
+    rich->value.ior = 1.5f;
+    rich->value.emission[1] = 0.3f;
     use_texture(rich, MATERIAL_BASE_COLOUR, hills);
     use_texture(rich, MATERIAL_NORMAL, normals);
     use_texture(rich, MATERIAL_METALLIC_ROUGHNESS, hills);
@@ -239,7 +239,7 @@ static inline void add_every_texture(struct fixture *fixture)
     use_texture(rich, MATERIAL_TRANSMISSION, hills);
     uint32_t rich_id = rich->base.id;
     struct scene_material *bumpy = fixture_material(fixture);
-    memcpy(bumpy->base_colour, (float[3]){0.8f, 0.5f, 0.3f}, 3 * sizeof(float));
+    memcpy(bumpy->value.base_colour, (float[3]){0.8f, 0.5f, 0.3f}, 3 * sizeof(float));
     use_texture(bumpy, MATERIAL_BUMP, hills);
     bumpy->textures[MATERIAL_BUMP].strength = 0.1f;
     uint32_t bumpy_id = bumpy->base.id;
@@ -251,10 +251,10 @@ static inline void add_every_texture(struct fixture *fixture)
 static inline void add_glass(struct fixture *fixture)
 {
     struct scene_material *glass = fixture_material(fixture);
-    memcpy(glass->base_colour, (float[3]){0.8f, 0.95f, 0.9f}, 3 * sizeof(float));
-    glass->transmission = 1.0f;
-    glass->roughness = 0.0f;
-    glass->ior = 1.5f;
+    memcpy(glass->value.base_colour, (float[3]){0.8f, 0.95f, 0.9f}, 3 * sizeof(float));
+    glass->value.transmission = 1.0f;
+    glass->value.roughness = 0.0f;
+    glass->value.ior = 1.5f;
     add_floor_and_lights(fixture, add_matte(fixture, 0.7f, 0.6f, 0.5f));
     add_shape(fixture, SHAPE_SPHERE, 96, glass->base.id, 0.9f, 0, -1.1f, 0, 0.6f);
     add_shape(fixture, SHAPE_TORUS, 96, glass->base.id, 0.9f, 1.0f, 1.2f, 0, 0.4f);
@@ -265,7 +265,7 @@ static inline void add_cutout(struct fixture *fixture)
 {
     struct scene_material *fence = fixture_material(fixture);
     use_texture(fence, MATERIAL_BASE_COLOUR, add_texture(fixture, true));
-    fence->alpha_mode = ALPHA_MASK;
+    fence->value.alpha_mode = ALPHA_MASK;
     add_floor_and_lights(fixture, add_mirror(fixture, 0.8f, 0.8f, 0.8f));
     add_shape(fixture, SHAPE_SPHERE, 64, fence->base.id, 0.9f, 0.4f, -0.9f, 0, 0);
     const float pane[12] = {0.8f, 0, 0.6f, 1.3f, 0, 1, 0, 0, -0.6f, 0, 0.8f, 0};

@@ -68,7 +68,7 @@ TEST(the_device_has_the_hosts_numbers_to_the_bit)
 static double an_edge(struct fixture *fixture)
 {
     struct scene_material *material = fixture_material(fixture);
-    material->unlit = true;
+    material->value.unlit = true;
     const float right[12] = {1, 0, 0, 50, 0, 1, 0, 0, 0, 0, 1, 0};
     fixture_square(fixture, 50.0f, material->base.id, right);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 1.0f); /* so that there is no default sky */
@@ -165,14 +165,14 @@ static void a_mixture(struct fixture *fixture)
 {
     struct scene_material *gloss = fixture_material(fixture), *glass = fixture_material(fixture),
                           *pane = fixture_material(fixture), *ground = fixture_material(fixture);
-    gloss->metallic = 1.0f;
-    gloss->roughness = 0.3f;
-    glass->transmission = 1.0f;
-    glass->ior = 1.5f;
-    glass->roughness = 0.1f;
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.4f;
-    pane->base_colour[0] = 0.2f;
+    gloss->value.metallic = 1.0f;
+    gloss->value.roughness = 0.3f;
+    glass->value.transmission = 1.0f;
+    glass->value.ior = 1.5f;
+    glass->value.roughness = 0.1f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.4f;
+    pane->value.base_colour[0] = 0.2f;
     fixture_sphere(fixture, -0.7f, 0.0f, 0.0f, 0.5f, gloss->base.id);
     fixture_sphere(fixture, 0.7f, 0.0f, 0.2f, 0.5f, glass->base.id);
     const float before[12] = {1, 0, 0, 0, 0, 1, 0, 0.2f, 0, 0, 1, 1.0f},

@@ -19,16 +19,16 @@ static double fresnel(double cosine, double n)
 static struct scene_material *clear_glass(struct fixture *fixture, double ior)
 {
     struct scene_material *glass = fixture_material(fixture);
-    glass->ior = (float)ior;
-    glass->roughness = 0.0f;
-    glass->transmission = 1.0f;
+    glass->value.ior = (float)ior;
+    glass->value.roughness = 0.0f;
+    glass->value.transmission = 1.0f;
     return glass;
 }
 
 static uint32_t light_material(struct fixture *fixture)
 {
     struct scene_material *light = fixture_material(fixture);
-    light->unlit = true;
+    light->value.unlit = true;
     return light->base.id;
 }
 
@@ -40,7 +40,7 @@ TEST(glass_reflects_four_percent_at_normal_incidence)
     struct fixture *fixture = *state;
     struct scene_material *glass = clear_glass(fixture, 1.5);
     /* refracts nothing, so that all that arrives is what it reflects */
-    glass->base_colour[0] = glass->base_colour[1] = glass->base_colour[2] = 0.0f;
+    glass->value.base_colour[0] = glass->value.base_colour[1] = glass->value.base_colour[2] = 0.0f;
     fixture_square(fixture, 10.0f, glass->base.id, NULL);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     fixture->request.camera.fov_y = 0.01f;
@@ -53,7 +53,7 @@ TEST(glass_at_a_slant_follows_fresnels_equations)
 {
     struct fixture *fixture = *state;
     struct scene_material *glass = clear_glass(fixture, 1.5);
-    glass->base_colour[0] = glass->base_colour[1] = glass->base_colour[2] = 0.0f;
+    glass->value.base_colour[0] = glass->value.base_colour[1] = glass->value.base_colour[2] = 0.0f;
     fixture_square(fixture, 100.0f, glass->base.id, NULL);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     fixture->request.width = fixture->request.height = 9;
@@ -72,9 +72,9 @@ TEST(a_mirror_may_be_weaker_and_coloured)
         double angle = 0.7 * slant;
         fixture_clear(state);
         struct scene_material *glass = clear_glass(fixture, 1.5);
-        glass->base_colour[0] = glass->base_colour[1] = glass->base_colour[2] = 0.0f;
-        glass->specular = 0.5f;
-        memcpy(glass->specular_colour, colour, sizeof(colour));
+        glass->value.base_colour[0] = glass->value.base_colour[1] = glass->value.base_colour[2] = 0.0f;
+        glass->value.specular = 0.5f;
+        memcpy(glass->value.specular_colour, colour, sizeof(colour));
         fixture_square(fixture, 100.0f, glass->base.id, NULL);
         fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
         fixture->request.width = fixture->request.height = 9;
@@ -102,8 +102,8 @@ TEST(a_body_takes_light_by_the_way_through_it)
             double angle = slant * PI / 180.0;
             fixture_clear(state);
             struct scene_material *smoke = clear_glass(fixture, 1.0);
-            smoke->attenuation_distance = 0.7f;
-            memcpy(smoke->attenuation, left, sizeof(left));
+            smoke->value.attenuation_distance = 0.7f;
+            memcpy(smoke->value.attenuation_colour, left, sizeof(left));
             fixture_square(fixture, 1000.0f, smoke->base.id, NULL);
             fixture_square(fixture, 1000.0f, smoke->base.id, turned);
             fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
@@ -128,21 +128,21 @@ static float lit_through(struct fixture *fixture, float metallic, bool has_textu
     fixture_clear((void **)&fixture);
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = texture->height = 1;
-    texture->format = TEXTURE_RGBA8_LINEAR;
+    texture->value.width = texture->value.height = 1;
+    texture->value.format = TEXTURE_RGBA8_LINEAR;
     texture->texels = fixture_blob(no_metal, sizeof(no_metal));
-    const struct texture_use use = {
+    const struct record_texture_use use = {
         .texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
     struct scene_material *glass = clear_glass(fixture, 1.5);
-    glass->metallic = metallic;
+    glass->value.metallic = metallic;
     if (has_texture)
         glass->textures[MATERIAL_METALLIC_ROUGHNESS] = use;
     fixture_square(fixture, 10.0f, glass->base.id, above);
     fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
     struct scene_light *light = &fixture_edit(fixture, OBJECT_LIGHT)->set.light;
     light->base.id = fixture->next_id++;
-    light->kind = LIGHT_DIRECTIONAL;
-    light->colour[0] = light->colour[1] = light->colour[2] = (float)PI;
+    light->value.kind = LIGHT_DIRECTIONAL;
+    light->value.colour[0] = light->value.colour[1] = light->value.colour[2] = (float)PI;
     fixture_node(fixture, NODE_LIGHT, light->base.id, down);
     fixture->request.integrator = INTEGRATOR_WHITTED;
     fixture_look(fixture, 0.0f, 0.0f, 1.0f, 0.5f);

@@ -13,9 +13,9 @@ TEST(a_mirror_shows_the_colour_of_the_environment)
 {
     struct fixture *fixture = *state;
     struct scene_material *material = fixture_material(fixture);
-    material->metallic = 1.0f;
-    material->roughness = 0.0f;
-    material->base_colour[1] = 0.5f;
+    material->value.metallic = 1.0f;
+    material->value.roughness = 0.0f;
+    material->value.base_colour[1] = 0.5f;
     fixture_square(fixture, 10.0f, material->base.id, NULL);
     fixture_environment(fixture, 0.2f, 0.4f, 3.0f);
     struct frame_result result = fixture_render(fixture);
@@ -40,8 +40,8 @@ TEST(an_environment_image_lights_by_its_irradiance)
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     struct scene_environment *environment = &fixture->edits[fixture->edit_count - 1].set.environment;
-    environment->width = WIDTH;
-    environment->height = HEIGHT;
+    environment->value.width = WIDTH;
+    environment->value.height = HEIGHT;
     environment->texels = fixture_blob(texels, sizeof(texels));
     fixture->request.camera.fov_y = 0.02f;
     fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.01f);
@@ -73,8 +73,8 @@ TEST(an_environment_image_stands_the_right_way_round)
         texels[i * 4 + 2] = 0x3c00; /* blue above */
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     struct scene_environment *environment = &fixture->edits[fixture->edit_count - 1].set.environment;
-    environment->width = WIDTH;
-    environment->height = HEIGHT;
+    environment->value.width = WIDTH;
+    environment->value.height = HEIGHT;
     environment->texels = fixture_blob(texels, sizeof(texels));
     fixture->request.width = fixture->request.height = 9;
     fixture_look(fixture, -3.0f, -3.0f, 3.0f, 0.01f); /* towards +x, +y, -z: the middle of a green column */
@@ -96,12 +96,12 @@ TEST(blended_layers_let_through_what_alpha_leaves)
     for (int i = 0; i < 3; i++) {
         struct scene_material *material = fixture_material(fixture);
         const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -0.5f * (float)i};
-        material->unlit = true;
-        material->alpha_mode = ALPHA_BLEND;
-        material->base_colour[3] = 0.25f;
-        material->base_colour[0] = i == 0 ? 1.0f : 0.0f;
-        material->base_colour[1] = i == 1 ? 1.0f : 0.0f;
-        material->base_colour[2] = i == 2 ? 1.0f : 0.0f;
+        material->value.unlit = true;
+        material->value.alpha_mode = ALPHA_BLEND;
+        material->value.base_colour[3] = 0.25f;
+        material->value.base_colour[0] = i == 0 ? 1.0f : 0.0f;
+        material->value.base_colour[1] = i == 1 ? 1.0f : 0.0f;
+        material->value.base_colour[2] = i == 2 ? 1.0f : 0.0f;
         fixture_square(fixture, 10.0f, material->base.id, transform);
     }
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 1.0f); /* so that there is no default sky */
@@ -121,8 +121,8 @@ static double light_below_panes(struct fixture *fixture, int count, float transm
     fixture_clear((void **)&fixture);
     fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
     struct scene_material *pane = fixture_material(fixture);
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 1.0f - transmittance;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 1.0f - transmittance;
     for (int i = 0; i < count; i++) {
         const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2.0f + 0.01f * (float)i};
         fixture_square(fixture, 10.0f, pane->base.id, transform);
@@ -150,9 +150,9 @@ TEST(depth_counts_the_bounces_after_the_first_hit)
 {
     struct fixture *fixture = *state;
     struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
-    mirror->emission[0] = 1.0f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
+    mirror->value.emission[0] = 1.0f;
     /* two mirrors face to face, each adding 1: the eye between them sees 1 + depth */
     const float behind[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 20.0f};
     fixture_square(fixture, 100.0f, mirror->base.id, NULL);

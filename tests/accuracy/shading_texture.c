@@ -5,16 +5,16 @@
 
 #define PI 3.14159265358979
 
-static struct texture_use one_texture(struct fixture *fixture, uint32_t width, uint32_t height,
-                                      const uint8_t *texels, float strength)
+static struct record_texture_use one_texture(struct fixture *fixture, uint32_t width, uint32_t height,
+                                             const uint8_t *texels, float strength)
 {
     struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
-    texture->width = width;
-    texture->height = height;
-    texture->format = TEXTURE_RGBA8_LINEAR;
+    texture->value.width = width;
+    texture->value.height = height;
+    texture->value.format = TEXTURE_RGBA8_LINEAR;
     texture->texels = fixture_blob(texels, (size_t)width * height * 4);
-    return (struct texture_use){
+    return (struct record_texture_use){
         .texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = strength};
 }
 
@@ -26,8 +26,8 @@ static void light_from(struct fixture *fixture, float x, float y)
     assert_true(frame_camera_look_at(&camera, eye, target, up, 1.0f));
     struct scene_light *light = &fixture_edit(fixture, OBJECT_LIGHT)->set.light;
     light->base.id = fixture->next_id++;
-    light->kind = LIGHT_DIRECTIONAL;
-    light->colour[0] = light->colour[1] = light->colour[2] = (float)PI;
+    light->value.kind = LIGHT_DIRECTIONAL;
+    light->value.colour[0] = light->value.colour[1] = light->value.colour[2] = (float)PI;
     fixture_node(fixture, NODE_LIGHT, light->base.id, camera.world_from_view);
 }
 
@@ -40,7 +40,7 @@ static float render_middle(struct fixture *fixture)
 }
 
 /* KHR_texture_transform: the image turned by so many radians, and scaled. */
-static void turn_slot(struct texture_use *use, double angle, double scale_u, double scale_v)
+static void turn_slot(struct record_texture_use *use, double angle, double scale_u, double scale_v)
 {
     const float rows[6] = {(float)(cos(angle) * scale_u),  (float)(sin(angle) * scale_v), 0.0f,
                            (float)(-sin(angle) * scale_u), (float)(cos(angle) * scale_v), 0.0f};
@@ -52,7 +52,7 @@ static float render_placed_normal_map(struct fixture *fixture, uint8_t red, uint
 {
     fixture_clear((void **)&fixture);
     const uint8_t texel[4] = {red, green, 218, 255};
-    struct texture_use use = one_texture(fixture, 1, 1, texel, 1.0f);
+    struct record_texture_use use = one_texture(fixture, 1, 1, texel, 1.0f);
     turn_slot(&use, place[0], place[1], place[2]);
     struct scene_material *material = fixture_material(fixture);
     material->textures[MATERIAL_NORMAL] = use;
@@ -104,7 +104,7 @@ static float render_bump_ramp(struct fixture *fixture, float strength, float lig
     fixture_clear((void **)&fixture);
     for (int i = 0; i < 256; i++)
         memset(texels + i * 4, i, 4);
-    struct texture_use use = one_texture(fixture, 256, 1, texels, strength);
+    struct record_texture_use use = one_texture(fixture, 256, 1, texels, strength);
     struct scene_material *material = fixture_material(fixture);
     material->textures[MATERIAL_BUMP] = use;
     fixture_square(fixture, 1.0f, material->base.id, NULL);
@@ -127,7 +127,7 @@ TEST(occlusion_darkens_the_environment_by_its_strength)
 {
     struct fixture *fixture = *state;
     const uint8_t half[4] = {51, 255, 255, 255}; /* 0.2 */
-    struct texture_use use = one_texture(fixture, 1, 1, half, 0.5f);
+    struct record_texture_use use = one_texture(fixture, 1, 1, half, 0.5f);
     struct scene_material *material = fixture_material(fixture);
     material->textures[MATERIAL_OCCLUSION] = use;
     fixture_square(fixture, 10.0f, material->base.id, NULL);
@@ -139,9 +139,9 @@ TEST(emission_is_multiplied_by_its_texture)
 {
     struct fixture *fixture = *state;
     const uint8_t texel[4] = {51, 0, 0, 255};
-    struct texture_use use = one_texture(fixture, 1, 1, texel, 1.0f);
+    struct record_texture_use use = one_texture(fixture, 1, 1, texel, 1.0f);
     struct scene_material *material = fixture_material(fixture);
-    material->emission[0] = 10.0f;
+    material->value.emission[0] = 10.0f;
     material->textures[MATERIAL_EMISSION] = use;
     fixture_square(fixture, 10.0f, material->base.id, NULL);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, -5.0f, 1.0f); /* behind */
@@ -154,10 +154,10 @@ TEST(fine_patterns_are_averaged_in_the_distance)
     static uint8_t texels[64 * 64 * 4];
     for (int i = 0; i < 64 * 64; i++)
         memset(texels + i * 4, (i + i / 64) % 2 ? 255 : 0, 4);
-    struct texture_use use = one_texture(fixture, 64, 64, texels, 1.0f);
+    struct record_texture_use use = one_texture(fixture, 64, 64, texels, 1.0f);
     use.uv_transform[0] = use.uv_transform[4] = 4.0f;
     struct scene_material *material = fixture_material(fixture);
-    material->unlit = true;
+    material->value.unlit = true;
     material->textures[MATERIAL_BASE_COLOUR] = use;
     fixture_square(fixture, 2.0f, material->base.id, NULL); /* 256 texels over 40 pixels */
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 5.0f, 1.0f);
@@ -177,10 +177,10 @@ TEST(the_environment_turns_about_y_for_the_eye_and_for_surfaces_alike)
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 0.5f, fixture_material(fixture)->base.id);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     struct scene_environment *environment = &fixture->edits[fixture->edit_count - 1].set.environment;
-    environment->width = WIDTH;
-    environment->height = HEIGHT;
+    environment->value.width = WIDTH;
+    environment->value.height = HEIGHT;
     environment->texels = fixture_blob(texels, sizeof(texels));
-    environment->rotation = (float)(PI / 2.0); /* +x goes to -z */
+    environment->value.rotation = (float)(PI / 2.0); /* +x goes to -z */
     struct frame_result result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 0, 0)[0], 1.0, 1e-6);
     assert_near(fixture_pixel(&result, 16, 16)[0], 0.0, 0.03);
@@ -203,10 +203,10 @@ static void expect_turned_grain(struct fixture *fixture, unsigned integrator, do
     for (int way = 0; way < 3; way++) { /* by a texture; by numbers; without a texture's turn */
         fixture_clear((void **)&fixture);
         struct scene_material *brushed = fixture_material(fixture);
-        brushed->metallic = 1.0f;
-        brushed->roughness = 0.3f;
-        brushed->anisotropy = way == 0 ? 0.9f : 0.9f * 128 / 255;
-        brushed->anisotropy_rotation = way == 1 ? 0.4f + (float)(atan2(y, x) - turn) : 0.4f;
+        brushed->value.metallic = 1.0f;
+        brushed->value.roughness = 0.3f;
+        brushed->value.anisotropy = way == 0 ? 0.9f : 0.9f * 128 / 255;
+        brushed->value.anisotropy_rotation = way == 1 ? 0.4f + (float)(atan2(y, x) - turn) : 0.4f;
         if (way == 0) {
             brushed->textures[MATERIAL_ANISOTROPY] = one_texture(fixture, 1, 1, texel, 1.0f);
             turn_slot(&brushed->textures[MATERIAL_ANISOTROPY], turn, 1, 1);

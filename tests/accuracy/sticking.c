@@ -21,15 +21,15 @@ static void add_body(struct fixture *fixture, enum body body)
 {
     struct scene_material *material = fixture_material(fixture);
     const bool scatters = body >= ROUGH;
-    material->metallic = body == MIRROR;
-    material->transmission = body == GLASS;
-    material->roughness = body == ROUGH || body == VEIL ? 1.0f : body == PLASTIC ? 0.1f : 0.0f;
-    material->ior = 1.5f;
+    material->value.metallic = body == MIRROR;
+    material->value.transmission = body == GLASS;
+    material->value.roughness = body == ROUGH || body == VEIL ? 1.0f : body == PLASTIC ? 0.1f : 0.0f;
+    material->value.ior = 1.5f;
     for (int i = 0; scatters && i < 3; i++)
-        material->base_colour[i] = (float)BASE;
+        material->value.base_colour[i] = (float)BASE;
     if (body == VEIL) {
-        material->alpha_mode = ALPHA_BLEND;
-        material->base_colour[3] = 0.4f;
+        material->value.alpha_mode = ALPHA_BLEND;
+        material->value.base_colour[3] = 0.4f;
     }
     fixture_sphere(fixture, (float)places[body], 0.0f, 0.0f, (float)RADIUS, material->base.id);
 }

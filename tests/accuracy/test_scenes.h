@@ -76,19 +76,20 @@ static inline struct scene_material *test_material(struct test_edits *edits, uin
 {
     struct scene_material *material = &test_add(edits, OBJECT_MATERIAL)->set.material;
     material->base.id = id;
-    material->base_colour[0] = red;
-    material->base_colour[1] = green;
-    material->base_colour[2] = blue;
-    material->base_colour[3] = 1.0f;
-    material->roughness = 1.0f;
-    material->ior = 1.5f;
-    material->alpha_cutoff = 0.5f;
-    material->specular = material->specular_colour[0] = material->specular_colour[1] =
-        material->specular_colour[2] = 1.0f;
-    material->attenuation[0] = material->attenuation[1] = material->attenuation[2] = 1.0f;
-    material->iridescence_ior = 1.3f;
-    material->diffuse_transmission_colour[0] = material->diffuse_transmission_colour[1] =
-        material->diffuse_transmission_colour[2] = 1.0f;
+    material->value.base_colour[0] = red;
+    material->value.base_colour[1] = green;
+    material->value.base_colour[2] = blue;
+    material->value.base_colour[3] = 1.0f;
+    material->value.roughness = 1.0f;
+    material->value.ior = 1.5f;
+    material->value.alpha_cutoff = 0.5f;
+    material->value.specular = material->value.specular_colour[0] = material->value.specular_colour[1] =
+        material->value.specular_colour[2] = 1.0f;
+    material->value.attenuation_colour[0] = material->value.attenuation_colour[1] =
+        material->value.attenuation_colour[2] = 1.0f;
+    material->value.iridescence_ior = 1.3f;
+    material->value.diffuse_transmission_colour[0] = material->value.diffuse_transmission_colour[1] =
+        material->value.diffuse_transmission_colour[2] = 1.0f;
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++) {
         material->textures[i].uv_transform[0] = 1.0f;
         material->textures[i].uv_transform[4] = 1.0f;
@@ -97,9 +98,9 @@ static inline struct scene_material *test_material(struct test_edits *edits, uin
     return material;
 }
 
-static inline struct material_range *test_ranges(const struct material_range *ranges, uint32_t count)
+static inline struct record_material_range *test_ranges(const struct record_material_range *ranges, uint32_t count)
 {
-    struct material_range *copy = malloc((count ? count : 1) * sizeof(*copy));
+    struct record_material_range *copy = malloc((count ? count : 1) * sizeof(*copy));
     memcpy(copy, ranges, count * sizeof(*copy));
     return copy;
 }
@@ -110,8 +111,8 @@ static inline struct scene_mesh *test_mesh(struct test_edits *edits, uint32_t id
 {
     struct scene_mesh *mesh = &test_add(edits, OBJECT_MESH)->set.mesh;
     mesh->base.id = id;
-    mesh->vertex_count = vertex_count;
-    mesh->triangle_count = triangle_count;
+    mesh->value.vertex_count = vertex_count;
+    mesh->value.triangle_count = triangle_count;
     mesh->arrays[MESH_POSITIONS] = test_blob(positions, vertex_count * sizeof(*positions));
     mesh->arrays[MESH_INDICES] = test_blob(indices, (size_t)triangle_count * 3 * sizeof(*indices));
     return mesh;
@@ -122,7 +123,7 @@ static inline struct scene_spheres *test_spheres(struct test_edits *edits, uint3
 {
     struct scene_spheres *spheres = &test_add(edits, OBJECT_SPHERES)->set.spheres;
     spheres->base.id = id;
-    spheres->sphere_count = count;
+    spheres->value.sphere_count = count;
     spheres->centres_radii = test_blob(centres_radii, count * sizeof(*centres_radii));
     return spheres;
 }
@@ -133,10 +134,10 @@ static inline struct scene_node *test_node(struct test_edits *edits, uint32_t id
     static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     struct scene_node *node = &test_add(edits, OBJECT_NODE)->set.node;
     node->base.id = id;
-    node->parent = parent;
-    node->kind = kind;
-    node->object = object;
-    memcpy(node->parent_from_node, parent_from_node ? parent_from_node : identity, sizeof(identity));
+    node->value.parent = parent;
+    node->value.kind = kind;
+    node->value.object = object;
+    memcpy(node->value.parent_from_node, parent_from_node ? parent_from_node : identity, sizeof(identity));
     return node;
 }
 
@@ -183,7 +184,7 @@ static inline void test_soup_mesh(struct test_edits *edits, uint32_t id, uint32_
             indices[v] = v;
         }
     }
-    const struct material_range ranges[] = {{0, count / 3, 1}, {count / 2, count / 4, 2}};
+    const struct record_material_range ranges[] = {{0, count / 3, 1}, {count / 2, count / 4, 2}};
     struct scene_mesh *mesh = test_mesh(edits, id, (const float(*)[3])positions, count * 3, indices, count);
     mesh->arrays[MESH_NORMALS] = test_blob(normals, count * 3 * sizeof(*normals));
     mesh->arrays[MESH_TEXCOORDS_0] = test_blob(uv, count * 3 * sizeof(*uv));
@@ -217,7 +218,7 @@ static inline struct scene *test_scene_soup(void)
     test_node(&edits, 5, 4, NODE_MESH, 10, m);
     test_transform(m, 1, 0, 1, 1, 0, 0, 0, 0);
     test_node(&edits, 6, 0, NODE_MESH, 10, m);
-    test_node(&edits, 7, 0, NODE_MESH, 10, NULL)->hidden = true;
+    test_node(&edits, 7, 0, NODE_MESH, 10, NULL)->value.hidden = true;
     test_commit(&edits);
     return edits.scene;
 }
@@ -235,7 +236,7 @@ static inline struct scene *test_scene_spheres(void)
     }
     test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
     test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    const struct material_range ranges[] = {{5, 10, 2}, {20, 20, 1}};
+    const struct record_material_range ranges[] = {{5, 10, 2}, {20, 20, 1}};
     struct scene_spheres *set = test_spheres(&edits, 20, (const float(*)[4])spheres, 40);
     set->ranges = test_ranges(ranges, 2);
     set->range_count = 2;
@@ -258,11 +259,11 @@ static inline void test_texture(struct test_edits *edits, uint32_t id, uint32_t 
         texels[i] = test_random(&seed);
     struct scene_texture *texture = &test_add(edits, OBJECT_TEXTURE)->set.texture;
     texture->base.id = id;
-    texture->width = width;
-    texture->height = height;
-    texture->format = format;
-    texture->wrap_u = wrap_u;
-    texture->wrap_v = wrap_v;
+    texture->value.width = width;
+    texture->value.height = height;
+    texture->value.format = format;
+    texture->value.wrap_u = wrap_u;
+    texture->value.wrap_v = wrap_v;
     texture->texels = test_blob(texels, (size_t)width * height * 4);
     free(texels);
 }
@@ -275,22 +276,22 @@ static inline struct scene *test_scene_translucent(void)
     test_texture(&edits, 1, 13, 8, TEXTURE_RGBA8_SRGB, WRAP_REPEAT, WRAP_MIRROR, 17);
     test_texture(&edits, 2, 5, 5, TEXTURE_RGBA8_LINEAR, WRAP_CLAMP, WRAP_REPEAT, 19);
     struct scene_material *cutout = test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
-    cutout->alpha_mode = ALPHA_MASK;
+    cutout->value.alpha_mode = ALPHA_MASK;
     cutout->textures[MATERIAL_BASE_COLOUR].texture = 1;
     cutout->textures[MATERIAL_BASE_COLOUR].uv_transform[1] = 0.5f;
     cutout->textures[MATERIAL_BASE_COLOUR].uv_transform[2] = 0.25f;
     cutout->textures[MATERIAL_BASE_COLOUR].uv_transform[3] = -0.3f;
     struct scene_material *pane = test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.6f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.6f;
     struct scene_material *glass = test_material(&edits, 3, 0.9f, 0.8f, 0.7f);
-    glass->transmission = 0.9f;
+    glass->value.transmission = 0.9f;
     glass->textures[MATERIAL_TRANSMISSION].texture = 2;
     struct scene_material *clear = test_material(&edits, 4, 0.95f, 0.75f, 0.85f);
-    clear->transmission = 1.0f;
+    clear->value.transmission = 1.0f;
     test_material(&edits, 5, 0.05f, 0.15f, 0.25f);
     test_soup_mesh(&edits, 10, 60, 0.5f, 7);
-    const struct material_range ranges[] = {{0, 1, 3}, {1, 1, 4}};
+    const struct record_material_range ranges[] = {{0, 1, 3}, {1, 1, 4}};
     struct scene_spheres *set = test_spheres(&edits, 20, (const float(*)[4])sphere, 2);
     set->ranges = test_ranges(ranges, 2);
     set->range_count = 2;
@@ -300,10 +301,10 @@ static inline struct scene *test_scene_translucent(void)
     test_node(&edits, 3, 0, NODE_MESH, 10, m);
     struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
-    disc->material = 5;
-    disc->centre_world[1] = -1.2f;
-    disc->normal_world[1] = 1.0f;
-    disc->radius = 3.0f;
+    disc->value.material = 5;
+    disc->value.centre_world[1] = -1.2f;
+    disc->value.normal_world[1] = 1.0f;
+    disc->value.radius = 3.0f;
     test_commit(&edits);
     return edits.scene;
 }

@@ -143,10 +143,10 @@ static void set_disc(struct fixture *fixture, uint32_t id, uint32_t material, fl
 {
     struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
     disc->base.id = id;
-    disc->material = material;
-    disc->normal_world[2] = 1.0f;
-    disc->centre_world[2] = -1.0f;
-    disc->radius = radius;
+    disc->value.material = material;
+    disc->value.normal_world[2] = 1.0f;
+    disc->value.centre_world[2] = -1.0f;
+    disc->value.radius = radius;
 }
 
 static void move_node(struct fixture *fixture, uint32_t id, enum node_kind kind, uint32_t object, float x)
@@ -154,9 +154,9 @@ static void move_node(struct fixture *fixture, uint32_t id, enum node_kind kind,
     const float moved[12] = {1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, kind == NODE_LIGHT ? 3.0f : 0.0f};
     struct scene_node *node = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     node->base.id = id;
-    node->kind = kind;
-    node->object = object;
-    memcpy(node->parent_from_node, moved, sizeof(moved));
+    node->value.kind = kind;
+    node->value.object = object;
+    memcpy(node->value.parent_from_node, moved, sizeof(moved));
 }
 
 static struct ids build_scene(struct fixture *fixture)

@@ -104,13 +104,13 @@ static void mix(struct fixture *fixture, bool plain)
     for (size_t i = 0; i < fixture->edit_count; i++) {
         struct scene_edit *edit = &fixture->edits[i];
         if (edit->object == OBJECT_LIGHT)
-            edit->set.light.kind = LIGHT_POINT;
+            edit->set.light.value.kind = LIGHT_POINT;
         if (!plain || edit->kind != EDIT_SET || edit->object != OBJECT_MATERIAL)
             continue;
         struct scene_material *material = &edit->set.material;
-        material->transmission = material->metallic = 0.0f;
-        material->alpha_mode = ALPHA_OPAQUE;
-        material->roughness = material->ior = 1.0f;
+        material->value.transmission = material->value.metallic = 0.0f;
+        material->value.alpha_mode = ALPHA_OPAQUE;
+        material->value.roughness = material->value.ior = 1.0f;
     }
 }
 
@@ -323,7 +323,7 @@ static void panels(struct fixture *fixture)
     uint32_t materials[5];
     for (int i = 0; i < 5; i++) {
         struct scene_material *material = fixture_material(fixture);
-        memcpy(material->base_colour, colours[i], sizeof(colours[i]));
+        memcpy(material->value.base_colour, colours[i], sizeof(colours[i]));
         materials[i] = material->base.id;
     }
     const float floor_transform[12] = {1, 0, 0, 0, 0, 0, 1, -0.6f, 0, -1, 0, 0};
@@ -381,7 +381,7 @@ TEST_LONG(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
 static void squares_on_the_wall(struct fixture *fixture)
 {
     struct scene_material *dark = fixture_material(fixture);
-    dark->base_colour[0] = dark->base_colour[1] = 0.1f;
+    dark->value.base_colour[0] = dark->value.base_colour[1] = 0.1f;
     const uint32_t material = dark->base.id;
     for (int i = 0; i < 40; i++) {
         const float x = -2.0f + 0.4f * (float)(i % 10), y = 0.2f + 0.4f * (float)(i / 10);

@@ -109,13 +109,13 @@ static void build_scene(struct fixture *fixture)
     fixture_mixture(fixture);
     for (size_t i = 0; i < fixture->edit_count; i++)
         if (fixture->edits[i].object == OBJECT_LIGHT)
-            fixture->edits[i].set.light.kind = LIGHT_POINT;
+            fixture->edits[i].set.light.value.kind = LIGHT_POINT;
     const float wall_transform[12] = {0.8f, 0, 0.6f, 0, 0, 1, 0, 0, -0.6f, 0, 0.8f, -1.5f};
     const float mirror_transform[12] = {1, 0, 0, 0, 0, 0, 1, -0.59f, 0, -1, 0, 0};
     fixture_square(fixture, 1.1f, fixture_material(fixture)->base.id, wall_transform);
     struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.0f;
+    mirror->value.metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
     fixture_square(fixture, 3.0f, mirror->base.id, mirror_transform);
     fixture->request.width = 84; /* not a multiple of the tiles' 8: some slots are dead */
     fixture->request.height = 60;

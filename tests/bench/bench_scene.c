@@ -65,16 +65,16 @@ static struct scene *family_scene(uint32_t triangles)
 static bool own_camera(struct bench_scene *scene)
 {
     const struct scene_node *node = scene_node(scene->loaded.scene, scene->loaded.camera);
-    const struct scene_camera *camera = node ? scene_camera(scene->loaded.scene, node->object) : NULL;
+    const struct scene_camera *camera = node ? scene_camera(scene->loaded.scene, node->value.object) : NULL;
     float m[12], eye[3], look_at[3], up[3];
-    if (!camera || camera->fov_y <= 0 || !scene_world_from_node(scene->loaded.scene, NULL, node->base.id, m))
+    if (!camera || camera->value.fov_y <= 0 || !scene_world_from_node(scene->loaded.scene, NULL, node->base.id, m))
         return false;
     for (int k = 0; k < 3; k++) {
         eye[k] = m[4 * k + 3];
         look_at[k] = eye[k] - m[4 * k + 2];
         up[k] = m[4 * k + 1];
     }
-    return frame_camera_look_at(&scene->camera, eye, look_at, up, camera->fov_y);
+    return frame_camera_look_at(&scene->camera, eye, look_at, up, camera->value.fov_y);
 }
 
 static bool choose_camera(struct bench_scene *scene, const struct bench_scene_options *options,

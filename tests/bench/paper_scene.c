@@ -24,26 +24,26 @@ static void add_materials(struct test_edits *edits)
         }
     struct scene_texture *texture = &test_add(edits, OBJECT_TEXTURE)->set.texture;
     texture->base.id = 1;
-    texture->width = texture->height = TEXTURE_EDGE;
+    texture->value.width = texture->value.height = TEXTURE_EDGE;
     texture->texels = test_blob(texels, sizeof(texels));
     struct scene_material *ground = test_material(edits, MATERIAL_GROUND, 1.0f, 1.0f, 1.0f);
-    ground->roughness = 0.7f;
+    ground->value.roughness = 0.7f;
     ground->textures[MATERIAL_BASE_COLOUR].texture = 1;
     struct scene_material *flake = test_material(edits, MATERIAL_FLAKE, 0.95f, 0.75f, 0.45f);
-    flake->metallic = 1.0f;
-    flake->roughness = 0.2f;
+    flake->value.metallic = 1.0f;
+    flake->value.roughness = 0.2f;
     struct scene_material *blob = test_material(edits, MATERIAL_BLOB, 0.1f, 0.3f, 0.6f);
-    blob->roughness = 0.15f;
+    blob->value.roughness = 0.15f;
     struct scene_material *rough = test_material(edits, MATERIAL_LOOSE, 0.7f, 0.2f, 0.15f);
-    rough->roughness = 0.9f;
+    rough->value.roughness = 0.9f;
     struct scene_material *glossy = test_material(edits, MATERIAL_LOOSE + 1, 0.2f, 0.6f, 0.2f);
-    glossy->roughness = 0.25f;
+    glossy->value.roughness = 0.25f;
     struct scene_material *glass = test_material(edits, MATERIAL_LOOSE + 2, 0.95f, 0.97f, 1.0f);
-    glass->roughness = 0.0f;
-    glass->transmission = 1.0f;
+    glass->value.roughness = 0.0f;
+    glass->value.transmission = 1.0f;
     struct scene_material *mirror = test_material(edits, MATERIAL_LOOSE + 3, 0.9f, 0.9f, 0.9f);
-    mirror->roughness = 0.0f;
-    mirror->metallic = 1.0f;
+    mirror->value.roughness = 0.0f;
+    mirror->value.metallic = 1.0f;
 }
 
 static void unit_cross(float out[3], const float a[3], const float b[3])
@@ -83,12 +83,12 @@ static uint32_t add_flake(float (*spheres)[4], const float centre[3], float radi
 static void add_loose(struct test_edits *edits)
 {
     float spheres[LOOSE_SPHERES][4];
-    struct material_range ranges[LOOSE_SPHERES];
+    struct record_material_range ranges[LOOSE_SPHERES];
     for (uint32_t i = 0; i < LOOSE_SPHERES; i++) {
         float angle = 2.4f * (float)i, away = 2.0f + 0.55f * sqrtf((float)(i * 3 + 4)),
               radius = 0.16f + 0.04f * (float)(i % 7);
         memcpy(spheres[i], (float[4]){away * cosf(angle), radius, away * sinf(angle), radius}, sizeof(spheres[i]));
-        ranges[i] = (struct material_range){i, 1, MATERIAL_LOOSE + i % LOOSE_MATERIALS};
+        ranges[i] = (struct record_material_range){i, 1, MATERIAL_LOOSE + i % LOOSE_MATERIALS};
     }
     const uint32_t falling = LOOSE_SPHERES / 8, lying = LOOSE_SPHERES - falling;
     struct scene_spheres *set = test_spheres(edits, OBJECT_LOOSE, (const float(*)[4])spheres, lying);
@@ -124,7 +124,7 @@ static void add_blob(struct test_edits *edits)
     struct scene_mesh *mesh = test_mesh(edits, OBJECT_BLOB, (const float(*)[3])positions, ROW * ROW, indices[0],
                                         2 * BLOB_STEPS * BLOB_STEPS);
     mesh->arrays[MESH_NORMALS] = test_blob(normals, sizeof(normals));
-    mesh->ranges = test_ranges(&(struct material_range){0, 2 * BLOB_STEPS * BLOB_STEPS, MATERIAL_BLOB}, 1);
+    mesh->ranges = test_ranges(&(struct record_material_range){0, 2 * BLOB_STEPS * BLOB_STEPS, MATERIAL_BLOB}, 1);
     mesh->range_count = 1;
     const float at[12] = {1, 0, 0, blob_place[0], 0, 1, 0, blob_place[1], 0, 0, 1, blob_place[2]};
     test_node(edits, NODE_BLOB, 0, NODE_MESH, OBJECT_BLOB, at);
@@ -139,15 +139,16 @@ static void add_lights(struct test_edits *edits)
     for (uint32_t i = 0; i < 3; i++) {
         struct scene_light *light = &test_add(edits, OBJECT_LIGHT)->set.light;
         light->base.id = 1 + i;
-        light->kind = LIGHT_SPHERE;
-        light->size[0] = lights[i][3];
-        memcpy(light->colour, &lights[i][4], sizeof(light->colour));
+        light->value.kind = LIGHT_SPHERE;
+        light->value.size[0] = lights[i][3];
+        memcpy(light->value.colour, &lights[i][4], sizeof(light->value.colour));
         const float at[12] = {1, 0, 0, lights[i][0], 0, 1, 0, lights[i][1], 0, 0, 1, lights[i][2]};
         test_node(edits, NODE_LIGHTS + i, 0, NODE_LIGHT, 1 + i, at);
     }
     struct scene_edit *sky = test_add(edits, OBJECT_NODE);
     sky->kind = EDIT_SET_ENVIRONMENT;
-    memcpy(sky->set.environment.colour, (float[3]){0.18f, 0.24f, 0.32f}, sizeof(sky->set.environment.colour));
+    memcpy(sky->set.environment.value.colour, (float[3]){0.18f, 0.24f, 0.32f},
+           sizeof(sky->set.environment.value.colour));
 }
 
 struct scene *paper_scene_create(void)
@@ -160,16 +161,16 @@ struct scene *paper_scene_create(void)
     add_materials(&edits);
     add_flake(flake, centre, 0.9f, up, FLAKE_DEPTH);
     struct scene_spheres *set = test_spheres(&edits, OBJECT_FLAKE, (const float(*)[4])flake, FLAKE_SPHERES);
-    set->ranges = test_ranges(&(struct material_range){0, FLAKE_SPHERES, MATERIAL_FLAKE}, 1);
+    set->ranges = test_ranges(&(struct record_material_range){0, FLAKE_SPHERES, MATERIAL_FLAKE}, 1);
     set->range_count = 1;
     test_node(&edits, NODE_FLAKE, 0, NODE_SPHERES, OBJECT_FLAKE, NULL);
     add_loose(&edits);
     add_blob(&edits);
     struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
-    disc->material = MATERIAL_GROUND;
-    disc->normal_world[1] = 1.0f;
-    disc->radius = 40.0f;
+    disc->value.material = MATERIAL_GROUND;
+    disc->value.normal_world[1] = 1.0f;
+    disc->value.radius = 40.0f;
     add_lights(&edits);
     test_commit(&edits);
     return edits.scene;

@@ -67,38 +67,40 @@ static void take_weights(struct input *input, float **weights, uint32_t *count)
 static void make_node(struct input *input, struct scene_node *node)
 {
     static const enum node_kind kinds[] = {NODE_MESH, NODE_GROUP, NODE_MESH, NODE_LIGHT};
-    node->parent = take(input) % 2 ? 0 : take_id(input);
-    node->kind = kinds[take(input) % 4];
-    node->object = node->kind == NODE_GROUP ? 0 : take_id(input);
-    node->skin = node->kind == NODE_MESH && take(input) % 2 ? take_id(input) : 0;
-    node->hidden = take(input) % 8 == 7;
-    node->parent_from_node[0] = node->parent_from_node[5] = node->parent_from_node[10] = 1;
+    node->value.parent = take(input) % 2 ? 0 : take_id(input);
+    node->value.kind = kinds[take(input) % 4];
+    node->value.object = node->value.kind == NODE_GROUP ? 0 : take_id(input);
+    node->value.skin = node->value.kind == NODE_MESH && take(input) % 2 ? take_id(input) : 0;
+    node->value.hidden = take(input) % 8 == 7;
+    node->value.parent_from_node[0] = node->value.parent_from_node[5] = node->value.parent_from_node[10] = 1;
     for (unsigned i = take(input) % 4; i > 0; i--) {
         float value = take_float(input, false);
-        node->parent_from_node[take(input) % 12] = fabsf(value) <= 1e12f ? value : 0;
+        node->value.parent_from_node[take(input) % 12] = fabsf(value) <= 1e12f ? value : 0;
     }
     take_weights(input, &node->weights, &node->weight_count);
 }
 
 static void make_mesh(struct input *input, struct scene_mesh *mesh)
 {
-    mesh->vertex_count = 3 + take(input) % 2;
-    mesh->triangle_count = 1;
-    mesh->influence_count = take(input) % 3;
-    mesh->target_count = take(input) % 3;
-    mesh->arrays[MESH_POSITIONS] = take_array(input, mesh->vertex_count, 12, 0);
+    mesh->value.vertex_count = 3 + take(input) % 2;
+    mesh->value.triangle_count = 1;
+    mesh->value.influence_count = take(input) % 3;
+    mesh->value.target_count = take(input) % 3;
+    mesh->arrays[MESH_POSITIONS] = take_array(input, mesh->value.vertex_count, 12, 0);
     mesh->arrays[MESH_INDICES] = take_array(input, 3, 4, 3);
     if (take(input) % 2)
-        mesh->arrays[MESH_NORMALS] = take_array(input, mesh->vertex_count, 12, 0);
-    if (mesh->influence_count) {
-        mesh->arrays[MESH_JOINTS] = take_array(input, (size_t)mesh->vertex_count * mesh->influence_count, 2, 3);
-        mesh->arrays[MESH_WEIGHTS] = take_array(input, mesh->vertex_count, 4 * mesh->influence_count, 0);
+        mesh->arrays[MESH_NORMALS] = take_array(input, mesh->value.vertex_count, 12, 0);
+    if (mesh->value.influence_count) {
+        mesh->arrays[MESH_JOINTS] =
+            take_array(input, (size_t)mesh->value.vertex_count * mesh->value.influence_count, 2, 3);
+        mesh->arrays[MESH_WEIGHTS] =
+            take_array(input, mesh->value.vertex_count, 4 * mesh->value.influence_count, 0);
         struct blob *weights = mesh->arrays[MESH_WEIGHTS];
         for (size_t i = 0; weights && i + 4 <= weights->size_bytes && take(input) % 16; i += 4)
             weights->data[i + 3] &= 0x7f; /* not negative */
     }
-    for (int i = MESH_TARGET_POSITIONS; i < MESH_ARRAY_COUNT && mesh->target_count; i++)
-        mesh->arrays[i] = take_array(input, (size_t)mesh->target_count * mesh->vertex_count, 12, 0);
+    for (int i = MESH_TARGET_POSITIONS; i < MESH_ARRAY_COUNT && mesh->value.target_count; i++)
+        mesh->arrays[i] = take_array(input, (size_t)mesh->value.target_count * mesh->value.vertex_count, 12, 0);
     take_weights(input, &mesh->weights, &mesh->weight_count);
 }
 
@@ -109,14 +111,14 @@ static void make_channel(struct input *input, struct scene_channel *channel)
                                      CHANNEL_MATERIAL_BASE_COLOUR, CHANNEL_VIEW_EYE,      7};
     static const uint32_t widths[] = {3, 4, 3, 2, 1, 2, 4, 3, 1};
     unsigned which = take(input) % 9;
-    channel->clip = take_id(input);
-    channel->path = (enum channel_path)paths[which];
-    channel->width = widths[which] + (take(input) % 16 == 15);
-    channel->object = channel->path == CHANNEL_VIEW_EYE ? 0 : take_id(input);
-    channel->interpolation = (enum interpolation)(take(input) % 16 % 6);
-    channel->key_count = 1 + take(input) % 4;
-    channel->first_time = take(input) % 4;
-    channel->first_value = take(input) % 16;
+    channel->value.clip = take_id(input);
+    channel->value.path = (enum channel_path)paths[which];
+    channel->value.width = widths[which] + (take(input) % 16 == 15);
+    channel->value.object = channel->value.path == CHANNEL_VIEW_EYE ? 0 : take_id(input);
+    channel->value.interpolation = (enum interpolation)(take(input) % 16 % 6);
+    channel->value.key_count = 1 + take(input) % 4;
+    channel->value.first_time = take(input) % 4;
+    channel->value.first_value = take(input) % 16;
 }
 
 static void make_clip(struct input *input, struct scene_clip *clip)
@@ -147,10 +149,10 @@ static void make_edit(struct input *input, struct scene_edit *edit)
         make_mesh(input, &edit->set.mesh);
         break;
     case OBJECT_SKIN:
-        edit->set.skin.joint_count = 2 + take(input) % 4;
-        edit->set.skin.joints = take_array(input, edit->set.skin.joint_count, 4, IDS + 1);
+        edit->set.skin.value.joint_count = 2 + take(input) % 4;
+        edit->set.skin.joints = take_array(input, edit->set.skin.value.joint_count, 4, IDS + 1);
         if (take(input) % 2)
-            edit->set.skin.joint_from_mesh = take_array(input, edit->set.skin.joint_count, 48, 0);
+            edit->set.skin.joint_from_mesh = take_array(input, edit->set.skin.value.joint_count, 48, 0);
         break;
     case OBJECT_CLIP:
         make_clip(input, &edit->set.clip);
@@ -243,17 +245,17 @@ static struct scene *make_scene(void)
     struct scene_edit edits[7];
     for (uint32_t i = 0; i < 3; i++) {
         set(&edits[i], OBJECT_NODE, i + 1);
-        float *m = edits[i].set.node.parent_from_node;
+        float *m = edits[i].set.node.value.parent_from_node;
         m[0] = m[5] = m[10] = 1;
     }
-    edits[2].set.node.kind = NODE_MESH;
-    edits[2].set.node.object = edits[2].set.node.skin = 1;
+    edits[2].set.node.value.kind = NODE_MESH;
+    edits[2].set.node.value.object = edits[2].set.node.value.skin = 1;
     set(&edits[3], OBJECT_MESH, 1);
     struct scene_mesh *mesh = &edits[3].set.mesh;
-    mesh->vertex_count = 3;
-    mesh->triangle_count = 1;
-    mesh->influence_count = 2;
-    mesh->target_count = 1;
+    mesh->value.vertex_count = 3;
+    mesh->value.triangle_count = 1;
+    mesh->value.influence_count = 2;
+    mesh->value.target_count = 1;
     mesh->arrays[MESH_POSITIONS] = array_of(triangle, sizeof(triangle));
     mesh->arrays[MESH_NORMALS] = array_of(triangle, sizeof(triangle));
     mesh->arrays[MESH_INDICES] = array_of(indices, sizeof(indices));
@@ -261,18 +263,18 @@ static struct scene *make_scene(void)
     mesh->arrays[MESH_WEIGHTS] = array_of(weights, sizeof(weights));
     mesh->arrays[MESH_TARGET_POSITIONS] = array_of(triangle, sizeof(triangle));
     set(&edits[4], OBJECT_SKIN, 1);
-    edits[4].set.skin.joint_count = 2;
+    edits[4].set.skin.value.joint_count = 2;
     edits[4].set.skin.joints = array_of(joints, sizeof(joints));
     set(&edits[5], OBJECT_CLIP, 1);
     edits[5].set.clip.floats = array_of(turning, sizeof(turning));
     set(&edits[6], OBJECT_CHANNEL, 1);
     edits[6].set.channel = (struct scene_channel){.base.id = 1,
-                                                  .clip = 1,
-                                                  .path = CHANNEL_NODE_ROTATION,
-                                                  .object = 2,
-                                                  .width = 4,
-                                                  .key_count = 2,
-                                                  .first_value = 2};
+                                                  .value.clip = 1,
+                                                  .value.path = CHANNEL_NODE_ROTATION,
+                                                  .value.object = 2,
+                                                  .value.width = 4,
+                                                  .value.key_count = 2,
+                                                  .value.first_value = 2};
     struct scene *scene = scene_create("fuzz", NULL);
     FUZZ_REQUIRE(scene && scene_commit(scene, edits, 7, NULL));
     return scene;

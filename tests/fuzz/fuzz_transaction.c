@@ -47,18 +47,18 @@ static void make_edit(struct scene_edit *edit, unsigned what, uint32_t id, unsig
     edit->set.node.base.id = id;
     if (edit->object == OBJECT_MESH) {
         struct scene_mesh *mesh = &edit->set.mesh;
-        mesh->vertex_count = ELEMENTS - (which == 7); /* which does not fit the arrays */
-        mesh->triangle_count = ELEMENTS;
+        mesh->value.vertex_count = ELEMENTS - (which == 7); /* which does not fit the arrays */
+        mesh->value.triangle_count = ELEMENTS;
         mesh->arrays[MESH_POSITIONS] = blob_ref(arrays[which & 1 ? POSITIONS_WITH_NAN : POSITIONS]);
         mesh->arrays[MESH_INDICES] = blob_ref(arrays[which & 2 ? INDICES_BEYOND : INDICES]);
     } else if (edit->object == OBJECT_SKIN) {
-        edit->set.skin.joint_count = ELEMENTS;
+        edit->set.skin.value.joint_count = ELEMENTS;
         edit->set.skin.joints = blob_ref(arrays[JOINTS]);
         edit->set.skin.joint_from_mesh = which & 1 ? NULL : blob_ref(arrays[MATRICES]);
     } else if (edit->object == OBJECT_NODE) {
-        edit->set.node.parent = which & 1 ? id - 1 : 0;
-        edit->set.node.parent_from_node[0] = edit->set.node.parent_from_node[5] = 1;
-        edit->set.node.parent_from_node[10] = 1;
+        edit->set.node.value.parent = which & 1 ? id - 1 : 0;
+        edit->set.node.value.parent_from_node[0] = edit->set.node.value.parent_from_node[5] = 1;
+        edit->set.node.value.parent_from_node[10] = 1;
     }
 }
 

@@ -73,9 +73,9 @@ static void set_node(struct talk *talk, uint32_t request, uint32_t node, enum pr
 {
     struct message_set_node *set = &begin(talk, MESSAGE_SET_NODE)->set_node;
     set->node = node;
-    set->kind = kind;
-    set->object = kind == PROTOCOL_NODE_GROUP ? 0 : 1;
-    set->parent_from_node[0] = set->parent_from_node[5] = set->parent_from_node[10] = 1;
+    set->value.kind = kind;
+    set->value.object = kind == PROTOCOL_NODE_GROUP ? 0 : 1;
+    set->value.parent_from_node[0] = set->value.parent_from_node[5] = set->value.parent_from_node[10] = 1;
     set->name = "a node";
     end(talk, request);
 }
@@ -85,8 +85,8 @@ static void set_mesh(struct talk *talk, uint32_t request, struct record_blob_ref
     static struct record_material_range range = {.count = 1, .material = 1};
     struct message_set_mesh *set = &begin(talk, MESSAGE_SET_MESH)->set_mesh;
     set->mesh = 1;
-    set->vertex_count = 3;
-    set->triangle_count = 1;
+    set->value.vertex_count = 3;
+    set->value.triangle_count = 1;
     set->arrays = references;
     set->arrays_count = 2;
     set->ranges = &range;
@@ -112,7 +112,7 @@ static void put_up(struct talk *talk, uint32_t request)
     set_node(talk, request + 3, 1, PROTOCOL_NODE_MESH);
     struct message_set_light *light = &begin(talk, MESSAGE_SET_LIGHT)->set_light;
     light->light = 1;
-    light->kind = PROTOCOL_LIGHT_DIRECTIONAL;
+    light->value.kind = PROTOCOL_LIGHT_DIRECTIONAL;
     end(talk, request + 3);
     set_node(talk, request + 3, 2, PROTOCOL_NODE_LIGHT);
     commit(talk, request + 3);

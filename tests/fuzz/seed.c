@@ -78,6 +78,7 @@ static void words_of_struct(FILE *file, const struct struct_desc *desc)
             word(file, field->max, 4);
             break;
         case FIELD_BYTES:
+        case FIELD_RECORD:
             break;
         }
     }
@@ -142,8 +143,8 @@ static bool write_messages(const char *folder)
 static bool write_handshakes(const char *folder)
 {
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
-    struct handshake_hello hello = {.version_min = 1, .version_max = 2, .name = "a client"};
-    struct handshake_reply reply = {.version = 1, .name = "farlightd"};
+    struct handshake_hello hello = {.version_min = 1, .version_max = HANDSHAKE_VERSION_MAX, .name = "a client"};
+    struct handshake_reply reply = {.version = HANDSHAKE_VERSION_MAX, .name = "farlightd"};
     struct handshake_reply refusal = {.version = 0, .name = "farlightd", .text = "none in common"};
     return seed_write_file(folder, "handshake", "hello", 0, bytes, handshake_hello_encode(bytes, &hello)) &&
            seed_write_file(folder, "handshake", "reply", 0, bytes, handshake_reply_encode(bytes, &reply)) &&

@@ -179,7 +179,8 @@ bool serving_send(unsigned number, const uint8_t *bytes, size_t count)
 
 void serving_greet(unsigned number)
 {
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "a client"};
+    struct handshake_hello hello = {
+        .version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX, .name = "a client"};
     hello.capabilities = number % 2 ? HANDSHAKE_CAN_ABANDON : 0;
     uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
     serving_send(number, bytes, handshake_hello_encode(bytes, &hello));

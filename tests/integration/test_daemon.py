@@ -27,7 +27,7 @@ PROTOCOL, INVALID, UNKNOWN_ID, LIMIT = 1, 3, 4, 6
 IDENTITY = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0)
 
 
-def hello(version_min=1, version_max=1, name=b"test"):
+def hello(version_min=2, version_max=2, name=b"test"):
     data = b"FARL" + struct.pack("<HHQ", version_min, version_max, 0) + os.urandom(16) + bytes([len(name)]) + name
     return data + bytes(-len(data) % 8)
 
@@ -43,7 +43,8 @@ def text(value):
 
 def set_node(node, parent=0, kind=0, thing=0, matrix=IDENTITY):
     """The fixed part without its last field, the skin, as an older client sends it."""
-    return struct.pack("<5I12f", node, parent, kind, thing, 0, *matrix)
+    value = struct.pack("<4I12f", parent, kind, thing, 0, *matrix)  # without its last two fields, as an older client's
+    return struct.pack("<IH", node, len(value)) + value
 
 
 def named(value):
@@ -154,7 +155,7 @@ class Hostile(Case):
         self.addCleanup(peer.close)
         version, note = peer.read_reply()
         self.assertEqual(version, 0)
-        self.assertIn("1", note)
+        self.assertIn("2", note)
         self.assertEqual(peer.until_closed(), [])
         self.assert_alive()
 

@@ -111,7 +111,7 @@ def say(message, request=0, channel=0):
 
 
 DIGEST = 0x1059105ad19bfa09  # XXH3-64 of bytes(range(256)) * 2
-REPLY = b"FARL" + struct.pack("<HHQ", 1, 0, 0) + bytes(32) + b"\0\0" + bytes(6)
+REPLY = b"FARL" + struct.pack("<HHQ", 2, 0, 0) + bytes(32) + b"\0\0" + bytes(6)
 
 
 class Asked:
@@ -168,7 +168,7 @@ def frame(number, **values):
 class Lies(Case):
     def test_what_is_no_handshake_ends_the_connection(self):
         for reply, kind in ((b"HTTP/1.1 400 Bad Request", farlight.ProtocolError), (b"F" + bytes(47), farlight.ProtocolError),
-                            (b"FARL" + struct.pack("<HH", 1, 60000) + bytes(40), farlight.ProtocolError),
+                            (b"FARL" + struct.pack("<HH", 2, 60000) + bytes(40), farlight.ProtocolError),
                             (b"FARL" + struct.pack("<HHQ", 7, 0, 0) + bytes(34) + bytes(6), farlight.Refused),
                             (b"FARL" + struct.pack("<HHQ", 0, 0, 4) + bytes(34) + bytes(6), farlight.Refused)):
             with self.subTest(reply=reply[:8]):

@@ -182,7 +182,7 @@ class Document(Case):
 
     def take_reply(self, connection):
         reply = connection.recv(48, socket.MSG_WAITALL)
-        self.assertEqual(reply[:6], b"FARL\1\0")
+        self.assertEqual(reply[:6], b"FARL\2\0")
         limits_bytes, = struct.unpack_from("<H", reply, 6)
         reply += connection.recv(limits_bytes, socket.MSG_WAITALL)
         for _ in range(2):

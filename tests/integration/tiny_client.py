@@ -19,6 +19,7 @@ PRIVATE, KEPT, SHARED = 0, 1, 2  # sharing
 NODE_MESH, NODE_LIGHT = 1, 3  # node_kind
 DIRECTIONAL = 2  # light_kind
 CAMERA_PATH_KEYS = 2  # camera_path
+VERSION = 2  # of the protocol
 CANCELLED = 8  # error_code
 UPLOAD_CHANNEL, CHUNK_BYTES, PIECE_BYTES = 1, 1 << 20, 262144
 IDENTITY = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0)
@@ -111,7 +112,7 @@ class Client:
 
     def greet(self, name, capabilities):
         name = name.encode()
-        hello = b"FARL" + struct.pack("<2HQ16sB", 1, 1, capabilities, bytes(16), len(name)) + name
+        hello = b"FARL" + struct.pack("<2HQ16sB", VERSION, VERSION, capabilities, bytes(16), len(name)) + name
         self.socket.sendall(hello + bytes(-len(hello) % 8))
         reply = self.read(48)
         assert reply[:4] == b"FARL", reply
@@ -124,7 +125,7 @@ class Client:
             texts.append(self.read(length).decode())
             used += 1 + length
         self.read(-used % 8)
-        if self.version != 1:
+        if self.version != VERSION:
             raise Failed(2, "version", texts[1])
         self.daemon, self.requests_in_flight = texts[0], struct.unpack_from("<I", limits, 28)[0]
 
@@ -293,28 +294,35 @@ def camera_bytes(camera):
 
 # ---- edits
 
+def record(fixed):
+    """A record among the fixed fields of a message."""
+    return struct.pack("<H", len(fixed)) + fixed
+
+
 def set_material(material, base_colour, roughness=1, unlit=0, metallic=0):
-    fixed = struct.pack("<4I", material, 0, 0, unlit)
-    fixed += struct.pack("<14f", *base_colour, 1, 0, 0, 0, metallic, roughness, 0, 1.5, 0, 0, 0)
-    fixed += struct.pack("<I9f", 0, 1, 1, 1, 1, 0, 1, 1, 1, 0)  # emission, mirror and body as usual
-    fixed += struct.pack("<15fI", 0, 0, 0, 0, 0, 0, 0, 1.3, 100, 400, 0, 0, 1, 1, 1, 0)  # no layers
-    return SET_MATERIAL, payload(fixed, array([]), string(""))
+    value = struct.pack("<3I", 0, 0, unlit)
+    value += struct.pack("<7fI", *base_colour, 1, 0, 0, 0, 0)
+    value += struct.pack("<7f", metallic, roughness, 0, 1.5, 0, 0, 0)
+    value += struct.pack("<9f", 1, 1, 1, 1, 1, 1, 1, 0, 0)  # mirror and body as usual
+    value += struct.pack("<15fI", 0, 0, 0, 0, 0, 0, 0, 1.3, 100, 400, 0, 0, 1, 1, 1, 0)  # no layers
+    return SET_MATERIAL, payload(struct.pack("<I", material) + record(value), array([]), string(""))
 
 
 def set_mesh(mesh, vertex_count, triangle_count, blobs, material):
     """blobs: positions, indices and, where there are any, normals."""
-    fixed = struct.pack("<6I", mesh, vertex_count, triangle_count, 0, 0, 0)
+    fixed = struct.pack("<I", mesh) + record(struct.pack("<5I", vertex_count, triangle_count, 0, 0, 0))
     ranges = [struct.pack("<3I", 0, triangle_count, material)]
     return SET_MESH, payload(fixed, array([blob_reference(blob) for blob in blobs]), array(ranges), array([]), string(""))
 
 
 def set_node(node, kind, thing, parent_from_node=IDENTITY):
-    fixed = struct.pack("<5I12f2I", node, 0, kind, thing, 0, *parent_from_node, 0, 0)
+    fixed = struct.pack("<I", node) + record(struct.pack("<4I12f2I", 0, kind, thing, 0, *parent_from_node, 0, 0))
     return SET_NODE, payload(fixed, array([]), string(""))
 
 
 def set_light(light, kind, colour):
-    return SET_LIGHT, payload(struct.pack("<2I8f", light, kind, *colour, 0, 0, 0, 0, 0), string(""))
+    value = struct.pack("<I8f", kind, *colour, 0, 0, 0, 0, 0)
+    return SET_LIGHT, payload(struct.pack("<I", light) + record(value), string(""))
 
 
 def triangle(colour=(0.8, 0.4, 0.2)):

@@ -141,7 +141,7 @@ class Soak:
                 pass  # it has closed before it had read all
 
     @staticmethod
-    def hello(lowest=1, highest=1, name=b"soak"):
+    def hello(lowest=2, highest=2, name=b"soak"):
         data = b"FARL" + struct.pack("<2HQ16sB", lowest, highest, 0, bytes(16), len(name)) + name
         return data + bytes(-len(data) % 8)
 

@@ -22,7 +22,7 @@ struct shown {
 
 static bool make_room(struct shown *shown, const struct scene_mesh *mesh, struct error *error)
 {
-    const size_t bytes = (size_t)mesh->vertex_count * 3 * sizeof(float);
+    const size_t bytes = (size_t)mesh->value.vertex_count * 3 * sizeof(float);
     *shown = (struct shown){malloc(bytes), calloc(1, bytes)};
     return (shown->positions && shown->normals) || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
 }
@@ -52,7 +52,7 @@ static void transform(const float m[12], float point[3], float normal[3])
 static void print_corners(const struct scene_mesh *mesh, const struct shown *shown, const float *world_from_node)
 {
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
-    for (size_t i = 0; i < (size_t)mesh->triangle_count * 3; i++) {
+    for (size_t i = 0; i < (size_t)mesh->value.triangle_count * 3; i++) {
         float p[3], n[3];
         memcpy(p, shown->positions + (size_t)indices[i] * 3, sizeof(p));
         memcpy(n, shown->normals + (size_t)indices[i] * 3, sizeof(n));
@@ -67,8 +67,8 @@ static bool print_node(const struct scene *scene, const struct scene_pose *pose,
                        const struct scene_instance *instance, struct error *error)
 {
     const struct scene_node *node = instance->node;
-    const struct scene_mesh *mesh = scene_mesh(scene, node->object);
-    const bool has_skin = node->skin && mesh->influence_count > 0;
+    const struct scene_mesh *mesh = scene_mesh(scene, node->value.object);
+    const bool has_skin = node->value.skin && mesh->value.influence_count > 0;
     struct shown shown = {0};
     bool fine =
         make_room(&shown, mesh, error) && scene_deform(scene, pose, node, shown.positions, shown.normals, error);

@@ -17,13 +17,14 @@ static void moves_hides_and_changes_a_material(struct fixture *fixture)
     const struct scene_node *second = scene_node(fixture->scene, 2), *third = scene_node(fixture->scene, 3);
     float m[12];
     test_transform(m, 0.8f, -0.9f, 1.1f, 0, 0.3f, 0.4f, 0.1f, -0.7f);
-    test_node(edits, 2, second->parent, second->kind, second->object, m);
-    test_node(edits, 3, third->parent, third->kind, third->object, third->parent_from_node)->hidden = true;
+    test_node(edits, 2, second->value.parent, second->value.kind, second->value.object, m);
+    test_node(edits, 3, third->value.parent, third->value.kind, third->value.object, third->value.parent_from_node)
+        ->value.hidden = true;
     struct scene_material *material = test_material(edits, 2, 0.35f, 0.45f, 0.55f);
     if (!fixture->gpu.has_translucent && !getenv("FARLIGHT_TEST_LONG"))
         return; /* a program more of every tracer */
-    material->alpha_mode = ALPHA_BLEND;
-    material->base_colour[3] = 0.5f;
+    material->value.alpha_mode = ALPHA_BLEND;
+    material->value.base_colour[3] = 0.5f;
 }
 
 static void replaces_a_mesh_and_adds_an_instance(struct fixture *fixture)
@@ -36,7 +37,7 @@ static void replaces_a_mesh_and_adds_an_instance(struct fixture *fixture)
 /* What was there is a hole now, and what was a hole is there. */
 static void invert_alpha(struct test_edits *edits, const struct scene_texture *texture)
 {
-    size_t bytes = (size_t)texture->width * texture->height * 4;
+    size_t bytes = (size_t)texture->value.width * texture->value.height * 4;
     uint8_t *texels = malloc(bytes);
     for (size_t i = 0; i < bytes; i++)
         texels[i] = i % 4 == 3 ? (uint8_t)(255 - texture->texels->data[i]) : texture->texels->data[i];
@@ -54,17 +55,18 @@ static void removes_an_instance_shows_another_and_adds_a_disc(struct fixture *fi
     struct scene_edit *edit = test_add(edits, OBJECT_NODE);
     edit->kind = EDIT_REMOVE;
     edit->id = 100;
-    test_node(edits, 3, third->parent, third->kind, third->object, third->parent_from_node);
+    test_node(edits, 3, third->value.parent, third->value.kind, third->value.object,
+              third->value.parent_from_node);
     if (texture)
         invert_alpha(edits, texture);
     struct scene_material *cut_away = test_material(edits, 2, 0.35f, 0.45f, 0.55f);
-    cut_away->alpha_mode = ALPHA_MASK;
-    cut_away->base_colour[3] = 0.2f;
+    cut_away->value.alpha_mode = ALPHA_MASK;
+    cut_away->value.base_colour[3] = 0.2f;
     struct scene_disc *disc = &test_add(edits, OBJECT_DISC)->set.disc;
     disc->base.id = 9;
-    disc->centre_world[1] = -0.4f;
-    disc->normal_world[1] = 1.0f;
-    disc->radius = 1.0f;
+    disc->value.centre_world[1] = -0.4f;
+    disc->value.normal_world[1] = 1.0f;
+    disc->value.radius = 1.0f;
 }
 
 static const struct phase {
@@ -269,7 +271,7 @@ static void judge_hit(struct fault *fault, const struct fixture *fixture, const 
     }
     static const float white[4] = {1, 1, 1, 1};
     const struct scene_material *material = scene_material(fixture->scene, expected->material);
-    const float *base_colour = material ? material->base_colour : white;
+    const float *base_colour = material ? material->value.base_colour : white;
     uint32_t index = got->material & HIT_MATERIAL_MASK;
     assert_in_range(index, 0, fixture->gpu.material_count - 1);
     for (int k = 0; k < 4; k++)

@@ -93,10 +93,10 @@ static inline void twin_init_shapes(struct twin *twin, const struct scene_motion
     twin->shapes = calloc(twin->instance_counts[0] + 1, sizeof(*twin->shapes));
     for (size_t i = 0; i < twin->instance_counts[0]; i++) {
         const struct scene_node *node = twin->instances[0][i].node;
-        const struct scene_mesh *mesh = scene_mesh(twin->scene, node->object);
+        const struct scene_mesh *mesh = scene_mesh(twin->scene, node->value.object);
         for (uint32_t end = 0; scene_node_deforms(node, mesh) && end < 2; end++) {
-            float *positions = malloc(mesh->vertex_count * 3 * sizeof(float));
-            float *normals = malloc(mesh->vertex_count * 3 * sizeof(float));
+            float *positions = malloc(mesh->value.vertex_count * 3 * sizeof(float));
+            float *normals = malloc(mesh->value.vertex_count * 3 * sizeof(float));
             if (!scene_deform(twin->scene, twin_pose(motion, end * (twin->pose_count - 1)), node, positions,
                               normals, &error))
                 exit(1);
@@ -104,7 +104,8 @@ static inline void twin_init_shapes(struct twin *twin, const struct scene_motion
             twin->shapes[i].normals[end] = normals;
         }
         float *const *ends = twin->shapes[i].positions;
-        twin->shapes[i].changes = ends[0] && memcmp(ends[0], ends[1], mesh->vertex_count * 3 * sizeof(float)) != 0;
+        twin->shapes[i].changes =
+            ends[0] && memcmp(ends[0], ends[1], mesh->value.vertex_count * 3 * sizeof(float)) != 0;
     }
 }
 
@@ -205,26 +206,26 @@ static inline int twin_wrap(long i, int size, enum wrap wrap)
 
 static inline void twin_texel(const struct scene_texture *texture, long x, long y, double out[4])
 {
-    size_t column = (size_t)twin_wrap(x, (int)texture->width, texture->wrap_u);
-    size_t row = (size_t)twin_wrap(y, (int)texture->height, texture->wrap_v);
-    const uint8_t *texel = texture->texels->data + 4 * (row * texture->width + column);
+    size_t column = (size_t)twin_wrap(x, (int)texture->value.width, texture->value.wrap_u);
+    size_t row = (size_t)twin_wrap(y, (int)texture->value.height, texture->value.wrap_v);
+    const uint8_t *texel = texture->texels->data + 4 * (row * texture->value.width + column);
     for (int k = 0; k < 4; k++) {
         double c = texel[k] / 255.0;
-        if (texture->format == TEXTURE_RGBA8_SRGB && k < 3)
+        if (texture->value.format == TEXTURE_RGBA8_SRGB && k < 3)
             c = c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
         out[k] = c;
     }
 }
 
-static inline bool twin_sample(const struct scene *scene, const struct texture_use *use, const double uv[2],
+static inline bool twin_sample(const struct scene *scene, const struct record_texture_use *use, const double uv[2],
                                double out[4])
 {
     const struct scene_texture *texture = use->texture ? scene_texture(scene, use->texture) : NULL;
     if (!texture)
         return false;
     const float *m = use->uv_transform;
-    double x = (m[0] * uv[0] + m[1] * uv[1] + m[2]) * texture->width - 0.5;
-    double y = (m[3] * uv[0] + m[4] * uv[1] + m[5]) * texture->height - 0.5;
+    double x = (m[0] * uv[0] + m[1] * uv[1] + m[2]) * texture->value.width - 0.5;
+    double y = (m[3] * uv[0] + m[4] * uv[1] + m[5]) * texture->value.height - 0.5;
     double wx = x - floor(x), wy = y - floor(y);
     memset(out, 0, 4 * sizeof(*out));
     for (int corner = 0; corner < 4; corner++) {
@@ -258,24 +259,24 @@ static inline void twin_material(struct twin_answer *answer, struct twin_interse
         return;
     double colour[4], texel[4];
     for (int k = 0; k < 4; k++)
-        colour[k] = material->base_colour[k] * intersection->hit.colour[k];
+        colour[k] = material->value.base_colour[k] * intersection->hit.colour[k];
     if (twin_sample(scene, &material->textures[MATERIAL_BASE_COLOUR], intersection->hit.uv, texel))
         for (int k = 0; k < 4; k++)
             colour[k] *= texel[k];
     intersection->alpha = colour[3];
-    if (material->alpha_mode == ALPHA_MASK) {
-        intersection->cut_out = colour[3] < material->alpha_cutoff;
-        answer->close_call |= fabs(colour[3] - material->alpha_cutoff) < 1e-3;
-        if (fabs(colour[3] - material->alpha_cutoff) < answer->twin->blur.alpha)
+    if (material->value.alpha_mode == ALPHA_MASK) {
+        intersection->cut_out = colour[3] < material->value.alpha_cutoff;
+        answer->close_call |= fabs(colour[3] - material->value.alpha_cutoff) < 1e-3;
+        if (fabs(colour[3] - material->value.alpha_cutoff) < answer->twin->blur.alpha)
             twin_is_close(answer, intersection->hit.distance);
     }
-    double transmission = material->transmission * (1 - material->metallic);
+    double transmission = material->value.transmission * (1 - material->value.metallic);
     if (twin_sample(scene, &material->textures[MATERIAL_TRANSMISSION], intersection->hit.uv, texel))
         transmission *= texel[0];
     for (int k = 0; k < 3; k++) {
         double through = transmission * colour[k];
         intersection->transmittance[k] =
-            material->alpha_mode == ALPHA_BLEND ? 1 - colour[3] + colour[3] * through : through;
+            material->value.alpha_mode == ALPHA_BLEND ? 1 - colour[3] + colour[3] * through : through;
         if (intersection->cut_out)
             intersection->transmittance[k] = 1;
     }
@@ -314,7 +315,8 @@ static inline void twin_add_intersection(struct twin_answer *answer, struct twin
     }
 }
 
-static inline uint32_t twin_range_material(const struct material_range *ranges, uint32_t count, uint32_t primitive)
+static inline uint32_t twin_range_material(const struct record_material_range *ranges, uint32_t count,
+                                           uint32_t primitive)
 {
     for (uint32_t i = 0; i < count; i++)
         if (primitive >= ranges[i].first && primitive - ranges[i].first < ranges[i].count)
@@ -500,21 +502,23 @@ static inline void twin_discs(struct twin_answer *answer)
     void *value;
     while (hashmap_next(&answer->twin->scene->objects[OBJECT_DISC], &cursor, &id, &value)) {
         const struct scene_disc *disc = value;
-        struct twin_intersection intersection = {.hit = {.material = disc->material, .colour = {1, 1, 1, 1}}};
+        struct twin_intersection intersection = {
+            .hit = {.material = disc->value.material, .colour = {1, 1, 1, 1}}};
         double slope = 0, height = 0, squared = 0;
         for (int k = 0; k < 3; k++) {
-            intersection.hit.normal_geometric[k] = intersection.hit.normal_shading[k] = disc->normal_world[k];
-            slope += disc->normal_world[k] * answer->direction[k];
-            height += disc->normal_world[k] * (disc->centre_world[k] - answer->origin[k]);
+            intersection.hit.normal_geometric[k] = intersection.hit.normal_shading[k] =
+                disc->value.normal_world[k];
+            slope += disc->value.normal_world[k] * answer->direction[k];
+            height += disc->value.normal_world[k] * (disc->value.centre_world[k] - answer->origin[k]);
         }
         intersection.hit.distance = height / slope;
         answer->is_close = false;
         for (int k = 0; k < 3; k++) {
             double d =
-                answer->origin[k] + intersection.hit.distance * answer->direction[k] - disc->centre_world[k];
+                answer->origin[k] + intersection.hit.distance * answer->direction[k] - disc->value.centre_world[k];
             squared += d * d;
         }
-        double radius = sqrt(squared) / disc->radius;
+        double radius = sqrt(squared) / disc->value.radius;
         answer->close_call |= fabs(radius - 1) < 1e-3;
         if (slope != 0 && radius <= 1)
             twin_add_intersection(answer, &intersection);
@@ -563,16 +567,18 @@ static inline void twin_trace_at(struct twin_answer *answer, const struct twin *
     for (int kind = 0; kind < 2; kind++) {
         for (size_t i = 0; i < twin->instance_counts[kind]; i++) {
             const struct scene_instance instance = twin_instance_at(twin, kind, i, time);
-            const struct scene_mesh *mesh = kind == 0 ? scene_mesh(twin->scene, instance.node->object) : NULL;
-            const struct scene_spheres *set = kind == 1 ? scene_spheres(twin->scene, instance.node->object) : NULL;
+            const struct scene_mesh *mesh =
+                kind == 0 ? scene_mesh(twin->scene, instance.node->value.object) : NULL;
+            const struct scene_spheres *set =
+                kind == 1 ? scene_spheres(twin->scene, instance.node->value.object) : NULL;
             if (instance.singular)
                 continue;
             answer->shape = kind == 0 ? &twin->shapes[i] : NULL;
-            for (uint32_t p = 0; mesh && p < mesh->triangle_count; p++) {
+            for (uint32_t p = 0; mesh && p < mesh->value.triangle_count; p++) {
                 answer->is_close = false;
                 twin_triangle(answer, &instance, mesh, p);
             }
-            for (uint32_t p = 0; set && p < set->sphere_count; p++) {
+            for (uint32_t p = 0; set && p < set->value.sphere_count; p++) {
                 answer->is_close = false;
                 twin_sphere(answer, &instance, set, p);
             }

@@ -17,26 +17,26 @@ static struct scene *scene_of_panes(void)
         texels[i] = ((i + i / 4) % 2 ? 0xff000000u : 0u) | 0x00c0a080u;
     struct scene_texture *texture = &test_add(&edits, OBJECT_TEXTURE)->set.texture;
     texture->base.id = 1;
-    texture->width = texture->height = 4;
-    texture->format = TEXTURE_RGBA8_SRGB;
+    texture->value.width = texture->value.height = 4;
+    texture->value.format = TEXTURE_RGBA8_SRGB;
     texture->texels = test_blob(texels, sizeof(texels));
     struct scene_material *fence = test_material(&edits, 1, 0.9f, 0.8f, 0.7f);
-    fence->alpha_mode = ALPHA_MASK;
+    fence->value.alpha_mode = ALPHA_MASK;
     fence->textures[MATERIAL_BASE_COLOUR].texture = 1;
     struct scene_material *pane = test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.6f;
-    test_material(&edits, 3, 0.9f, 0.8f, 0.7f)->transmission = 0.9f;
-    test_material(&edits, 4, 0.95f, 0.75f, 0.85f)->transmission = 1.0f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.6f;
+    test_material(&edits, 3, 0.9f, 0.8f, 0.7f)->value.transmission = 0.9f;
+    test_material(&edits, 4, 0.95f, 0.75f, 0.85f)->value.transmission = 1.0f;
     test_material(&edits, 5, 0.05f, 0.15f, 0.25f);
     for (uint32_t i = 0; i < 3; i++) { /* meshes 10, 11, 12: a fence, a blended pane, one of glass */
         struct scene_mesh *mesh = test_mesh(&edits, 10 + i, corners, 4, indices, 2);
         mesh->arrays[MESH_TEXCOORDS_0] = test_blob(uv, sizeof(uv));
-        mesh->ranges = test_ranges(&(struct material_range){0, 2, 1 + i}, 1);
+        mesh->ranges = test_ranges(&(struct record_material_range){0, 2, 1 + i}, 1);
         mesh->range_count = 1;
     }
     struct scene_spheres *set = test_spheres(&edits, 20, ball, 1);
-    set->ranges = test_ranges(&(struct material_range){0, 1, 4}, 1);
+    set->ranges = test_ranges(&(struct record_material_range){0, 1, 4}, 1);
     set->range_count = 1;
     test_transform(m, 1, 1, 1, 0, 0.4f, 0, 0, -0.8f);
     test_node(&edits, 1, 0, NODE_MESH, 10, m);
@@ -49,10 +49,10 @@ static struct scene *scene_of_panes(void)
     test_node(&edits, 5, 0, NODE_SPHERES, 20, NULL);
     struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
-    disc->material = 5;
-    disc->centre_world[1] = -1.2f;
-    disc->normal_world[1] = 1.0f;
-    disc->radius = 3.0f;
+    disc->value.material = 5;
+    disc->value.centre_world[1] = -1.2f;
+    disc->value.normal_world[1] = 1.0f;
+    disc->value.radius = 3.0f;
     test_commit(&edits);
     return edits.scene;
 }

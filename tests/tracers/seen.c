@@ -32,9 +32,9 @@ static struct scene *scene_of_discs_and_balls(void)
     for (uint32_t i = 0; i < 3; i++) {
         struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
         disc->base.id = i + 1;
-        disc->centre_world[i] = 0.7f * (float)i - 1;
-        disc->normal_world[i] = 1;
-        disc->radius = 1.5f;
+        disc->value.centre_world[i] = 0.7f * (float)i - 1;
+        disc->value.normal_world[i] = 1;
+        disc->value.radius = 1.5f;
     }
     test_commit(&edits);
     return scene;

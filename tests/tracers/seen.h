@@ -89,21 +89,21 @@ struct seen {
 static inline bool seen_is_whole(const struct seen *seen, uint32_t material)
 {
     const struct scene_material *found = scene_material(seen->twin->scene, material);
-    return !found || found->alpha_mode != ALPHA_MASK;
+    return !found || found->value.alpha_mode != ALPHA_MASK;
 }
 
 static inline void seen_add_mesh(struct seen *seen, size_t i)
 {
     const struct scene_instance instance = twin_instance_at(seen->twin, 0, i, 0);
-    const struct scene_mesh *mesh = scene_mesh(seen->twin->scene, instance.node->object);
+    const struct scene_mesh *mesh = scene_mesh(seen->twin->scene, instance.node->value.object);
     const struct twin_answer start = {.twin = seen->twin, .shape = &seen->twin->shapes[i]};
     if (instance.singular || !mesh)
         return;
-    const size_t first = seen->triangle_count, count = first + mesh->triangle_count;
+    const size_t first = seen->triangle_count, count = first + mesh->value.triangle_count;
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
     seen->triangles = realloc(seen->triangles, count * sizeof(*seen->triangles));
     seen->is_whole = realloc(seen->is_whole, count * sizeof(*seen->is_whole));
-    for (uint32_t p = 0; p < mesh->triangle_count; p++) {
+    for (uint32_t p = 0; p < mesh->value.triangle_count; p++) {
         for (uint32_t v = 0; v < 3; v++) {
             double corner[3], *world = seen->triangles[first + p][v];
             twin_moving_vertex(&start, mesh, MESH_POSITIONS, indices[3 * p + v], corner);
@@ -389,22 +389,22 @@ static inline void seen_disc(struct seen *seen, const struct scene_disc *disc)
 {
     double n[3], c[3], u[3], v[3], height, apart;
     for (int k = 0; k < 3; k++) {
-        n[k] = disc->normal_world[k];
-        c[k] = disc->centre_world[k] - seen->view->eye[k];
+        n[k] = disc->value.normal_world[k];
+        c[k] = disc->value.centre_world[k] - seen->view->eye[k];
     }
     height = twin_dot(n, c);
     if (height == 0)
         return;
-    apart = sqrt(twin_dot(c, c)) + disc->radius;
+    apart = sqrt(twin_dot(c, c)) + disc->value.radius;
     const double off = SEEN_TEXELS * seen->view->texel * apart * apart / fabs(height);
     const double on = twin_dot(n, seen->origin), dn = twin_dot(n, seen->direction), side = height > 0 ? 1 : -1;
     for (int k = 0; k < 3; k++) { /* p height - c (n p), across the way from the eye to its centre */
         u[k] = seen->origin[k] * height - c[k] * on;
         v[k] = seen->direction[k] * height - c[k] * dn;
     }
-    const bool is_whole = seen_is_whole(seen, disc->material);
+    const bool is_whole = seen_is_whole(seen, disc->value.material);
     for (int i = 0; i < 2; i++) {
-        const double radius = disc->radius + (i == 0 ? off : -off);
+        const double radius = disc->value.radius + (i == 0 ? off : -off);
         struct seen_interval beyond = seen->inside;
         seen_clip(&beyond, side * (on - height), side * dn);
         if (radius <= 0)
@@ -431,7 +431,7 @@ static inline void seen_disc(struct seen *seen, const struct scene_disc *disc)
         const double away = seen->origin[k] + at * seen->direction[k] - c[k];
         squared += away * away;
     }
-    if (fabs(sqrt(squared) - disc->radius) < off)
+    if (fabs(sqrt(squared) - disc->value.radius) < off)
         seen_edge(seen, at);
 }
 
@@ -506,8 +506,8 @@ static inline void seen_surfaces(struct seen *seen)
         seen_triangle(seen, i);
     for (size_t i = 0; i < seen->twin->instance_counts[1]; i++) {
         const struct scene_instance instance = twin_instance_at(seen->twin, 1, i, 0);
-        const struct scene_spheres *set = scene_spheres(seen->twin->scene, instance.node->object);
-        for (uint32_t p = 0; set && !instance.singular && p < set->sphere_count; p++)
+        const struct scene_spheres *set = scene_spheres(seen->twin->scene, instance.node->value.object);
+        for (uint32_t p = 0; set && !instance.singular && p < set->value.sphere_count; p++)
             seen_sphere(seen, &instance, (const float *)(const void *)set->centres_radii->data + 4 * (size_t)p,
                         seen_is_whole(seen, twin_range_material(set->ranges, set->range_count, p)));
     }

@@ -83,10 +83,10 @@ static void add_ball(struct mesh_builder *mesh, const float centre[3], double ra
 static void add_glass(struct test_edits *edits)
 {
     struct scene_material *glass = test_material(edits, 1, 0.5f, 0.5f, 1);
-    glass->transmission = 1;
-    glass->attenuation[1] = 0.5f;
-    glass->attenuation_distance = 1;
-    glass->thickness = 2;
+    glass->value.transmission = 1;
+    glass->value.attenuation_colour[1] = 0.5f;
+    glass->value.attenuation_distance = 1;
+    glass->value.thickness = 2;
 }
 
 /* Whether that is left of light after so many surfaces. */
@@ -107,9 +107,9 @@ static struct scene *scene_of(struct mesh_builder *built, bool closed, bool is_g
     add_glass(&edits);
     struct scene_mesh *mesh = test_mesh(&edits, 10, (const float(*)[3])built->vertices, built->vertex_count,
                                         built->indices, built->triangle_count);
-    mesh->closed = closed;
+    mesh->value.closed = closed;
     if (is_glass) {
-        mesh->ranges = test_ranges(&(struct material_range){0, built->triangle_count, 1}, 1);
+        mesh->ranges = test_ranges(&(struct record_material_range){0, built->triangle_count, 1}, 1);
         mesh->range_count = 1;
     }
     test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
@@ -186,7 +186,7 @@ static struct scene *scene_of_ball(enum ball ball, bool is_glass)
     add_glass(&edits);
     struct scene_spheres *set = test_spheres(&edits, 20, sphere, 1);
     if (is_glass) {
-        set->ranges = test_ranges(&(struct material_range){0, 1, 1}, 1);
+        set->ranges = test_ranges(&(struct record_material_range){0, 1, 1}, 1);
         set->range_count = 1;
     }
     test_node(&edits, 1, 0, NODE_SPHERES, 20, NULL);

@@ -163,7 +163,7 @@ CHECK(without_a_change_nothing_is_built, 0)
     expect_nothing_built(&fixture, 0);
     struct scene_light *light = &test_add(&fixture.edits, OBJECT_LIGHT)->set.light;
     light->base.id = 50;
-    light->colour[0] = 1.0f;
+    light->value.colour[0] = 1.0f;
     test_node(&fixture.edits, 50, 0, NODE_LIGHT, 50, NULL);
     fixture_update(&fixture);
     expect_nothing_built(&fixture, 0);
@@ -171,7 +171,7 @@ CHECK(without_a_change_nothing_is_built, 0)
     test_material(&fixture.edits, 77, 0.5f, 0.5f, 0.5f);
     fixture_update(&fixture);
     expect_nothing_built(&fixture, fixture.gpu.material_count * sizeof(struct material));
-    test_material(&fixture.edits, 77, 0.9f, 0.1f, 0.5f)->roughness = 0.1f;
+    test_material(&fixture.edits, 77, 0.9f, 0.1f, 0.5f)->value.roughness = 0.1f;
     fixture_update(&fixture);
     expect_nothing_built(&fixture, fixture.gpu.material_count * sizeof(struct material));
     expect_below(&fixture, 2, 0, 9.5);
@@ -213,9 +213,9 @@ CHECK(an_empty_scene_is_missed_and_filled_and_emptied_again, CHECK_FORMS)
     answers_finish(&answers);
     struct scene_disc *disc = &test_add(&fixture.edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
-    disc->centre_world[2] = -2;
-    disc->normal_world[2] = 1;
-    disc->radius = 3;
+    disc->value.centre_world[2] = -2;
+    disc->value.normal_world[2] = 1;
+    disc->value.radius = 3;
     fixture_update(&fixture);
     expect_below(&fixture, 0, 0, 12);
     add_box_mesh(&fixture.edits, 10);
@@ -223,7 +223,7 @@ CHECK(an_empty_scene_is_missed_and_filled_and_emptied_again, CHECK_FORMS)
     fixture_update(&fixture);
     expect_below(&fixture, 0, 0, 9.5);
     expect_below(&fixture, 1, 0, 12);
-    test_node(&fixture.edits, 1, 0, NODE_MESH, 10, NULL)->hidden = true;
+    test_node(&fixture.edits, 1, 0, NODE_MESH, 10, NULL)->value.hidden = true;
     fixture_update(&fixture);
     expect_below(&fixture, 0, 0, 12);
     fixture_finish(&fixture);

@@ -52,15 +52,15 @@ void send(builder &b, protocol_channel_path path, uint32_t node, uint32_t width,
         fail(b.r, b.where, "the clip has too many numbers");
     if (b.clip == 0)
         b.clip = import_reserve_id(b.r.scene, PROTOCOL_OBJECT_CLIP);
-    set.clip = b.clip;
-    set.path = path;
-    set.object = node;
-    set.interpolation = PROTOCOL_INTERPOLATION_LINEAR;
-    set.width = width;
-    set.key_count = uint32_t(of.times.size());
-    set.first_time = uint32_t(b.floats.size());
+    set.value.clip = b.clip;
+    set.value.path = path;
+    set.value.object = node;
+    set.value.interpolation = PROTOCOL_INTERPOLATION_LINEAR;
+    set.value.width = width;
+    set.value.key_count = uint32_t(of.times.size());
+    set.value.first_time = uint32_t(b.floats.size());
     b.floats.insert(b.floats.end(), of.times.begin(), of.times.end());
-    set.first_value = uint32_t(b.floats.size());
+    set.value.first_value = uint32_t(b.floats.size());
     b.floats.insert(b.floats.end(), of.values.begin(), of.values.end());
     import_add_channel(b.r.scene, &set);
     check(b.r);

@@ -485,11 +485,11 @@ bool add_ply_gaussians(reader &r, const unsigned char *bytes, size_t size_bytes)
                     "it is cut off: it states %llu Gaussians and has %zu whole ones, which are shown",
                     static_cast<unsigned long long>(of.count), cloud.all.size());
     message_set_node set = {};
-    set.object = splats::add(r, cloud, r.scene->file, "");
-    set.kind = PROTOCOL_NODE_MESH;
+    set.value.object = splats::add(r, cloud, r.scene->file, "");
+    set.value.kind = PROTOCOL_NODE_MESH;
     set.name = r.scene->file;
-    import_identity(set.parent_from_node);
-    if (set.object != 0)
+    import_identity(set.value.parent_from_node);
+    if (set.value.object != 0)
         import_add_node(r.scene, &set);
     return true;
 }

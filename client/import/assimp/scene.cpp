@@ -80,14 +80,14 @@ uint32_t add_node(reader &r, uint32_t parent, const aiMatrix4x4 &placed, const a
 {
     message_set_node set = {};
 
-    set.parent = parent;
+    set.value.parent = parent;
     set.name = name.c_str();
     for (unsigned i = 0; i < 12; i++)
-        set.parent_from_node[i] = placed[i / 4][i % 4];
+        set.value.parent_from_node[i] = placed[i / 4][i % 4];
     if (what) {
-        set.kind = what->kind;
-        set.object = what->object;
-        set.skin = what->skin;
+        set.value.kind = what->kind;
+        set.value.object = what->object;
+        set.value.skin = what->skin;
     }
     const uint32_t id = import_add_node(r.scene, &set);
     check(r);
@@ -134,11 +134,11 @@ attachment camera_of(reader &r, const aiCamera &from)
                     "the library does not give this camera's field of view; 45 degrees are used");
     }
     set.name = name.c_str();
-    set.near = cut(double(from.mClipPlaneNear) * r.metres, 0, 1e12);
+    set.value.near = cut(double(from.mClipPlaneNear) * r.metres, 0, 1e12);
     if (from.mOrthographicWidth > 0)
-        set.height = cut(2 * double(from.mOrthographicWidth) / aspect * r.metres, 0, 1e12);
+        set.value.height = cut(2 * double(from.mOrthographicWidth) / aspect * r.metres, 0, 1e12);
     else
-        set.fov_y = cut(2 * std::atan(std::tan(double(cut(width, 0.001, 3.1)) / 2) / aspect), 0.001, 3.1);
+        set.value.fov_y = cut(2 * std::atan(std::tan(double(cut(width, 0.001, 3.1)) / 2) / aspect), 0.001, 3.1);
     return {PROTOCOL_NODE_CAMERA, import_add_camera(r.scene, &set), 0,
             looking(from.mLookAt, from.mUp, from.mPosition), " camera"};
 }
@@ -163,7 +163,7 @@ bool has_watts(const reader &r)
 
 // Strength of a light with the colour 1. In these formats a white surface shows the light's colour, hence the
 // factor pi, as for NFF. An FBX light's falloff is left to programs, which ignore it, except for lights in watts.
-double strength_of(reader &r, const aiLight &from, protocol_light_kind &kind)
+double strength_of(reader &r, const aiLight &from, uint32_t &kind)
 {
     const bool is_fbx = strcmp(r.format->ending, ".fbx") == 0, is_point = kind == PROTOCOL_LIGHT_POINT;
     const double constant = from.mAttenuationConstant > 0 ? double(from.mAttenuationConstant) : 1;
@@ -191,16 +191,16 @@ attachment light_of(reader &r, const aiLight &from)
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(), "ambient light is left out");
         return {PROTOCOL_NODE_LIGHT, 0, 0, {}, ""};
     }
-    set.kind = from.mType == aiLightSource_DIRECTIONAL ? PROTOCOL_LIGHT_DIRECTIONAL
-               : from.mType == aiLightSource_SPOT      ? PROTOCOL_LIGHT_SPOT
-                                                       : PROTOCOL_LIGHT_POINT;
-    const double strength = strength_of(r, from, set.kind);
-    if (set.kind == PROTOCOL_LIGHT_SPOT) {
-        set.outer_cone = cut(double(from.mAngleOuterCone) / 2, 0, 1.5707);
-        set.inner_cone = cut(double(from.mAngleInnerCone) / 2, 0, double(set.outer_cone));
+    set.value.kind = from.mType == aiLightSource_DIRECTIONAL ? PROTOCOL_LIGHT_DIRECTIONAL
+                     : from.mType == aiLightSource_SPOT      ? PROTOCOL_LIGHT_SPOT
+                                                             : PROTOCOL_LIGHT_POINT;
+    const double strength = strength_of(r, from, set.value.kind);
+    if (set.value.kind == PROTOCOL_LIGHT_SPOT) {
+        set.value.outer_cone = cut(double(from.mAngleOuterCone) / 2, 0, 1.5707);
+        set.value.inner_cone = cut(double(from.mAngleInnerCone) / 2, 0, double(set.value.outer_cone));
     }
     for (unsigned c = 0; c < 3; c++)
-        set.colour[c] = cut(double(from.mColorDiffuse[c]) * strength, 0, 1e12);
+        set.value.colour[c] = cut(double(from.mColorDiffuse[c]) * strength, 0, 1e12);
     set.name = name.c_str();
     return {PROTOCOL_NODE_LIGHT, import_add_light(r.scene, &set), 0,
             looking(from.mDirection, {0, 1, 0}, from.mPosition), " light"};

@@ -167,14 +167,14 @@ void send_channel(builder &b, protocol_channel_path path, uint32_t object, uint3
 
     if (b.clip == 0)
         b.clip = import_reserve_id(b.r.scene, PROTOCOL_OBJECT_CLIP);
-    set.clip = b.clip;
-    set.path = path;
-    set.object = object;
-    set.interpolation = interpolation;
-    set.width = width;
-    set.key_count = key_count;
-    set.first_time = first_time;
-    set.first_value = first_value;
+    set.value.clip = b.clip;
+    set.value.path = path;
+    set.value.object = object;
+    set.value.interpolation = interpolation;
+    set.value.width = width;
+    set.value.key_count = key_count;
+    set.value.first_time = first_time;
+    set.value.first_value = first_value;
     if (import_add_channel(b.r.scene, &set) == 0)
         throw reading::failed();
 }

@@ -17,11 +17,11 @@ struct part {
         value = limited(b.r, b.where, key, number(object, key, double(value)), minimum, maximum);
     }
 
-    void colour(const char *key, float *const (&channels)[3], double maximum) const
+    void colour(const char *key, float (&channels)[3], double maximum) const
     {
         const std::vector<double> given = numbers(object, key);
         for (size_t c = 0; c < 3 && c < given.size(); c++)
-            *channels[c] = limited(b.r, b.where, key, given[c], 0, maximum);
+            channels[c] = limited(b.r, b.where, key, given[c], 0, maximum);
     }
 
     void texture(const char *key, bool is_colour, protocol_material_texture at) const
@@ -32,15 +32,15 @@ struct part {
 
 void anisotropy(const part &p)
 {
-    p.factor("anisotropyStrength", p.b.set.anisotropy, 0, 1);
-    p.factor("anisotropyRotation", p.b.set.anisotropy_rotation, -1000, 1000);
+    p.factor("anisotropyStrength", p.b.set.value.anisotropy, 0, 1);
+    p.factor("anisotropyRotation", p.b.set.value.anisotropy_rotation, -1000, 1000);
     p.texture("anisotropyTexture", false, PROTOCOL_MATERIAL_ANISOTROPY);
 }
 
 void clearcoat(const part &p)
 {
-    p.factor("clearcoatFactor", p.b.set.clearcoat, 0, 1);
-    p.factor("clearcoatRoughnessFactor", p.b.set.clearcoat_roughness, 0, 1);
+    p.factor("clearcoatFactor", p.b.set.value.clearcoat, 0, 1);
+    p.factor("clearcoatRoughnessFactor", p.b.set.value.clearcoat_roughness, 0, 1);
     p.texture("clearcoatTexture", false, PROTOCOL_MATERIAL_CLEARCOAT);
     p.texture("clearcoatRoughnessTexture", false, PROTOCOL_MATERIAL_CLEARCOAT_ROUGHNESS);
     texture_source normal = source_of(p.object, "clearcoatNormalTexture");
@@ -51,34 +51,32 @@ void clearcoat(const part &p)
 void diffuse_transmission(const part &p)
 {
     message_set_material &set = p.b.set;
-    p.factor("diffuseTransmissionFactor", set.diffuse_transmission, 0, 1);
-    p.colour("diffuseTransmissionColorFactor",
-             {&set.diffuse_transmission_red, &set.diffuse_transmission_green, &set.diffuse_transmission_blue}, 1);
+    p.factor("diffuseTransmissionFactor", set.value.diffuse_transmission, 0, 1);
+    p.colour("diffuseTransmissionColorFactor", set.value.diffuse_transmission_colour, 1);
     p.texture("diffuseTransmissionTexture", false, PROTOCOL_MATERIAL_DIFFUSE_TRANSMISSION);
     p.texture("diffuseTransmissionColorTexture", true, PROTOCOL_MATERIAL_DIFFUSE_TRANSMISSION_COLOUR);
 }
 
 void dispersion(const part &p)
 {
-    p.factor("dispersion", p.b.set.dispersion, 0, 100);
+    p.factor("dispersion", p.b.set.value.dispersion, 0, 100);
 }
 
 void iridescence(const part &p)
 {
     message_set_material &set = p.b.set;
-    p.factor("iridescenceFactor", set.iridescence, 0, 1);
-    p.factor("iridescenceIor", set.iridescence_ior, 1, 10);
-    p.factor("iridescenceThicknessMinimum", set.iridescence_minimum_nm, 0, 1e6);
-    p.factor("iridescenceThicknessMaximum", set.iridescence_maximum_nm, 0, 1e6);
+    p.factor("iridescenceFactor", set.value.iridescence, 0, 1);
+    p.factor("iridescenceIor", set.value.iridescence_ior, 1, 10);
+    p.factor("iridescenceThicknessMinimum", set.value.iridescence_minimum_nm, 0, 1e6);
+    p.factor("iridescenceThicknessMaximum", set.value.iridescence_maximum_nm, 0, 1e6);
     p.texture("iridescenceTexture", false, PROTOCOL_MATERIAL_IRIDESCENCE);
     p.texture("iridescenceThicknessTexture", false, PROTOCOL_MATERIAL_IRIDESCENCE_THICKNESS);
 }
 
 void sheen(const part &p)
 {
-    float(&colour)[3] = p.b.set.sheen;
-    p.colour("sheenColorFactor", {&colour[0], &colour[1], &colour[2]}, 1);
-    p.factor("sheenRoughnessFactor", p.b.set.sheen_roughness, 0, 1);
+    p.colour("sheenColorFactor", p.b.set.value.sheen, 1);
+    p.factor("sheenRoughnessFactor", p.b.set.value.sheen_roughness, 0, 1);
     p.texture("sheenColorTexture", true, PROTOCOL_MATERIAL_SHEEN);
     p.texture("sheenRoughnessTexture", false, PROTOCOL_MATERIAL_SHEEN_ROUGHNESS);
 }
@@ -86,8 +84,8 @@ void sheen(const part &p)
 void specular(const part &p)
 {
     message_set_material &set = p.b.set;
-    p.factor("specularFactor", set.specular, 0, 1);
-    p.colour("specularColorFactor", {&set.specular_red, &set.specular_green, &set.specular_blue}, 1000);
+    p.factor("specularFactor", set.value.specular, 0, 1);
+    p.colour("specularColorFactor", set.value.specular_colour, 1000);
     p.texture("specularTexture", false, PROTOCOL_MATERIAL_SPECULAR);
     p.texture("specularColorTexture", true, PROTOCOL_MATERIAL_SPECULAR_COLOUR);
 }
@@ -95,9 +93,9 @@ void specular(const part &p)
 void volume(const part &p)
 {
     message_set_material &set = p.b.set;
-    p.factor("attenuationDistance", set.attenuation_distance, 0, 1e12);
-    p.colour("attenuationColor", {&set.attenuation_red, &set.attenuation_green, &set.attenuation_blue}, 1);
-    p.factor("thicknessFactor", set.thickness, 0, 1e12);
+    p.factor("attenuationDistance", set.value.attenuation_distance, 0, 1e12);
+    p.colour("attenuationColor", set.value.attenuation_colour, 1);
+    p.factor("thicknessFactor", set.value.thickness, 0, 1e12);
 }
 
 const struct {
@@ -121,6 +119,7 @@ void extensions(const building &b)
         if (const tinygltf::Value *object = extension(b.source.extensions, one.name))
             one.read({b, *object});
     // KHR_materials_volume: a thickness of 0, the default, means that there is no interior.
-    b.set.thin_walled = (b.set.transmission > 0 || b.set.diffuse_transmission > 0) && b.set.thickness <= 0;
+    b.set.value.thin_walled =
+        (b.set.value.transmission > 0 || b.set.value.diffuse_transmission > 0) && b.set.value.thickness <= 0;
 }
 } // namespace gltf

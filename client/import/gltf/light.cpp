@@ -21,9 +21,9 @@ void give_size(reader &r, const tinygltf::Light &light, const std::string &where
 
     if (!(radius > 0))
         return;
-    set.kind = PROTOCOL_LIGHT_SPHERE;
-    set.size[0] = limited(r, where, "the light's radius", radius, 1e-6, 1e12);
-    for (float &one : set.colour)
+    set.value.kind = PROTOCOL_LIGHT_SPHERE;
+    set.value.size[0] = limited(r, where, "the light's radius", radius, 1e-6, 1e12);
+    for (float &one : set.value.colour)
         one = limited(r, where, "the light's radiance", double(one) / light_disc(light), 0, 1e12);
 }
 
@@ -85,19 +85,20 @@ uint32_t light_id(reader &r, int index, const std::string &where)
     message_set_light set = {};
 
     for (size_t c = 0; c < 3; c++)
-        set.colour[c] = limited(r, here, "the light's colour",
-                                (light.color.size() == 3 ? light.color[c] : 1.0) * light.intensity, 0, 1e12);
-    set.range = limited(r, here, "the light's range", light.range, 0, 1e12);
+        set.value.colour[c] = limited(r, here, "the light's colour",
+                                      (light.color.size() == 3 ? light.color[c] : 1.0) * light.intensity, 0, 1e12);
+    set.value.range = limited(r, here, "the light's range", light.range, 0, 1e12);
     set.name = light.name.c_str();
     if (light.type == "directional") {
-        set.kind = PROTOCOL_LIGHT_DIRECTIONAL;
+        set.value.kind = PROTOCOL_LIGHT_DIRECTIONAL;
     } else if (light.type == "point") {
-        set.kind = PROTOCOL_LIGHT_POINT;
+        set.value.kind = PROTOCOL_LIGHT_POINT;
         give_size(r, light, here, set);
     } else if (light.type == "spot") {
-        set.kind = PROTOCOL_LIGHT_SPOT;
-        set.outer_cone = limited(r, here, "the outer cone", light.spot.outerConeAngle, 0, 1.5707);
-        set.inner_cone = limited(r, here, "the inner cone", light.spot.innerConeAngle, 0, double(set.outer_cone));
+        set.value.kind = PROTOCOL_LIGHT_SPOT;
+        set.value.outer_cone = limited(r, here, "the outer cone", light.spot.outerConeAngle, 0, 1.5707);
+        set.value.inner_cone =
+            limited(r, here, "the inner cone", light.spot.innerConeAngle, 0, double(set.value.outer_cone));
     } else {
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, here.c_str(),
                     "a light of unknown type '%.32s' is left out", light.type.c_str());

@@ -17,9 +17,9 @@ void core(const building &b)
     const tinygltf::PbrMetallicRoughness &pbr = b.source.pbrMetallicRoughness;
 
     for (size_t c = 0; c < 4; c++)
-        b.set.base_colour[c] = limited(b.r, b.where, "the base colour", pbr.baseColorFactor[c], 0, 1);
-    b.set.metallic = limited(b.r, b.where, "metallicFactor", pbr.metallicFactor, 0, 1);
-    b.set.roughness = limited(b.r, b.where, "roughnessFactor", pbr.roughnessFactor, 0, 1);
+        b.set.value.base_colour[c] = limited(b.r, b.where, "the base colour", pbr.baseColorFactor[c], 0, 1);
+    b.set.value.metallic = limited(b.r, b.where, "metallicFactor", pbr.metallicFactor, 0, 1);
+    b.set.value.roughness = limited(b.r, b.where, "roughnessFactor", pbr.roughnessFactor, 0, 1);
     if (!extension(b.source.extensions, "KHR_materials_pbrSpecularGlossiness")) { // which replaces these fields
         use_texture(b.r, b.all, source_of(pbr.baseColorTexture), true, b.uses[PROTOCOL_MATERIAL_BASE_COLOUR],
                     b.where);
@@ -41,7 +41,8 @@ void emission(const building &b)
     const double strength = stronger ? number(*stronger, "emissiveStrength", 1) : 1;
 
     for (size_t c = 0; c < 3 && c < b.source.emissiveFactor.size(); c++)
-        b.set.emission[c] = limited(b.r, b.where, "the emission", b.source.emissiveFactor[c] * strength, 0, 1e6);
+        b.set.value.emission[c] =
+            limited(b.r, b.where, "the emission", b.source.emissiveFactor[c] * strength, 0, 1e6);
     use_texture(b.r, b.all, source_of(b.source.emissiveTexture), true, b.uses[PROTOCOL_MATERIAL_EMISSION],
                 b.where);
 }
@@ -51,30 +52,30 @@ void alpha(const building &b)
     const std::string &mode = b.source.alphaMode;
 
     if (mode == "MASK")
-        b.set.alpha_mode = PROTOCOL_ALPHA_MASK;
+        b.set.value.alpha_mode = PROTOCOL_ALPHA_MASK;
     else if (mode == "BLEND")
-        b.set.alpha_mode = PROTOCOL_ALPHA_BLEND;
+        b.set.value.alpha_mode = PROTOCOL_ALPHA_BLEND;
     else if (mode != "OPAQUE")
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
                     "unknown alpha mode '%.32s' is treated as OPAQUE", mode.c_str());
     // A cutoff above 1 is allowed and removes the whole surface; 1 keeps only fully opaque parts.
-    b.set.alpha_cutoff = limited(b.r, b.where, "the alpha cutoff", b.source.alphaCutoff, 0, 1);
-    b.set.double_sided = b.source.doubleSided;
+    b.set.value.alpha_cutoff = limited(b.r, b.where, "the alpha cutoff", b.source.alphaCutoff, 0, 1);
+    b.set.value.double_sided = b.source.doubleSided;
 }
 
 void transmission(const building &b)
 {
     if (const tinygltf::Value *ior = extension(b.source.extensions, "KHR_materials_ior")) {
         const double value = number(*ior, "ior", 1.5);
-        b.set.ior = value == 0 ? 10.0f : limited(b.r, b.where, "the index of refraction", value, 1, 10);
+        b.set.value.ior = value == 0 ? 10.0f : limited(b.r, b.where, "the index of refraction", value, 1, 10);
     }
     if (const tinygltf::Value *glass = extension(b.source.extensions, "KHR_materials_transmission")) {
-        b.set.transmission =
+        b.set.value.transmission =
             limited(b.r, b.where, "transmissionFactor", number(*glass, "transmissionFactor", 0), 0, 1);
         use_texture(b.r, b.all, source_of(*glass, "transmissionTexture"), false,
                     b.uses[PROTOCOL_MATERIAL_TRANSMISSION], b.where);
     }
-    b.set.unlit = extension(b.source.extensions, "KHR_materials_unlit") != nullptr;
+    b.set.value.unlit = extension(b.source.extensions, "KHR_materials_unlit") != nullptr;
 }
 
 // Marks a panel that only shows a light, which lights the scene itself; Blender stores this as a property of the
@@ -85,7 +86,7 @@ void emission_seen_only(const building &b)
     const tinygltf::Value &extras = b.source.extras;
     const bool is_true =
         extras.IsObject() && extras.Has(key) && extras.Get(key).IsBool() && extras.Get(key).Get<bool>();
-    b.set.emission_seen_only = is_true || number(extras, key, 0) != 0;
+    b.set.value.emission_seen_only = is_true || number(extras, key, 0) != 0;
 }
 
 // ---- the old model, converted
@@ -143,16 +144,16 @@ void use_converted(const building &b, const specular_gloss &factors, const gloss
         if (maps.images[i] >= 0) {
             const size_t number = b.all.numbers.at({maps.images[i], true});
             from[i] = texels_of(b.r, b.all, number);
-            set.width = std::max(set.width, from[i].width);
-            set.height = std::max(set.height, from[i].height);
-            set.nearest = set.nearest || b.all.jobs[number].reason[0] != '\0';
+            set.value.width = std::max(set.value.width, from[i].width);
+            set.value.height = std::max(set.value.height, from[i].height);
+            set.value.nearest = set.value.nearest || b.all.jobs[number].reason[0] != '\0';
         }
-    metal_images to = {set.width, set.height, nullptr, nullptr, nullptr};
+    metal_images to = {set.value.width, set.value.height, nullptr, nullptr, nullptr};
     uint32_t blobs[3];
     unsigned char **const places[3] = {&to.base, &to.rough, &to.mirror};
     for (size_t i = 0; i < 3; i++) {
-        *places[i] = allocate_texels(b, set.width, set.height);
-        blobs[i] = import_add_blob(b.r.scene, *places[i], uint64_t(set.width) * set.height * 4);
+        *places[i] = allocate_texels(b, set.value.width, set.value.height);
+        blobs[i] = import_add_blob(b.r.scene, *places[i], uint64_t(set.value.width) * set.value.height * 4);
     }
     check(b.r);
     metal_texels(factors, from[0], from[1], to);
@@ -189,14 +190,13 @@ void specular_glossiness(const building &b)
     const metal_rough metal =
         // The textures contain the factors then
         textured ? metal_rough{{1, 1, 1}, 1, 1, 1, {1, 1, 1}} : metal_of(factors);
-    float *const mirror[] = {&b.set.specular_red, &b.set.specular_green, &b.set.specular_blue};
     for (size_t c = 0; c < 3; c++) {
-        b.set.base_colour[c] = float(metal.base[c]);
-        *mirror[c] = float(metal.mirror[c] / plain_mirror);
+        b.set.value.base_colour[c] = float(metal.base[c]);
+        b.set.value.specular_colour[c] = float(metal.mirror[c] / plain_mirror);
     }
-    b.set.base_colour[3] = float(metal.alpha);
-    b.set.metallic = float(metal.metallic);
-    b.set.roughness = float(metal.roughness);
+    b.set.value.base_colour[3] = float(metal.alpha);
+    b.set.value.metallic = float(metal.metallic);
+    b.set.value.roughness = float(metal.roughness);
     if (textured && !b.all.collecting)
         use_converted(b, factors, maps);
 }

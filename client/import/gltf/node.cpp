@@ -41,13 +41,14 @@ uint32_t camera_id(reader &r, int index, const std::string &where)
     if (camera.type == "perspective") {
         if (!(camera.perspective.yfov > 0))
             return leave_out(here, "yfov, its field of view, is not above 0");
-        set.fov_y = limited(r, here, "the field of view", camera.perspective.yfov, 0.001, 3.1);
-        set.near = limited(r, here, "the near distance", camera.perspective.znear, 0, 1e12);
+        set.value.fov_y = limited(r, here, "the field of view", camera.perspective.yfov, 0.001, 3.1);
+        set.value.near = limited(r, here, "the near distance", camera.perspective.znear, 0, 1e12);
     } else if (camera.type == "orthographic") {
         if (!(std::fabs(camera.orthographic.ymag) > 0))
             return leave_out(here, "ymag, half the height that it sees, is 0");
-        set.height = limited(r, here, "the orthographic height", 2 * std::fabs(camera.orthographic.ymag), 0, 1e12);
-        set.near = limited(r, here, "the near distance", std::max(0.0, camera.orthographic.znear), 0, 1e12);
+        set.value.height =
+            limited(r, here, "the orthographic height", 2 * std::fabs(camera.orthographic.ymag), 0, 1e12);
+        set.value.near = limited(r, here, "the near distance", std::max(0.0, camera.orthographic.znear), 0, 1e12);
     } else {
         return leave_out(here, "its type is neither 'perspective' nor 'orthographic'");
     }
@@ -104,14 +105,14 @@ uint32_t add_node(reader &r, uint32_t parent, const matrix &m, const attachment 
 {
     message_set_node set = {};
 
-    set.parent = parent;
-    set.hidden = hidden;
+    set.value.parent = parent;
+    set.value.hidden = hidden;
     set.name = name.c_str();
-    to_rows(m, set.parent_from_node);
+    to_rows(m, set.value.parent_from_node);
     if (what) {
-        set.kind = what->kind;
-        set.object = what->object;
-        set.skin = what->skin;
+        set.value.kind = what->kind;
+        set.value.object = what->object;
+        set.value.skin = what->skin;
         set.weights = const_cast<record_morph_weight *>(what->weights.data()); // copied by import_add_node()
         set.weights_count = uint32_t(what->weights.size());
     }

@@ -153,15 +153,15 @@ uint32_t add_texture(reader &r, int texture, const std::string &name, bool colou
                      uint32_t blob)
 {
     const tinygltf::Texture &t = r.model.textures[size_t(texture)];
-    set.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
+    set.value.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
     set.name = name.c_str();
     if (t.sampler >= 0) {
         if (size_t(t.sampler) >= r.model.samplers.size())
             fail(r, place("textures", size_t(texture)), "sampler %d does not exist", t.sampler);
         const tinygltf::Sampler &sampler = r.model.samplers[size_t(t.sampler)];
-        set.wrap_u = wrap_of(sampler.wrapS);
-        set.wrap_v = wrap_of(sampler.wrapT);
-        set.nearest |= sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+        set.value.wrap_u = wrap_of(sampler.wrapS);
+        set.value.wrap_v = wrap_of(sampler.wrapT);
+        set.value.nearest |= sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
     }
     return import_add_texture(r.scene, &set, blob);
 }
@@ -204,9 +204,9 @@ uint32_t texture_id(reader &r, images &all, int texture, int image, bool colour)
         return found->second;
     const size_t number = all.numbers.at({image, colour});
     message_set_texture set = {};
-    set.width = all.jobs[number].width;
-    set.height = all.jobs[number].height;
-    set.nearest = all.jobs[number].reason[0] != '\0';
+    set.value.width = all.jobs[number].width;
+    set.value.height = all.jobs[number].height;
+    set.value.nearest = all.jobs[number].reason[0] != '\0';
     return r.texture_ids[{texture, colour}] =
                add_texture(r, texture, texture_name(r, texture, image), colour, set, blob_of(r, all, number));
 }

@@ -48,7 +48,7 @@ bool import_add_skin(struct import_scene *scene, uint32_t skin, const char *name
         return false;
     }
     edit->message.set_skin.skin = skin;
-    edit->message.set_skin.joint_count = joint_count;
+    edit->message.set_skin.value.joint_count = joint_count;
     edit->message.set_skin.name = import_copy_name(scene, name);
     edit->message.set_skin.arrays_count = joint_from_mesh ? 2 : 1;
     edit->blobs[0] = import_add_blob(scene, joints, (uint64_t)joint_count * sizeof(*joints));

@@ -278,13 +278,13 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
         import_mesh_finish(mesh);
         return 0;
     }
-    edit->message.set_mesh.vertex_count = mesh->vertex_count;
-    edit->message.set_mesh.triangle_count = mesh->triangle_count;
+    edit->message.set_mesh.value.vertex_count = mesh->vertex_count;
+    edit->message.set_mesh.value.triangle_count = mesh->triangle_count;
     edit->message.set_mesh.name = import_copy_name(scene, mesh->name);
     edit->message.set_mesh.ranges = mesh->ranges;
     edit->message.set_mesh.ranges_count = mesh->range_count;
-    edit->message.set_mesh.influence_count = mesh->influence_count;
-    edit->message.set_mesh.target_count = mesh->target_count;
+    edit->message.set_mesh.value.influence_count = mesh->influence_count;
+    edit->message.set_mesh.value.target_count = mesh->target_count;
     edit->message.set_mesh.weights = import_copy_weights(scene, mesh->weights, mesh->weight_count);
     edit->message.set_mesh.weights_count = mesh->weight_count;
     edit->message.set_mesh.mesh = import_next_id(scene, PROTOCOL_OBJECT_MESH);
@@ -316,9 +316,10 @@ void import_mark_closed(struct import_scene *scene)
         struct message_set_mesh *mesh = &scene->edits[i].message.set_mesh;
 
         if (edit->message.type == MESSAGE_SET_MESH && edit->blobs[0] != 0 && edit->blobs[1] != 0)
-            mesh->closed = import_triangles_closed(
-                (const float *)(const void *)scene->blobs[edit->blobs[0] - 1].bytes, mesh->vertex_count,
-                (const uint32_t *)(const void *)scene->blobs[edit->blobs[1] - 1].bytes, mesh->triangle_count);
+            mesh->value.closed = import_triangles_closed(
+                (const float *)(const void *)scene->blobs[edit->blobs[0] - 1].bytes, mesh->value.vertex_count,
+                (const uint32_t *)(const void *)scene->blobs[edit->blobs[1] - 1].bytes,
+                mesh->value.triangle_count);
     }
 }
 
@@ -360,23 +361,23 @@ void import_measure_bodies(struct import_scene *scene)
         const struct import_edit *edit = &scene->edits[i];
         const struct message_set_mesh *mesh = &scene->edits[i].message.set_mesh;
 
-        if (edit->message.type == MESSAGE_SET_MESH && mesh->closed && mesh->ranges_count == 1)
+        if (edit->message.type == MESSAGE_SET_MESH && mesh->value.closed && mesh->ranges_count == 1)
             add_tetrahedra(&bodies[mesh->ranges[0].material],
                            (const float *)(const void *)scene->blobs[edit->blobs[0] - 1].bytes,
                            (const uint32_t *)(const void *)scene->blobs[edit->blobs[1] - 1].bytes,
-                           mesh->triangle_count);
+                           mesh->value.triangle_count);
     }
     for (size_t i = 0; i < scene->edit_count; i++) {
         struct message_set_material *material = &scene->edits[i].message.set_material;
 
-        if (scene->edits[i].message.type != MESSAGE_SET_MATERIAL || !(material->attenuation_distance > 0) ||
-            !(material->thickness > 0))
+        if (scene->edits[i].message.type != MESSAGE_SET_MATERIAL || !(material->value.attenuation_distance > 0) ||
+            !(material->value.thickness > 0))
             continue;
         const struct body *body = &bodies[material->material];
         const double thickness = body->area > 0 ? 4 * fabs(body->volume) / body->area : 0;
 
         if (thickness > 0 && thickness <= 1e12)
-            material->thickness = (float)thickness;
+            material->value.thickness = (float)thickness;
     }
     free(bodies);
 }
@@ -411,7 +412,7 @@ uint32_t import_add_spheres(struct import_scene *scene, const char *name, float 
         free(ranges);
         return 0;
     }
-    edit->message.set_spheres.sphere_count = count;
+    edit->message.set_spheres.value.sphere_count = count;
     edit->message.set_spheres.name = import_copy_name(scene, name);
     edit->message.set_spheres.ranges = ranges;
     edit->message.set_spheres.ranges_count = range_count;

@@ -61,9 +61,10 @@ static struct record_material_range *make_ranges(const struct keyed *order, uint
 static bool show(struct import_scene *scene, uint32_t parent, enum protocol_node_kind kind, uint32_t object,
                  const char *name)
 {
-    struct message_set_node node = {.parent = parent, .kind = kind, .object = object, .name = name};
+    struct message_set_node node = {
+        .value.parent = parent, .value.kind = kind, .value.object = object, .name = name};
 
-    import_identity(node.parent_from_node);
+    import_identity(node.value.parent_from_node);
     return object != 0 && import_add_node(scene, &node) != 0;
 }
 

@@ -35,11 +35,11 @@ bool import_find_origin(const double lower[3], const double upper[3], double ori
 
 uint32_t import_add_origin_node(struct import_scene *scene, const double origin[3], uint32_t parent)
 {
-    struct message_set_node node = {.parent = parent, .name = "origin"};
+    struct message_set_node node = {.value.parent = parent, .name = "origin"};
 
-    import_identity(node.parent_from_node);
+    import_identity(node.value.parent_from_node);
     for (int c = 0; c < 3; c++)
-        node.parent_from_node[c * 4 + 3] = (float)origin[c];
+        node.value.parent_from_node[c * 4 + 3] = (float)origin[c];
     return import_add_node(scene, &node);
 }
 
@@ -90,10 +90,10 @@ static bool tree_init(struct tree *tree, struct import_scene *scene)
 /* NULL: the node shows nothing, or joints place it. */
 static const struct import_bounds *bounds_of(const struct tree *tree, const struct message_set_node *node)
 {
-    if (node->kind == PROTOCOL_NODE_MESH && node->object < tree->mesh_count && node->skin == 0)
-        return tree->meshes[node->object];
-    if (node->kind == PROTOCOL_NODE_SPHERES && node->object < tree->sphere_count)
-        return tree->spheres[node->object];
+    if (node->value.kind == PROTOCOL_NODE_MESH && node->value.object < tree->mesh_count && node->value.skin == 0)
+        return tree->meshes[node->value.object];
+    if (node->value.kind == PROTOCOL_NODE_SPHERES && node->value.object < tree->sphere_count)
+        return tree->spheres[node->value.object];
     return NULL;
 }
 
@@ -114,8 +114,8 @@ static bool world_box(const struct tree *tree, double lower[3], double upper[3])
             high[c] = (double)bounds->upper[c];
         }
         for (unsigned depth = 0; node && depth <= DEPTH_MAX; depth++) {
-            box_transform(node->parent_from_node, low, high);
-            node = node->parent < tree->node_count ? tree->nodes[node->parent] : NULL;
+            box_transform(node->value.parent_from_node, low, high);
+            node = node->value.parent < tree->node_count ? tree->nodes[node->value.parent] : NULL;
         }
         for (int c = 0; c < 3; c++) {
             lower[c] = any ? fmin(lower[c], low[c]) : low[c];
@@ -133,8 +133,8 @@ static bool has_moving_root(const struct import_scene *scene, const struct tree 
         const struct message_set_channel *channel = &scene->edits[i].message.set_channel;
 
         if (scene->edits[i].message.type == MESSAGE_SET_CHANNEL &&
-            channel->path == PROTOCOL_CHANNEL_NODE_TRANSLATION && channel->object < tree->node_count &&
-            tree->nodes[channel->object] && tree->nodes[channel->object]->parent == 0)
+            channel->value.path == PROTOCOL_CHANNEL_NODE_TRANSLATION && channel->value.object < tree->node_count &&
+            tree->nodes[channel->value.object] && tree->nodes[channel->value.object]->value.parent == 0)
             return true;
     }
     return false;
@@ -149,8 +149,8 @@ static bool move_below(struct import_scene *scene, const double origin[3])
     for (size_t i = 0; top != 0 && i < scene->edit_count; i++) {
         struct message_set_node *node = &scene->edits[i].message.set_node;
 
-        if (scene->edits[i].message.type == MESSAGE_SET_NODE && node->parent == 0 && node->node != top)
-            node->parent = top;
+        if (scene->edits[i].message.type == MESSAGE_SET_NODE && node->value.parent == 0 && node->node != top)
+            node->value.parent = top;
     }
     return top != 0;
 }
@@ -166,8 +166,8 @@ bool import_settle_origin(struct import_scene *scene)
     is_far = world_box(&tree, lower, upper) && import_find_origin(lower, upper, origin);
     moving = is_far && has_moving_root(scene, &tree);
     for (uint32_t id = 1; is_far && !moving && id < tree.node_count; id++)
-        for (int c = 0; tree.nodes[id] && tree.nodes[id]->parent == 0 && c < 3; c++) {
-            float *place = &tree.nodes[id]->parent_from_node[c * 4 + 3];
+        for (int c = 0; tree.nodes[id] && tree.nodes[id]->value.parent == 0 && c < 3; c++) {
+            float *place = &tree.nodes[id]->value.parent_from_node[c * 4 + 3];
 
             *place = (float)((double)*place - origin[c]);
         }

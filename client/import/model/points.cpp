@@ -85,7 +85,7 @@ std::vector<uint32_t> add_palette(reading::base &r, const std::vector<float> &co
         import_material_default(&set);
         set.name = "point";
         for (unsigned c = 0; c < 3; c++)
-            set.base_colour[c] = std::min(float(cells[i].sum[c] / cells[i].count), 1.0f);
+            set.value.base_colour[c] = std::min(float(cells[i].sum[c] / cells[i].count), 1.0f);
         ids[i] = import_add_material(r.scene, &set);
         check(r);
     }

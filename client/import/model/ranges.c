@@ -46,8 +46,8 @@ static uint32_t default_material(struct import_scene *scene)
     if (scene->default_material == 0) {
         import_material_default(&material);
         for (int c = 0; c < 3; c++)
-            material.base_colour[c] = DEFAULT_ALBEDO;
-        material.double_sided = 1;
+            material.value.base_colour[c] = DEFAULT_ALBEDO;
+        material.value.double_sided = 1;
         material.name = "default";
         scene->default_material = import_add_material(scene, &material);
     }

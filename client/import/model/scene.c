@@ -13,6 +13,8 @@
 #include "protocol/describe.h"
 #include "protocol/plain_text.h"
 
+#define FIELDS_MAX 64 /* of a message of an object */
+
 /* ---- text ---- */
 
 /* Copies as many whole characters as fit; bytes that are not UTF-8 and control characters become '?'. */
@@ -262,8 +264,10 @@ static bool within(const float *values, size_t count, float minimum, float maxim
 /* Checks the real numbers of a struct against the table of messages. */
 static bool within_fields(const struct struct_desc *desc, const void *body)
 {
+    struct field_desc leaves[FIELDS_MAX];
+    const size_t count = struct_leaves(desc, leaves, FIELDS_MAX);
     bool ok = true;
-    for (const struct field_desc *field = desc->fields; field->name; field++)
+    for (const struct field_desc *field = leaves; field < leaves + count; field++)
         if (field->kind == FIELD_REAL)
             ok &= within((const float *)(const void *)((const char *)body + field->offset), field->count,
                          field->real_min, field->real_max);
@@ -276,7 +280,7 @@ uint32_t import_add_node(struct import_scene *scene, const struct message_set_no
 {
     struct import_edit *edit;
 
-    if (!within(node->parent_from_node, 12, -1e12f, 1e12f)) {
+    if (!within(node->value.parent_from_node, 12, -1e12f, 1e12f)) {
         import_fail(scene, node->name, "a node's transform is not finite or beyond 1e12");
         return 0;
     }
@@ -284,11 +288,11 @@ uint32_t import_add_node(struct import_scene *scene, const struct message_set_no
     if (!edit)
         return 0;
     edit->message.set_node = *node;
-    if (node->parent == 0)
-        edit->message.set_node.parent = scene->root;
-    if (scene->is_added && node->kind == PROTOCOL_NODE_CAMERA) {
-        edit->message.set_node.kind = PROTOCOL_NODE_GROUP;
-        edit->message.set_node.object = 0;
+    if (node->value.parent == 0)
+        edit->message.set_node.value.parent = scene->root;
+    if (scene->is_added && node->value.kind == PROTOCOL_NODE_CAMERA) {
+        edit->message.set_node.value.kind = PROTOCOL_NODE_GROUP;
+        edit->message.set_node.value.object = 0;
     }
     edit->message.set_node.name = import_copy_name(scene, node->name);
     edit->message.set_node.weights = import_copy_weights(scene, node->weights, node->weights_count);
@@ -336,9 +340,10 @@ uint32_t import_add_light(struct import_scene *scene, const struct message_set_l
 {
     struct import_edit *edit;
 
-    if (!within(light->colour, 3, 0, 1e12f) || !within(&light->range, 1, 0, 1e12f) ||
-        !within(&light->inner_cone, 1, 0, 1.5708f) || !within(&light->outer_cone, 1, light->inner_cone, 1.5708f) ||
-        !within(light->size, 2, 0, 1e12f)) {
+    if (!within(light->value.colour, 3, 0, 1e12f) || !within(&light->value.range, 1, 0, 1e12f) ||
+        !within(&light->value.inner_cone, 1, 0, 1.5708f) ||
+        !within(&light->value.outer_cone, 1, light->value.inner_cone, 1.5708f) ||
+        !within(light->value.size, 2, 0, 1e12f)) {
         import_fail(scene, light->name, "a light has a number that is not allowed");
         return 0;
     }
@@ -354,8 +359,8 @@ uint32_t import_add_camera(struct import_scene *scene, const struct message_set_
 {
     struct import_edit *edit;
 
-    if (!within(&camera->fov_y, 1, 0, 3.1f) || !within(&camera->height, 1, 0, 1e12f) ||
-        !within(&camera->near, 1, 0, 1e12f)) {
+    if (!within(&camera->value.fov_y, 1, 0, 3.1f) || !within(&camera->value.height, 1, 0, 1e12f) ||
+        !within(&camera->value.near, 1, 0, 1e12f)) {
         import_fail(scene, camera->name, "a camera has a number that is not allowed");
         return 0;
     }
@@ -374,8 +379,8 @@ uint32_t import_add_texture(struct import_scene *scene, const struct message_set
     struct import_edit *edit;
 
     if (!scene->failed &&
-        (texels == 0 || texels > scene->blob_count || texture->width == 0 || texture->height == 0 ||
-         scene->blobs[texels - 1].size_bytes != 4ull * texture->width * texture->height)) {
+        (texels == 0 || texels > scene->blob_count || texture->value.width == 0 || texture->value.height == 0 ||
+         scene->blobs[texels - 1].size_bytes != 4ull * texture->value.width * texture->value.height)) {
         import_fail(scene, texture->name, "a texture's size does not fit its texels");
         return 0;
     }
@@ -394,7 +399,7 @@ void import_set_environment(struct import_scene *scene, const struct message_set
 {
     struct import_edit *edit;
 
-    if (!within(environment->colour, 3, 0, 1e9f) || !within(&environment->rotation, 1, -100, 100)) {
+    if (!within(environment->value.colour, 3, 0, 1e9f) || !within(&environment->value.rotation, 1, -100, 100)) {
         import_fail(scene, NULL, "the background has a number that is not allowed");
         return;
     }
@@ -419,11 +424,11 @@ void import_identity(float parent_from_node[12])
 void import_material_default(struct message_set_material *material)
 {
     struct_defaults(message_describe(MESSAGE_SET_MATERIAL)->body(), material);
-    material->roughness = 1;
-    material->ior = 1.5f;
-    material->alpha_cutoff = 0.5f;
+    material->value.roughness = 1;
+    material->value.ior = 1.5f;
+    material->value.alpha_cutoff = 0.5f;
     for (int i = 0; i < 4; i++)
-        material->base_colour[i] = 1;
+        material->value.base_colour[i] = 1;
 }
 
 void import_texture_use_default(struct record_texture_use *use, uint32_t texture)

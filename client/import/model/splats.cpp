@@ -69,8 +69,8 @@ uint32_t add_material(reading::base &r)
 
     import_material_default(&set);
     set.name = "gaussians";
-    set.unlit = 1;
-    set.double_sided = 1;
+    set.value.unlit = 1;
+    set.value.double_sided = 1;
     const uint32_t id = import_add_material(r.scene, &set);
     check(r);
     return id;

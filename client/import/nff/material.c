@@ -33,26 +33,26 @@ float nff_colour(const struct nff *nff, float shown)
  * and is attenuated by `share`. Reflections are sharp, as Shine only shapes highlights. */
 static void mirror(struct message_set_material *material, float share)
 {
-    const float root = (material->ior - 1) / (material->ior + 1);
+    const float root = (material->value.ior - 1) / (material->value.ior + 1);
 
-    if (share == 0 && material->transmission == 0) {
-        material->ior = 1; /* reflects nothing */
+    if (share == 0 && material->value.transmission == 0) {
+        material->value.ior = 1; /* reflects nothing */
         return;
     }
-    material->roughness = 0;
-    material->specular = share;
-    material->specular_red = share > 0 ? fminf(1 / (root * root), SPECULAR_MAX) : 1;
-    material->specular_green = material->specular_blue = material->specular_red;
+    material->value.roughness = 0;
+    material->value.specular = share;
+    for (int c = 0; c < 3; c++)
+        material->value.specular_colour[c] = share > 0 ? fminf(1 / (root * root), SPECULAR_MAX) : 1;
 }
 
 /* Sets transmission. Without an index of refraction above 1, light passes straight through a thin pane. */
 static void transmit(struct message_set_material *material, float through, float ior)
 {
-    material->transmission = through;
-    material->roughness = 0;
-    material->thin_walled = ior > 1 ? 0u : 1u;
+    material->value.transmission = through;
+    material->value.roughness = 0;
+    material->value.thin_walled = ior > 1 ? 0u : 1u;
     if (ior > 1)
-        material->ior = fminf(ior, 10);
+        material->value.ior = fminf(ior, 10);
 }
 
 /* The colour below a mirror of this share that reflects as much in total as without it. */
@@ -73,7 +73,7 @@ static void from_fill(const struct nff *nff, const float n[8], struct message_se
         transmit(material, through / sent, n[7]);
     mirror(material, share);
     for (int c = 0; c < 3; c++)
-        material->base_colour[c] =
+        material->value.base_colour[c] =
             below(through > 0 ? nff_colour(nff, n[c]) * sent : nff_colour(nff, unit(n[c]) * unit(n[3])), share);
 }
 
@@ -134,7 +134,7 @@ static uint32_t add_material(struct nff *nff, const struct nff_material *from)
     struct message_set_material material;
 
     import_material_default(&material);
-    material.double_sided = 1;
+    material.value.double_sided = 1;
     material.name = from->name;
     from_fill(nff, from->fill.numbers, &material);
     return import_add_material(nff->scene, &material);

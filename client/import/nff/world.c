@@ -11,9 +11,9 @@
 static bool show(struct nff *nff, enum protocol_node_kind kind, uint32_t object, const float matrix[12],
                  const char *name)
 {
-    struct message_set_node node = {.kind = kind, .object = object, .name = name};
+    struct message_set_node node = {.value.kind = kind, .value.object = object, .name = name};
 
-    memcpy(node.parent_from_node, matrix, sizeof(node.parent_from_node));
+    memcpy(node.value.parent_from_node, matrix, sizeof(node.value.parent_from_node));
     return object != 0 && import_add_node(nff->scene, &node) != 0;
 }
 
@@ -39,8 +39,8 @@ bool nff_add_camera(struct nff *nff)
     }
     for (int row = 0; row < 3; row++)
         matrix[row * 4 + 3] = nff->from[row];
-    camera.fov_y = (float)((double)nff->angle_degrees * PI / 180);
-    camera.near = fmaxf(nff->hither, 0);
+    camera.value.fov_y = (float)((double)nff->angle_degrees * PI / 180);
+    camera.value.near = fmaxf(nff->hither, 0);
     return show(nff, PROTOCOL_NODE_CAMERA, import_add_camera(nff->scene, &camera), matrix, "view");
 }
 
@@ -53,14 +53,14 @@ bool nff_add_lights(struct nff *nff)
 
     for (size_t i = 0; i < nff->light_count; i++) {
         const struct nff_light *light = &nff->lights[i];
-        struct message_set_light set = {.kind = PROTOCOL_LIGHT_STEADY};
+        struct message_set_light set = {.value.kind = PROTOCOL_LIGHT_STEADY};
         float matrix[12];
         char name[32];
 
         import_identity(matrix);
         for (int c = 0; c < 3; c++) {
             matrix[c * 4 + 3] = light->position[c];
-            set.colour[c] = (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI, 1e12);
+            set.value.colour[c] = (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI, 1e12);
         }
         snprintf(name, sizeof(name), "light %zu", i + 1);
         set.name = name;
@@ -77,9 +77,9 @@ void nff_add_background(struct nff *nff)
     if (!nff->has_background && !nff_keeps_values(nff))
         return;
     /* The backdrop for rays that hit nothing; without lights it is also the only light. */
-    environment.backdrop = nff->light_count > 0;
-    environment.display_values = nff_keeps_values(nff);
+    environment.value.backdrop = nff->light_count > 0;
+    environment.value.display_values = nff_keeps_values(nff);
     for (int c = 0; c < 3; c++)
-        environment.colour[c] = nff_colour(nff, nff->background[c]);
+        environment.value.colour[c] = nff_colour(nff, nff->background[c]);
     import_set_environment(nff->scene, &environment, 0);
 }

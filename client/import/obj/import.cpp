@@ -281,11 +281,11 @@ void add_node(state &s, protocol_node_kind kind, uint32_t object, uint32_t paren
 {
     message_set_node set = {};
 
-    set.object = object;
-    set.kind = kind;
+    set.value.object = object;
+    set.value.kind = kind;
     set.name = s.r.scene->file;
-    set.parent = parent;
-    import_identity(set.parent_from_node);
+    set.value.parent = parent;
+    import_identity(set.value.parent_from_node);
     if (object != 0)
         import_add_node(s.r.scene, &set);
 }

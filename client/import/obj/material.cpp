@@ -39,21 +39,21 @@ void reflection(const tinyobj::material_t &m, message_set_material &set)
     const bool is_textured = diffuse <= 0 && !m.diffuse_texname.empty();
 
     for (size_t c = 0; c < 3; c++)
-        set.base_colour[c] = is_textured ? 1 : unit(m.diffuse[c]);
+        set.value.base_colour[c] = is_textured ? 1 : unit(m.diffuse[c]);
     // Equal width of Blinn's and GGX's highlights (Walter et al. 2007), where perceptual roughness is the root.
-    set.roughness = unit(std::sqrt(2 / (std::max(m.shininess, 0.0f) + 2)));
-    set.metallic = unit(m.metallic);
+    set.value.roughness = unit(std::sqrt(2 / (std::max(m.shininess, 0.0f) + 2)));
+    set.value.metallic = unit(m.metallic);
     if (mirrors && specular > 0 && m.metallic <= 0) {
         for (size_t c = 0; c < 3; c++)
-            set.base_colour[c] = unit(m.diffuse[c] + m.specular[c]);
-        set.metallic = specular / (diffuse + specular);
+            set.value.base_colour[c] = unit(m.diffuse[c] + m.specular[c]);
+        set.value.metallic = specular / (diffuse + specular);
         if (m.shininess >= 100) // illumination 3 and up means sharp reflections
-            set.roughness = 0;
+            set.value.roughness = 0;
     }
     if (m.roughness > 0 || !m.roughness_texname.empty())
-        set.roughness = m.roughness > 0 ? unit(m.roughness) : 1;
+        set.value.roughness = m.roughness > 0 ? unit(m.roughness) : 1;
     if (!m.metallic_texname.empty() && m.metallic <= 0)
-        set.metallic = 1;
+        set.value.metallic = 1;
 }
 
 // `anisor` counts turns.
@@ -61,9 +61,9 @@ void anisotropy(const tinyobj::material_t &m, message_set_material &set)
 {
     constexpr float turn = 6.28318531f;
 
-    set.anisotropy = unit(m.anisotropy);
+    set.value.anisotropy = unit(m.anisotropy);
     if (std::fabs(m.anisotropy_rotation) <= 100) // false for NaN
-        set.anisotropy_rotation = m.anisotropy_rotation * turn;
+        set.value.anisotropy_rotation = m.anisotropy_rotation * turn;
 }
 
 void transparency(const tinyobj::material_t &m, message_set_material &set)
@@ -72,30 +72,30 @@ void transparency(const tinyobj::material_t &m, message_set_material &set)
     const bool refracts = m.illum == 4 || m.illum == 6 || m.illum == 7 || m.illum == 9;
 
     if (m.ior >= 1 && m.ior <= 10)
-        set.ior = m.ior > 1 ? m.ior : set.ior;
+        set.value.ior = m.ior > 1 ? m.ior : set.value.ior;
     if ((refracts && (through > 0 || filter > 0)) || (through > 0 && m.ior > 1)) {
-        set.transmission = through > 0 ? through : filter;
-        set.metallic = 0;
-        set.roughness = m.shininess >= 100 || refracts ? 0 : set.roughness;
+        set.value.transmission = through > 0 ? through : filter;
+        set.value.metallic = 0;
+        set.value.roughness = m.shininess >= 100 || refracts ? 0 : set.value.roughness;
         for (size_t c = 0; c < 3; c++) // black glass would be opaque: colours apply to the filter
-            set.base_colour[c] = filter > 0                     ? unit(m.transmittance[c])
-                                 : max_component(m.diffuse) > 0 ? unit(m.diffuse[c])
-                                                                : 1;
+            set.value.base_colour[c] = filter > 0                     ? unit(m.transmittance[c])
+                                       : max_component(m.diffuse) > 0 ? unit(m.diffuse[c])
+                                                                      : 1;
     } else if (through > 0) {
-        set.alpha_mode = PROTOCOL_ALPHA_BLEND;
-        set.base_colour[3] = 1 - through;
+        set.value.alpha_mode = PROTOCOL_ALPHA_BLEND;
+        set.value.base_colour[3] = 1 - through;
     }
 }
 
 // Reads Pc, Pcr and Ps.
 void layers(const tinyobj::material_t &m, message_set_material &set)
 {
-    set.clearcoat = unit(m.clearcoat_thickness);
-    set.clearcoat_roughness = unit(m.clearcoat_roughness);
+    set.value.clearcoat = unit(m.clearcoat_thickness);
+    set.value.clearcoat_roughness = unit(m.clearcoat_roughness);
     const float sheen = m.sheen <= 0 && !m.sheen_texname.empty() ? 1 : unit(m.sheen);
-    for (float &channel : set.sheen)
+    for (float &channel : set.value.sheen)
         channel = sheen;
-    set.sheen_roughness = sheen > 0 ? sheen_roughness : 0;
+    set.value.sheen_roughness = sheen > 0 ? sheen_roughness : 0;
 }
 
 void surface_maps(building &b, const tinyobj::material_t &m, const texcoord_sets &sets, message_set_material &set,
@@ -105,7 +105,7 @@ void surface_maps(building &b, const tinyobj::material_t &m, const texcoord_sets
         bool cutout = false;
         uses[PROTOCOL_MATERIAL_BASE_COLOUR] =
             use_of(alpha_texture(b, m, cutout), m.alpha_texopt, sets[PROTOCOL_MATERIAL_BASE_COLOUR]);
-        set.alpha_mode = cutout ? PROTOCOL_ALPHA_MASK : PROTOCOL_ALPHA_BLEND;
+        set.value.alpha_mode = cutout ? PROTOCOL_ALPHA_MASK : PROTOCOL_ALPHA_BLEND;
     } else if (!m.diffuse_texname.empty()) {
         uses[PROTOCOL_MATERIAL_BASE_COLOUR] =
             use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp), m.diffuse_texopt,
@@ -116,7 +116,7 @@ void surface_maps(building &b, const tinyobj::material_t &m, const texcoord_sets
             use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp), m.emissive_texopt,
                    sets[PROTOCOL_MATERIAL_EMISSION]);
         if (max_component(m.emission) <= 0)
-            set.emission[0] = set.emission[1] = set.emission[2] = 1;
+            set.value.emission[0] = set.value.emission[1] = set.value.emission[2] = 1;
     }
     if (!m.roughness_texname.empty() || !m.metallic_texname.empty())
         uses[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS] =
@@ -166,15 +166,15 @@ uint32_t add_material(building &b, const tinyobj::material_t &m, const texcoord_
     message_set_material set;
 
     import_material_default(&set);
-    set.double_sided = 1; // OBJ has no notion of sides
+    set.value.double_sided = 1; // OBJ has no notion of sides
     set.name = m.name.c_str();
     reflection(m, set);
     anisotropy(m, set);
     layers(m, set);
     transparency(m, set);
     for (size_t c = 0; c < 3; c++)
-        set.emission[c] = m.emission[c] > 0 ? std::min(m.emission[c], 1e6f) : 0;
-    if (set.alpha_mode == PROTOCOL_ALPHA_BLEND && set.base_colour[3] <= 0 && m.alpha_texname.empty())
+        set.value.emission[c] = m.emission[c] > 0 ? std::min(m.emission[c], 1e6f) : 0;
+    if (set.value.alpha_mode == PROTOCOL_ALPHA_BLEND && set.value.base_colour[3] <= 0 && m.alpha_texname.empty())
         import_note(b.scene, PROTOCOL_SEVERITY_WARNING, m.name.c_str(),
                     "a material is wholly transparent (d 0 or Tr 1): objects with it are invisible");
     surface_maps(b, m, sets, set, uses);

@@ -47,11 +47,11 @@ uint32_t add_texture(building &b, const std::string &key, const std::string &nam
                      const image &size, bool colour, bool clamp)
 {
     message_set_texture set = {};
-    set.width = size.width;
-    set.height = size.height;
-    set.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
-    set.wrap_u = set.wrap_v = clamp ? PROTOCOL_WRAP_CLAMP : PROTOCOL_WRAP_REPEAT;
-    set.nearest = size.marked;
+    set.value.width = size.width;
+    set.value.height = size.height;
+    set.value.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
+    set.value.wrap_u = set.value.wrap_v = clamp ? PROTOCOL_WRAP_CLAMP : PROTOCOL_WRAP_REPEAT;
+    set.value.nearest = size.marked;
     set.name = name.c_str();
     const uint32_t blob = import_add_blob(b.scene, texels, uint64_t(size.width) * size.height * 4);
     return b.textures[key] = import_add_texture(b.scene, &set, blob);

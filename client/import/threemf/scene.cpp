@@ -37,13 +37,13 @@ uint32_t add_material(reader &r, const std::string &name, const colour &of)
 
     import_material_default(&set);
     set.name = name.c_str();
-    set.double_sided = 1;
-    set.roughness = 1; // matches plain colours of other formats
+    set.value.double_sided = 1;
+    set.value.roughness = 1; // matches plain colours of other formats
     for (size_t c = 0; c < 3; c++)
-        set.base_colour[c] = linear(of[c]);
+        set.value.base_colour[c] = linear(of[c]);
     if (of[3] > 0 && of[3] < 255) { // exporters without alpha write 0
-        set.base_colour[3] = float(of[3]) / 255;
-        set.alpha_mode = PROTOCOL_ALPHA_BLEND;
+        set.value.base_colour[3] = float(of[3]) / 255;
+        set.value.alpha_mode = PROTOCOL_ALPHA_BLEND;
     }
     const uint32_t id = import_add_material(r.scene, &set);
     check(r);
@@ -169,12 +169,12 @@ void place(placing &p, uint32_t parent, const instance &from, unsigned depth)
              from.key.second, depth_max);
     if (p.left-- == 0)
         fail(r, from.key.first, "the objects are there more than %u times", instances_max);
-    set.parent = parent;
+    set.value.parent = parent;
     set.name = found->second.name.c_str();
-    memcpy(set.parent_from_node, from.parent_from_object, sizeof(set.parent_from_node));
+    memcpy(set.value.parent_from_node, from.parent_from_object, sizeof(set.value.parent_from_node));
     if (found->second.mesh != 0) {
-        set.kind = PROTOCOL_NODE_MESH;
-        set.object = found->second.mesh;
+        set.value.kind = PROTOCOL_NODE_MESH;
+        set.value.object = found->second.mesh;
     }
     const uint32_t node = import_add_node(r.scene, &set);
     check(r);
@@ -197,7 +197,7 @@ void add_items(reader &r)
 
     if (r.items.empty())
         fail(r, "", "the 3MF file builds nothing: it has no item");
-    memcpy(set.parent_from_node, upright, sizeof(upright));
+    memcpy(set.value.parent_from_node, upright, sizeof(upright));
     set.name = "3MF";
     const uint32_t root = import_add_node(r.scene, &set);
     check(r);

@@ -68,7 +68,7 @@ def _setting(text: str) -> tuple[str, Any]:
     """Reads a field of the message render, by the type of the field."""
     word, equals, value = text.partition("=")
     name, render = word.replace("-", "_"), messages.Render()
-    known = [field.name for field in render.FIELDS if not isinstance(getattr(render, field.name), tuple)]
+    known = [name for name in render.names() if not isinstance(getattr(render, name), tuple)]
     if not equals or name not in known:
         like = " or ".join(difflib.get_close_matches(name, known)) if equals else ""
         raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=VALUE with a field of the message render" +

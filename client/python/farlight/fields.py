@@ -3,7 +3,7 @@
 becomes a complete message or an error that names the field.
 
 A payload: u16 size of the fixed part, the fixed fields without gaps, then strings, arrays and bulk data, each after a u32
-count. A shorter fixed part than ours is from an older peer: missing fields get their defaults. A longer one is from a newer
+count. A nested record is u16 size and its fixed fields. A shorter fixed part than ours is from an older peer: missing fields get their defaults. A longer one is from a newer
 peer: the rest is skipped."""
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import inspect
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from dataclasses import fields as dataclass_fields
 from typing import Any, ClassVar, ParamSpec, TypeVar, Union
 
 from .errors import Error, InvalidValue, ProtocolError
@@ -73,6 +74,11 @@ class Record:
     NAME: ClassVar[str] = ""
     FIELDS: ClassVar[tuple[Field, ...]] = ()
 
+    @classmethod
+    def names(cls) -> list[str]:
+        """Its attributes, those of nested records among them."""
+        return [one.name for one in dataclass_fields(cls)]
+
 
 @dataclass
 class Message(Record):
@@ -122,6 +128,14 @@ class Field:
     def decode(self, reader: Reader, path: str) -> Any:
         """Reads a value; raises ProtocolError."""
         raise NotImplementedError
+
+    def encode_of(self, holder: Record, out: bytearray, path: str) -> None:
+        """Appends the attribute, or those of a nested record; `path` is the holder's."""
+        self.encode(getattr(holder, self.name), out, f"{path}.{self.wire_name}")
+
+    def decode_into(self, values: dict[str, Any], reader: Reader, path: str) -> None:
+        """Reads it into arguments for the holder's class."""
+        values[self.name] = self.decode(reader, f"{path}.{self.wire_name}")
 
 
 def _out_of_range(value: object, low: object, high: object) -> str:
@@ -263,6 +277,24 @@ def _is_utf8(data: bytes) -> bool:
     return True
 
 
+class _Nested(Field):
+    """A record in a message, whose class has the record's fields as its own attributes: u16 bytes, then the fields."""
+
+    def __init__(self, name: str, record: type[Record]) -> None:
+        super().__init__(name)
+        self.fields = record.FIELDS
+        self.record_bytes = sum(field.fixed_bytes for field in self.fields)
+        self.fixed_bytes = 2 + self.record_bytes
+
+    def encode_of(self, holder: Record, out: bytearray, path: str) -> None:
+        out += self.record_bytes.to_bytes(2, "little")
+        for field in self.fields:
+            field.encode_of(holder, out, path)  # the caller knows attributes
+
+    def decode_into(self, values: dict[str, Any], reader: Reader, path: str) -> None:
+        _decode_fixed(values, reader, self.fields, f"{path}.{self.wire_name}")
+
+
 class _Array(Field):
     def __init__(self, name: str, record: type[Record], maximum: int) -> None:
         super().__init__(name)
@@ -279,7 +311,7 @@ class _Array(Field):
             if not isinstance(one, self.record):
                 raise InvalidValue(f"{one!r} is no {self.record.__name__}", field=f"{path}[{i}]")
             for field in self.record.FIELDS:
-                field.encode(getattr(one, field.name), out, f"{path}[{i}].{field.wire_name}")
+                field.encode_of(one, out, f"{path}[{i}]")
 
     def decode(self, reader: Reader, path: str) -> list[Record]:
         count = reader.count(self.maximum, path)
@@ -335,6 +367,11 @@ def text(name: str, maximum: int) -> Field:
     return _Text(name, maximum)
 
 
+def nested(name: str, record: type[Record]) -> Field:
+    """One record."""
+    return _Nested(name, record)
+
+
 def array(name: str, record: type[Record], maximum: int) -> Field:
     """Describes an array of at most `maximum` records."""
     return _Array(name, record, maximum)
@@ -356,25 +393,30 @@ def encode(message: Message) -> bytes:
     fixed_bytes = sum(field.fixed_bytes for field in message.FIELDS)
     out[:] = fixed_bytes.to_bytes(2, "little")
     for field in message.FIELDS:
-        field.encode(getattr(message, field.name), out, f"{message.NAME}.{field.wire_name}")
+        field.encode_of(message, out, message.NAME)
     if len(out) > payload_max_bytes(type(message)):
         raise InvalidValue(f"{len(out)} bytes, at most {payload_max_bytes(type(message))} can be sent",
                            field=message.NAME)
     return bytes(out)
 
 
+def _decode_fixed(values: dict[str, Any], reader: Reader, fields: tuple[Field, ...], path: str) -> None:
+    """The fixed fields that are there, behind a u16 of their bytes."""
+    size = int.from_bytes(reader.take(2, f"{path}.struct_bytes"), "little")
+    fixed = Reader(reader.take(size, f"{path}.struct_bytes"))
+    for field in fields:
+        if field.fixed_bytes and fixed.left():
+            field.decode_into(values, fixed, path)
+
+
 def decode(kind: type[Message], payload: Bytes) -> Message:
     """Decodes a payload; ProtocolError names the field."""
     reader = Reader(payload)
-    size = int.from_bytes(reader.take(2, f"{kind.NAME}.struct_bytes"), "little")
-    fixed = Reader(reader.take(size, f"{kind.NAME}.struct_bytes"))
     values: dict[str, Any] = {}
+    _decode_fixed(values, reader, kind.FIELDS, kind.NAME)
     for field in kind.FIELDS:
-        path = f"{kind.NAME}.{field.wire_name}"
         if not field.fixed_bytes:
-            values[field.name] = field.decode(reader, path)
-        elif fixed.left():
-            values[field.name] = field.decode(fixed, path)
+            field.decode_into(values, reader, kind.NAME)
     if reader.left():
         raise ProtocolError(f"{reader.left()} bytes too many", field=kind.NAME)
     return kind(**values)

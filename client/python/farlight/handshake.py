@@ -9,7 +9,7 @@ from . import messages
 from .errors import InvalidValue, ProtocolError, Refused
 from .messages import ErrorCode
 
-VERSION = 1
+VERSION = 2
 MAGIC = b"FARL"
 NEEDS_KEY, TRY_AGAIN = 1 << 2, 1 << 4  # bits of capabilities
 NAME_MAX_BYTES, LIMITS_MAX_BYTES, FIXED_BYTES = 64, 256, 48

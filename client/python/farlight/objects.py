@@ -87,14 +87,14 @@ def _check_names(kind: type[Message], given: Iterable[str], known: Sequence[str]
 
 def make(kind: type[Message], values: dict[str, Any]) -> Any:
     """Makes a message with these values; raises InvalidValue for an unknown field."""
-    _check_names(kind, values, [field.name for field in kind.FIELDS])
+    _check_names(kind, values, kind.names())
     return kind(**values)
 
 
 def _changeable(edit: Message) -> list[str]:
     """Lists the keywords of change(): every field except the object's own number, which would make another object."""
     lit = isinstance(edit, (messages.SetLight, messages.SetEnvironment))
-    return [field.name for field in edit.FIELDS if edit.NAME != f"set_{field.name}"] + ["intensity"] * lit
+    return [name for name in edit.names() if edit.NAME != f"set_{name}"] + ["intensity"] * lit
 
 
 def _with_intensity(edit: Message, values: dict[str, Any]) -> dict[str, Any]:

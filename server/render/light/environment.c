@@ -89,13 +89,13 @@ static bool add_image(struct environment *environment, const struct scene_enviro
                       struct error *error)
 {
     const uint8_t *texels = image->texels->data;
-    uint32_t width = image->width, height = image->height;
+    uint32_t width = image->value.width, height = image->value.height;
     double(*circle)[2] = malloc(width * sizeof(*circle));
     if (!circle)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the environment's columns");
     for (uint32_t u = 0; u < width; u++) {
         /* The middle column is -z; the image is turned by the rotation about +y. */
-        double azimuth = ((u + 0.5) / width - 0.5) * 2.0 * PI - (double)image->rotation;
+        double azimuth = ((u + 0.5) / width - 0.5) * 2.0 * PI - (double)image->value.rotation;
         circle[u][0] = sin(azimuth);
         circle[u][1] = -cos(azimuth);
     }
@@ -157,14 +157,14 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
     static const float white[3] = {1.0f, 1.0f, 1.0f};
     const struct scene_environment *given = &gpu->scene->environment;
     *done = true;
-    bool image = given->texels && given->width > 0 && given->height > 0;
+    bool image = given->texels && given->value.width > 0 && given->value.height > 0;
     uint32_t kind = image ? ENVIRONMENT_IMAGE : ENVIRONMENT_CONSTANT;
-    if (is_black(given->colour))
+    if (is_black(given->value.colour))
         kind = gpu->light_count == 0 ? ENVIRONMENT_SKY : ENVIRONMENT_NONE;
-    else if (given->backdrop)
+    else if (given->value.backdrop)
         kind = ENVIRONMENT_BACKDROP;
     environment->default_light = kind == ENVIRONMENT_SKY;
-    if (environment->default_light && !make_default_lights(environment, device, given->light_group, error))
+    if (environment->default_light && !make_default_lights(environment, device, given->value.light_group, error))
         return false;
     if (environment->known && environment->revision == given->revision && environment->kind == kind)
         return true;
@@ -177,13 +177,13 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
         environment->known = false;
         if (!add_image(environment, given, end_ns, error))
             return false;
-        *done = environment->summed_rows == given->height;
+        *done = environment->summed_rows == given->value.height;
         if (!*done)
             return true;
-        fold_constants(environment->irradiance, environment->sums, given->colour);
+        fold_constants(environment->irradiance, environment->sums, given->value.colour);
         environment->summed_revision = 0;
     } else if (kind == ENVIRONMENT_CONSTANT) {
-        memcpy(environment->irradiance[0], given->colour, sizeof(given->colour));
+        memcpy(environment->irradiance[0], given->value.colour, sizeof(given->value.colour));
     }
     environment->kind = kind;
     environment->revision = given->revision;

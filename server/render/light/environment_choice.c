@@ -65,13 +65,13 @@ static void sky_luminances(float luminances[SKY_ROWS])
  * both, and so an eighth of the light of a texel shines from each half of a texel beside it. */
 static void image_row(float *row, float *scratch, const struct scene_environment *image, uint32_t v)
 {
-    uint32_t width = image->width;
+    uint32_t width = image->value.width;
     for (uint32_t u = 0; u < width; u++) {
         uint16_t halves[4];
         float rgb[3];
         memcpy(halves, (const uint8_t *)image->texels->data + ((size_t)v * width + u) * 8, sizeof(halves));
         for (int c = 0; c < 3; c++)
-            rgb[c] = environment_float_from_half(halves[c]) * image->colour[c];
+            rgb[c] = environment_float_from_half(halves[c]) * image->value.colour[c];
         scratch[u] = fmaxf(luminance(rgb), 0.0f);
     }
     for (uint32_t u = 0; u < width; u++)
@@ -81,7 +81,7 @@ static void image_row(float *row, float *scratch, const struct scene_environment
 /* Sums of the texels whose middles are in each cell. */
 static bool image_luminances(float *cells, const struct scene_environment *image, uint32_t rows, uint32_t columns)
 {
-    uint32_t width = image->width, height = image->height;
+    uint32_t width = image->value.width, height = image->value.height;
     float *lines = malloc((size_t)4 * width * sizeof(*lines));
     if (!lines)
         return false;
@@ -115,8 +115,8 @@ static bool make_table(struct environment_choice *choice, struct gpu_device *dev
                        const struct scene_environment *given, struct error *error)
 {
     bool image = choice->kind == ENVIRONMENT_IMAGE;
-    uint32_t rows = image ? cells_along(given->height, ROWS_MAX) : SKY_ROWS;
-    uint32_t columns = image ? cells_along(given->width, COLUMNS_MAX) : 1;
+    uint32_t rows = image ? cells_along(given->value.height, ROWS_MAX) : SKY_ROWS;
+    uint32_t columns = image ? cells_along(given->value.width, COLUMNS_MAX) : 1;
     size_t cell_count = (size_t)rows * columns, sum_count = rows + 1 + (size_t)rows * (columns + 1);
     float *luminances = malloc((cell_count + sum_count) * sizeof(*luminances));
     if (!luminances)

@@ -10,20 +10,21 @@
 
 /* ---- materials ---- */
 
-static void take_texture(struct opacity_texture *out, const struct scene *scene, const struct texture_use *use)
+static void take_texture(struct opacity_texture *out, const struct scene *scene,
+                         const struct record_texture_use *use)
 {
     const struct scene_texture *texture = use->texture ? scene_texture(scene, use->texture) : NULL;
     if (!texture)
         return;
     *out = (struct opacity_texture){
         .texels = blob_ref(texture->texels),
-        .width = texture->width,
-        .height = texture->height,
-        .is_srgb = texture->format == TEXTURE_RGBA8_SRGB,
-        .nearest = texture->nearest,
+        .width = texture->value.width,
+        .height = texture->value.height,
+        .is_srgb = texture->value.format == TEXTURE_RGBA8_SRGB,
+        .nearest = texture->value.nearest,
         .second_set = use->texcoord_set == 1,
-        .wrap_u = texture->wrap_u,
-        .wrap_v = texture->wrap_v,
+        .wrap_u = texture->value.wrap_u,
+        .wrap_v = texture->value.wrap_v,
     };
     memcpy(out->uv_transform, use->uv_transform, sizeof(out->uv_transform));
 }
@@ -31,12 +32,12 @@ static void take_texture(struct opacity_texture *out, const struct scene *scene,
 static void take_material(struct opacity_material *out, const struct scene *scene, const struct scene_material *in)
 {
     *out = (struct opacity_material){
-        .alpha_mode = in->alpha_mode,
-        .alpha_cutoff = in->alpha_cutoff,
-        .transmission = in->transmission,
-        .metallic = in->metallic,
+        .alpha_mode = in->value.alpha_mode,
+        .alpha_cutoff = in->value.alpha_cutoff,
+        .transmission = in->value.transmission,
+        .metallic = in->value.metallic,
     };
-    memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
+    memcpy(out->base_colour, in->value.base_colour, sizeof(out->base_colour));
     for (int i = 0; i < 3; i++)
         out->body_tint[i] = scene_material_body_tint(in, i);
     take_texture(&out->base_colour_texture, scene, &in->textures[MATERIAL_BASE_COLOUR]);
@@ -86,8 +87,8 @@ static bool lets_light_pass(const struct opacity_material *material)
 /* ---- surfaces ---- */
 
 /* Copies the ranges, with the default material in the gaps between them. */
-static bool take_ranges(struct opacity_surface *surface, const struct material_range *ranges, uint32_t range_count,
-                        uint32_t primitive_count)
+static bool take_ranges(struct opacity_surface *surface, const struct record_material_range *ranges,
+                        uint32_t range_count, uint32_t primitive_count)
 {
     uint32_t end = 0;
     surface->runs = calloc(2 * (size_t)range_count + 1, sizeof(*surface->runs));
@@ -115,14 +116,14 @@ bool opacity_surface_init_mesh(struct opacity_surface *surface, const struct sce
         .colours = blob_ref(mesh->arrays[MESH_COLOURS]),
         .has_wide_colours = mesh_has_wide_colours(mesh),
     };
-    return take_ranges(surface, mesh->ranges, mesh->range_count, mesh->triangle_count);
+    return take_ranges(surface, mesh->ranges, mesh->range_count, mesh->value.triangle_count);
 }
 
 bool opacity_surface_init_spheres(struct opacity_surface *surface, const struct scene_spheres *spheres)
 {
     *surface =
         (struct opacity_surface){.kind = OPACITY_SPHERES, .centres_radii = blob_ref(spheres->centres_radii)};
-    return take_ranges(surface, spheres->ranges, spheres->range_count, spheres->sphere_count);
+    return take_ranges(surface, spheres->ranges, spheres->range_count, spheres->value.sphere_count);
 }
 
 bool opacity_surface_init_discs(struct opacity_surface *surface, const struct disc *discs,

@@ -66,24 +66,24 @@ static bool take_shape(struct reference_entry *entry, RTCDevice device, const st
         if (!entry->node)
             entry->shape[0] = blob_ref(mesh->arrays[MESH_POSITIONS]);
         entry->shape[1] = blob_ref(mesh->arrays[MESH_INDICES]);
-        entry->primitive_count = mesh->triangle_count;
+        entry->primitive_count = mesh->value.triangle_count;
         entry->geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
         if (!entry->geometry)
             return false;
         if (!entry->node)
             set_buffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, entry->shape[0],
-                       3 * sizeof(float), mesh->vertex_count);
+                       3 * sizeof(float), mesh->value.vertex_count);
         set_buffer(entry->geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, entry->shape[1], 3 * sizeof(uint32_t),
-                   mesh->triangle_count);
+                   mesh->value.triangle_count);
         return opacity_surface_init_mesh(&entry->surface, mesh);
     }
     entry->shape[0] = blob_ref(geometry->spheres->centres_radii);
-    entry->primitive_count = geometry->spheres->sphere_count;
+    entry->primitive_count = geometry->spheres->value.sphere_count;
     entry->geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
     if (!entry->geometry)
         return false;
     set_buffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, entry->shape[0], 4 * sizeof(float),
-               geometry->spheres->sphere_count);
+               geometry->spheres->value.sphere_count);
     return opacity_surface_init_spheres(&entry->surface, geometry->spheres);
 }
 
@@ -135,7 +135,7 @@ static bool take_vertices(struct reference_entry *entry, const struct gpu_scene 
     const struct scene_node *node = scene_node(scene->scene, entry->node);
     const struct scene_mesh *mesh = scene_mesh(scene->scene, entry->id);
     float *vertices = rtcSetNewGeometryBuffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
-                                              3 * sizeof(float), mesh->vertex_count);
+                                              3 * sizeof(float), mesh->value.vertex_count);
     return vertices && scene_deform(scene->scene, pose, node, vertices, NULL, error);
 }
 
@@ -296,7 +296,7 @@ static uint32_t *list_disc_materials(const struct gpu_scene *scene)
         sorted[count++] = value;
     qsort(sorted, count, sizeof(*sorted), by_id);
     for (size_t i = 0; i < count; i++)
-        materials[i] = sorted[i]->material;
+        materials[i] = sorted[i]->value.material;
     free(sorted);
     return materials;
 }

@@ -192,11 +192,11 @@ static struct bvh_shape shape_of(const struct gpu_scene_geometry *geometry)
     if (geometry->mesh) {
         shape.positions = (const float *)(const void *)geometry->mesh->arrays[MESH_POSITIONS]->data;
         shape.indices = (const uint32_t *)(const void *)geometry->mesh->arrays[MESH_INDICES]->data;
-        shape.primitive_count = geometry->mesh->triangle_count;
+        shape.primitive_count = geometry->mesh->value.triangle_count;
         shape.deforms = geometry->node != 0;
     } else {
         shape.centres_radii = (const float *)(const void *)geometry->spheres->centres_radii->data;
-        shape.primitive_count = geometry->spheres->sphere_count;
+        shape.primitive_count = geometry->spheres->value.sphere_count;
     }
     return shape;
 }

@@ -165,7 +165,7 @@ static bool rebuild(struct bvh_store *store, const struct gpu_scene *scene, cons
                 ok && geometry->device.close_offset ? read + (size_t)geometry->device.vertex_count * 4 : NULL,
             .position_floats = 4,
             .indices = (const uint32_t *)(const void *)geometry->mesh->arrays[MESH_INDICES]->data,
-            .primitive_count = geometry->mesh->triangle_count,
+            .primitive_count = geometry->mesh->value.triangle_count,
             .deforms = true,
         };
         which[count++] = deforming->list[i].geometry;

@@ -22,8 +22,8 @@ static void see_node(uint32_t id, const char *name, enum protocol_node_kind kind
     message_init(&message, MESSAGE_SET_NODE);
     message.set_node.node = id;
     message.set_node.name = name;
-    message.set_node.kind = kind;
-    message.set_node.object = object;
+    message.set_node.value.kind = kind;
+    message.set_node.value.object = object;
     assert_true(fl_catalogue_observe(&catalogue, &message, &error));
 }
 
@@ -33,7 +33,7 @@ static void see_light(uint32_t id, const char *name, enum protocol_light_kind ki
     message_init(&message, MESSAGE_SET_LIGHT);
     message.set_light.light = id;
     message.set_light.name = name;
-    message.set_light.kind = kind;
+    message.set_light.value.kind = kind;
     assert_true(fl_catalogue_observe(&catalogue, &message, &error));
 }
 

@@ -105,7 +105,8 @@ static inline void put(struct daemon *daemon, const void *bytes, size_t count)
 static inline void greet_with(struct daemon *daemon, uint64_t capabilities)
 {
     struct handshake_hello hello;
-    struct handshake_reply reply = {.version = 1, .capabilities = capabilities, .name = "played"};
+    struct handshake_reply reply = {
+        .version = HANDSHAKE_VERSION_MAX, .capabilities = capabilities, .name = "played"};
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
     size_t count = 0;
     while (handshake_hello_parse(&hello, daemon->in, daemon->in_bytes, &count, NULL) != HANDSHAKE_CONSUMED)

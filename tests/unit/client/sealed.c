@@ -185,7 +185,7 @@ static bool heard_only_the_seal;
 
 static void play_open(struct daemon *daemon)
 {
-    struct handshake_reply reply = {.version = 1, .name = "open"};
+    struct handshake_reply reply = {.version = HANDSHAKE_VERSION_MAX, .name = "open"};
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
     more(daemon);
     put(daemon, bytes, handshake_reply_encode(bytes, &reply));
@@ -220,7 +220,7 @@ static bool is_changed;
 
 static void play_cut(struct daemon *daemon)
 {
-    struct handshake_reply reply = {.version = 1, .name = "cut"};
+    struct handshake_reply reply = {.version = HANDSHAKE_VERSION_MAX, .name = "cut"};
     struct message goodbye = {.type = MESSAGE_GOODBYE, .goodbye = {.text = "enough"}};
     static uint8_t plain[HANDSHAKE_REPLY_MAX_BYTES + 200];
     size_t plain_bytes = handshake_reply_encode(plain, &reply), sealed_bytes;

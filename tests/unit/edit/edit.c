@@ -45,8 +45,8 @@ static void tell_material(struct daemon *daemon, uint32_t request, uint32_t obje
     struct message message;
     message_init(&message, MESSAGE_SET_MATERIAL);
     message.set_material.material = object + world.wrong_object;
-    message.set_material.roughness = world.roughness;
-    message.set_material.metallic = world.metallic;
+    message.set_material.value.roughness = world.roughness;
+    message.set_material.value.metallic = world.metallic;
     message.set_material.name = "steel";
     tell(daemon, request, &message);
     tell_done(daemon, request);
@@ -156,8 +156,8 @@ TEST(an_edit_that_comes_too_late_is_made_anew_of_what_is_there)
     if (!edit("material.steel.roughness*=0.5", &edited))
         fail_msg("%s", error.text);
     assert_int_equal(world.commits, 3);
-    assert_true(world.set.roughness == 0.25f);
-    assert_true(world.set.metallic == 0.5f); /* the other client's */
+    assert_true(world.set.value.roughness == 0.25f);
+    assert_true(world.set.value.metallic == 0.5f); /* the other client's */
     assert_int_equal(world.base_revision, 12);
     assert_int_equal(edited.revision, 13);
     assert_int_equal(edited.objects, 1);

@@ -18,7 +18,7 @@ static struct message made(enum protocol_object_kind kind)
     message_init(&message, edit_message_type(kind));
     if (kind == PROTOCOL_OBJECT_NODE)
         for (int i = 0; i < 3; i++)
-            message.set_node.parent_from_node[5 * i] = 1;
+            message.set_node.value.parent_from_node[5 * i] = 1;
     return message;
 }
 
@@ -34,15 +34,11 @@ TEST(every_value_of_a_material_is_a_field)
 {
     struct fl_field fields[FL_FIELDS_MAX];
     const size_t count = fl_fields(PROTOCOL_OBJECT_MATERIAL, fields);
-    size_t wires = 0, covered = 0;
-    for (const struct field_desc *wire = message_describe(MESSAGE_SET_MATERIAL)->body()->fields; wire->name;
-         wire++)
-        wires += !field_is_counted(wire);
-    for (size_t i = 0; i < count; i++) {
-        covered += fields[i].source == EDIT_WIRE_TRIPLE ? 3 : 1;
+    struct field_desc leaves[FL_FIELDS_MAX];
+    const size_t wires = struct_leaves(message_describe(MESSAGE_SET_MATERIAL)->body(), leaves, FL_FIELDS_MAX);
+    for (size_t i = 0; i < count; i++)
         assert_true(fields[i].unit && fields[i].doc && fields[i].min < fields[i].max);
-    }
-    assert_int_equal(covered, wires - 1); /* all but its identifier */
+    assert_int_equal(count, wires - 1); /* all but its identifier */
     assert_int_equal(fl_fields(PROTOCOL_OBJECT_MESH, fields), 0);
 }
 
@@ -79,11 +75,12 @@ TEST(the_intensity_of_a_light_keeps_its_hue)
     struct message light = made(PROTOCOL_OBJECT_LIGHT);
     set(&light, PROTOCOL_OBJECT_LIGHT, "colour", (double[]){4, 2, 1});
     set(&light, PROTOCOL_OBJECT_LIGHT, "intensity", (double[]){8});
-    assert_true(light.set_light.colour[0] == 8 && light.set_light.colour[1] == 4 &&
-                light.set_light.colour[2] == 2);
+    assert_true(light.set_light.value.colour[0] == 8 && light.set_light.value.colour[1] == 4 &&
+                light.set_light.value.colour[2] == 2);
     set(&light, PROTOCOL_OBJECT_LIGHT, "intensity", (double[]){0});
     set(&light, PROTOCOL_OBJECT_LIGHT, "intensity", (double[]){3});
-    assert_true(light.set_light.colour[0] == 3 && light.set_light.colour[2] == 3); /* of black: white */
+    assert_true(light.set_light.value.colour[0] == 3 &&
+                light.set_light.value.colour[2] == 3); /* of black: white */
 }
 
 TEST(the_environment_turns_as_the_command_line_turns_it)
@@ -95,11 +92,11 @@ TEST(the_environment_turns_as_the_command_line_turns_it)
     static const float turns[] = {-1.57079633f, 0.0f, 1.57079633f}, degrees_of[] = {0.0f, 90.0f, 180.0f};
     assert_true(edit_field_find(PROTOCOL_OBJECT_ENVIRONMENT, "rotation", &field, &error));
     for (size_t i = 0; i < 3; i++) {
-        environment.set_environment.rotation = turns[i];
+        environment.set_environment.value.rotation = turns[i];
         edit_field_load(&field, &environment, degrees);
         assert_true(degrees[0] == (double)degrees_of[i]);
         edit_field_store(&field, &environment, degrees);
-        assert_true(environment.set_environment.rotation == turns[i]);
+        assert_true(environment.set_environment.value.rotation == turns[i]);
     }
 }
 
@@ -114,12 +111,12 @@ TEST(lights_have_the_fields_of_their_kind)
                                                       [PROTOCOL_LIGHT_STEADY] = {false, false, false, true}};
     for (int kind = 0; kind < PROTOCOL_LIGHT_COUNT; kind++) {
         struct message light = made(PROTOCOL_OBJECT_LIGHT);
-        light.set_light.kind = (enum protocol_light_kind)kind;
+        light.set_light.value.kind = (enum protocol_light_kind)kind;
         for (size_t i = 0; i < 4; i++) {
             struct fl_field field;
             assert_true(edit_field_find(PROTOCOL_OBJECT_LIGHT, fields[i], &field, &error));
             if (edit_field_applies(&field, &light) != has[kind][i])
-                fail_msg("%s light, %s", protocol_light_kind_text(light.set_light.kind), fields[i]);
+                fail_msg("%s light, %s", protocol_light_kind_text(light.set_light.value.kind), fields[i]);
         }
     }
 }
@@ -149,7 +146,7 @@ TEST(angles_and_scales_come_back_from_a_matrix)
 TEST(a_node_turns_about_x_then_y_then_z)
 {
     struct message node = made(PROTOCOL_OBJECT_NODE);
-    const float *m = node.set_node.parent_from_node;
+    const float *m = node.set_node.value.parent_from_node;
     set(&node, PROTOCOL_OBJECT_NODE, "translate", (double[]){1, 2, 3});
     set(&node, PROTOCOL_OBJECT_NODE, "rotate", (double[]){90, 0, 90});
     set(&node, PROTOCOL_OBJECT_NODE, "scale", (double[]){2, 1, 1});

@@ -273,9 +273,9 @@ TEST(an_orbit_without_a_key_turns_about_the_middle_of_the_scene)
 {
     struct scene_edit disc = {.kind = EDIT_SET, .object = OBJECT_DISC};
     disc.set.disc.base.id = 1;
-    disc.set.disc.centre_world[0] = 100;
-    disc.set.disc.normal_world[1] = 1;
-    disc.set.disc.radius = 2;
+    disc.set.disc.value.centre_world[0] = 100;
+    disc.set.disc.value.normal_world[1] = 1;
+    disc.set.disc.value.radius = 2;
     struct error error = {0};
     assert_true(scene_commit(scene, &disc, 1, &error));
     struct engine_job job = job_of(CAMERA_ORBIT, NULL, 0);
@@ -316,9 +316,9 @@ TEST(what_an_orbit_goes_around_is_as_large_as_its_margin_allows)
 {
     struct scene_edit disc = {.kind = EDIT_SET, .object = OBJECT_DISC};
     disc.set.disc.base.id = 1;
-    disc.set.disc.centre_world[0] = 3;
-    disc.set.disc.normal_world[1] = 1;
-    disc.set.disc.radius = 2;
+    disc.set.disc.value.centre_world[0] = 3;
+    disc.set.disc.value.normal_world[1] = 1;
+    disc.set.disc.value.radius = 2;
     struct error error = {0};
     assert_true(scene_commit(scene, &disc, 1, &error));
     struct engine_job job = job_of(CAMERA_ORBIT, NULL, 0);
@@ -352,11 +352,12 @@ TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
         {.kind = EDIT_SET, .object = OBJECT_NODE},
         {.kind = EDIT_SET, .object = OBJECT_NODE},
     };
-    edits[0].set.camera = (struct scene_camera){.base.id = 4, .fov_y = 0.9f, .near = 0.25f};
+    edits[0].set.camera = (struct scene_camera){.base.id = 4, .value.fov_y = 0.9f, .value.near = 0.25f};
     edits[1].set.node = (struct scene_node){.base.id = 1};
-    edits[2].set.node = (struct scene_node){.base.id = 2, .parent = 1, .kind = NODE_CAMERA, .object = 4};
-    memcpy(edits[1].set.node.parent_from_node, parent, sizeof(parent));
-    memcpy(edits[2].set.node.parent_from_node, child, sizeof(child));
+    edits[2].set.node =
+        (struct scene_node){.base.id = 2, .value.parent = 1, .value.kind = NODE_CAMERA, .value.object = 4};
+    memcpy(edits[1].set.node.value.parent_from_node, parent, sizeof(parent));
+    memcpy(edits[2].set.node.value.parent_from_node, child, sizeof(child));
     struct error error = {0};
     if (!scene_commit(scene, edits, 3, &error))
         fail_msg("%s", error.text);

@@ -156,28 +156,29 @@ static void make_scene(uint64_t client, float radius)
         edits[i].object = i < 2 ? OBJECT_NODE : i == 2 ? OBJECT_MESH : i == 3 ? OBJECT_SPHERES : OBJECT_MATERIAL;
     for (int i = 0; i < 2; i++) {
         struct scene_node *node = &edits[i].set.node;
-        *node = (struct scene_node){.base.id = (uint32_t)i + 1, .kind = i ? NODE_SPHERES : NODE_MESH, .object = 1};
-        memcpy(node->parent_from_node, identity, sizeof(identity));
+        *node = (struct scene_node){
+            .base.id = (uint32_t)i + 1, .value.kind = i ? NODE_SPHERES : NODE_MESH, .value.object = 1};
+        memcpy(node->value.parent_from_node, identity, sizeof(identity));
     }
     struct scene_mesh *mesh = &edits[2].set.mesh;
-    *mesh = (struct scene_mesh){.base.id = 1, .vertex_count = 4, .triangle_count = 2};
+    *mesh = (struct scene_mesh){.base.id = 1, .value.vertex_count = 4, .value.triangle_count = 2};
     mesh->arrays[MESH_POSITIONS] = blob_create(sizeof(square));
     memcpy(mesh->arrays[MESH_POSITIONS]->data, square, sizeof(square));
     mesh->arrays[MESH_INDICES] = blob_create(sizeof(indices));
     memcpy(mesh->arrays[MESH_INDICES]->data, indices, sizeof(indices));
     struct scene_spheres *spheres = &edits[3].set.spheres;
-    *spheres = (struct scene_spheres){.base.id = 1, .sphere_count = 1, .range_count = 1};
+    *spheres = (struct scene_spheres){.base.id = 1, .value.sphere_count = 1, .range_count = 1};
     spheres->centres_radii = blob_create(16);
     memcpy(spheres->centres_radii->data, (const float[]){0, radius, 0, radius}, 16);
     spheres->ranges = calloc(1, sizeof(*spheres->ranges));
-    *spheres->ranges = (struct material_range){0, 1, 1};
+    *spheres->ranges = (struct record_material_range){0, 1, 1};
     edits[4].set.material = (struct scene_material){.base.id = 1,
-                                                    .base_colour = {1, 1, 1, 1},
-                                                    .emission = {0.2f, 0.9f, 0.4f},
-                                                    .roughness = 1,
-                                                    .ior = 1.5f,
-                                                    .specular = 1,
-                                                    .specular_colour = {1, 1, 1}};
+                                                    .value.base_colour = {1, 1, 1, 1},
+                                                    .value.emission = {0.2f, 0.9f, 0.4f},
+                                                    .value.roughness = 1,
+                                                    .value.ior = 1.5f,
+                                                    .value.specular = 1,
+                                                    .value.specular_colour = {1, 1, 1}};
     submit((struct engine_command){
         .kind = ENGINE_COMMIT, .client = client, .request = 2, .scene = 1, .edits = edits, .edit_count = 5});
     expect_done();
@@ -545,13 +546,15 @@ static void make_field(uint64_t client)
     assert_non_null(edits);
     edits[0].object = OBJECT_MESH;
     struct scene_mesh *mesh = &edits[0].set.mesh;
-    *mesh = (struct scene_mesh){
-        .base.id = 1, .vertex_count = 3 * FIELD_TRIANGLES, .triangle_count = FIELD_TRIANGLES, .range_count = 1};
+    *mesh = (struct scene_mesh){.base.id = 1,
+                                .value.vertex_count = 3 * FIELD_TRIANGLES,
+                                .value.triangle_count = FIELD_TRIANGLES,
+                                .range_count = 1};
     mesh->arrays[MESH_POSITIONS] = blob_create((size_t)FIELD_TRIANGLES * 9 * sizeof(float));
     mesh->arrays[MESH_INDICES] = blob_create((size_t)FIELD_TRIANGLES * 3 * sizeof(uint32_t));
     mesh->ranges = calloc(1, sizeof(*mesh->ranges));
     assert_true(mesh->arrays[MESH_POSITIONS] && mesh->arrays[MESH_INDICES] && mesh->ranges);
-    *mesh->ranges = (struct material_range){0, FIELD_TRIANGLES, 1};
+    *mesh->ranges = (struct record_material_range){0, FIELD_TRIANGLES, 1};
     float *positions = (float *)(void *)mesh->arrays[MESH_POSITIONS]->data;
     uint32_t *indices = (uint32_t *)(void *)mesh->arrays[MESH_INDICES]->data;
     for (uint32_t i = 0; i < 3 * FIELD_TRIANGLES; i++) {

@@ -289,15 +289,16 @@ static void fill_scene(uint32_t request)
         spheres[i][3] = 1.0f + (float)i / SPHERES;
     struct scene_edit *edit = &made->edits[NODES];
     *edit = (struct scene_edit){.object = OBJECT_SPHERES};
-    edit->set.spheres = (struct scene_spheres){
-        .base.id = 1, .sphere_count = SPHERES, .centres_radii = test_blob(spheres, SPHERES * sizeof(*spheres))};
+    edit->set.spheres = (struct scene_spheres){.base.id = 1,
+                                               .value.sphere_count = SPHERES,
+                                               .centres_radii = test_blob(spheres, SPHERES * sizeof(*spheres))};
     free(spheres);
     for (uint32_t i = 0; i < NODES; i++) {
         struct scene_node *node = &made->edits[i].set.node;
-        node->kind = NODE_SPHERES;
-        node->object = 1;
-        node->parent_from_node[0] = node->parent_from_node[5] = node->parent_from_node[10] = 1;
-        node->parent_from_node[3] = (float)i;
+        node->value.kind = NODE_SPHERES;
+        node->value.object = 1;
+        node->value.parent_from_node[0] = node->value.parent_from_node[5] = node->value.parent_from_node[10] = 1;
+        node->value.parent_from_node[3] = (float)i;
     }
     submit(made);
     expect_done(1, request);

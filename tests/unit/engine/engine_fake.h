@@ -181,10 +181,11 @@ static inline uint64_t fake_motion_digest(const struct scene_motion *motion)
         }
         digest = XXH3_64bits_withSeed(pose->weights, pose->weight_count * sizeof(*pose->weights), digest);
         for (uint32_t k = 0; k < pose->light_count; k++)
-            digest = XXH3_64bits_withSeed(pose->lights[k].colour, sizeof(pose->lights[k].colour), digest);
-        for (uint32_t k = 0; k < pose->material_count; k++)
             digest =
-                XXH3_64bits_withSeed(pose->materials[k].emission, sizeof(pose->materials[k].emission), digest);
+                XXH3_64bits_withSeed(pose->lights[k].value.colour, sizeof(pose->lights[k].value.colour), digest);
+        for (uint32_t k = 0; k < pose->material_count; k++)
+            digest = XXH3_64bits_withSeed(pose->materials[k].value.emission,
+                                          sizeof(pose->materials[k].value.emission), digest);
     }
     return digest;
 }
@@ -531,7 +532,7 @@ static inline struct engine_command *commit_of_nodes(uint64_t client, uint32_t r
     made->edit_count = count;
     for (uint32_t i = 0; i < count; i++) {
         made->edits[i].set.node.base.id = i + 1;
-        made->edits[i].set.node.parent_from_node[0] = 1;
+        made->edits[i].set.node.value.parent_from_node[0] = 1;
     }
     return made;
 }

@@ -283,11 +283,13 @@ TEST(stats_add_up)
     made->edits = calloc(2, sizeof(*made->edits));
     made->edit_count = 2;
     made->edits[0].object = OBJECT_SPHERES;
-    made->edits[0].set.spheres =
-        (struct scene_spheres){.base.id = 7, .sphere_count = 1, .centres_radii = blob_create(sizeof(sphere))};
+    made->edits[0].set.spheres = (struct scene_spheres){
+        .base.id = 7, .value.sphere_count = 1, .centres_radii = blob_create(sizeof(sphere))};
     memcpy(made->edits[0].set.spheres.centres_radii->data, sphere, sizeof(sphere));
-    made->edits[1].set.node = (struct scene_node){
-        .base.id = 2, .kind = NODE_SPHERES, .object = 7, .parent_from_node = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    made->edits[1].set.node = (struct scene_node){.base.id = 2,
+                                                  .value.kind = NODE_SPHERES,
+                                                  .value.object = 7,
+                                                  .value.parent_from_node = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     submit(made);
     expect_done(1, 5);
     for (uint32_t request = 6; request <= 7; request++) {

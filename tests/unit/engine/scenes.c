@@ -245,7 +245,7 @@ TEST(a_commit_notifies_all_other_clients)
     wrong->edits = calloc(1, sizeof(*wrong->edits));
     wrong->edit_count = 1;
     wrong->edits[0].set.node.base.id = 3;
-    wrong->edits[0].set.node.parent = 9;
+    wrong->edits[0].set.node.value.parent = 9;
     submit(wrong);
     expect_failed(1, 10, ERROR_UNKNOWN_ID, "edits[0] (node 3).parent");
     close_scene(3, 11, 7);
@@ -576,7 +576,7 @@ TEST(a_description_names_cameras_and_clips)
 
     struct draft_list list = {0};
     add_set(&list, OBJECT_CAMERA, 4)->set.camera =
-        (struct scene_camera){.base = {.id = 4, .name = "lens"}, .fov_y = 0.75f};
+        (struct scene_camera){.base = {.id = 4, .name = "lens"}, .value.fov_y = 0.75f};
     strcpy(add_shown(&list, 9, NODE_CAMERA, 4)->base.name, "tower");
     add_shown(&list, 7, NODE_CAMERA, 4);
     static const float sphere[4] = {1, 2, 3, 0.5f};
@@ -586,7 +586,7 @@ TEST(a_description_names_cameras_and_clips)
     strcpy(add_clip(&list, 5, floats, 8)->base.name, "walk");
     add_clip(&list, 2, floats, 8);
     add_channel(&list, 1, 5, CHANNEL_NODE_TRANSLATION, 3, 3, 2);
-    add_channel(&list, 2, 5, CHANNEL_NODE_SCALE, 3, 3, 1)->first_value = 2;
+    add_channel(&list, 2, 5, CHANNEL_NODE_SCALE, 3, 3, 1)->value.first_value = 2;
     submit_edits(3, &list);
     event = describe(4);
     const struct engine_scene_description *told = event->description;
@@ -635,7 +635,7 @@ TEST(of_many_cameras_the_first_are_listed)
     while (next > 0) {
         struct draft_list list = {0};
         if (!has_camera)
-            add_set(&list, OBJECT_CAMERA, 1)->set.camera = (struct scene_camera){.base.id = 1, .fov_y = 1};
+            add_set(&list, OBJECT_CAMERA, 1)->set.camera = (struct scene_camera){.base.id = 1, .value.fov_y = 1};
         has_camera = true;
         while (next > 0 && list.count < EDITS_MAX)
             add_shown(&list, next--, NODE_CAMERA, 1);

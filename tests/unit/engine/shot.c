@@ -16,9 +16,9 @@
 static void add_turning(struct draft_list *list, double degrees)
 {
     add_mesh(list, 1);
-    add_set(list, OBJECT_CAMERA, 1)->set.camera.fov_y = 1;
+    add_set(list, OBJECT_CAMERA, 1)->set.camera.value.fov_y = 1;
     add_node(list, 1, 0);
-    add_shown(list, 2, NODE_MESH, 1)->parent = 1;
+    add_shown(list, 2, NODE_MESH, 1)->value.parent = 1;
     add_shown(list, 3, NODE_CAMERA, 1);
     /* Keys close enough for the arc between two of them to be the shorter one. */
     enum { KEYS = 65 };
@@ -34,9 +34,9 @@ static void add_turning(struct draft_list *list, double degrees)
     add_channel(list, 1, 1, CHANNEL_NODE_ROTATION, 1, 4, KEYS);
     add_channel(list, 2, 2, CHANNEL_NODE_ROTATION, 2, 4, KEYS);
     struct scene_channel *moving = add_channel(list, 3, 1, CHANNEL_NODE_TRANSLATION, 3, 3, 2);
-    moving->first_time = 0;
-    moving->first_value = KEYS * 5;
-    moving->key_count = 2;
+    moving->value.first_time = 0;
+    moving->value.first_value = KEYS * 5;
+    moving->value.key_count = 2;
 }
 
 static struct scene *turning_scene(double degrees)
@@ -99,8 +99,8 @@ TEST(joints_alone_need_two_poses)
     add_joints(add_mesh(&list, 1), joints, weights);
     add_skin(&list, 1, (uint32_t[]){1}, 1);
     struct scene_node *node = add_shown(&list, 2, NODE_MESH, 1);
-    node->skin = 1;
-    node->parent = 1;
+    node->value.skin = 1;
+    node->value.parent = 1;
     expect_commit(scene, &list);
     assert_int_equal(pose_count(scene, 2, 0, 1), 2);
     scene_destroy(scene);
@@ -277,9 +277,9 @@ TEST(clips_move_the_view_of_a_camera_with_keys)
     /* At 0 and 1 s. */
     add_clip(&list, 3, (float[]){0, 1, 3, 0, 4, 3, 0, 8, 0.4f, 0.8f, 2, 4, 1, 3, 9, 11}, 16);
     add_channel(&list, 10, 3, CHANNEL_VIEW_EYE, 0, 3, 2);
-    add_channel(&list, 11, 3, CHANNEL_VIEW_FOV_Y, 0, 1, 2)->first_value = 8;
-    add_channel(&list, 12, 3, CHANNEL_VIEW_APERTURE, 0, 1, 2)->first_value = 10;
-    add_channel(&list, 13, 3, CHANNEL_VIEW_EXPOSURE, 0, 1, 2)->first_value = 12;
+    add_channel(&list, 11, 3, CHANNEL_VIEW_FOV_Y, 0, 1, 2)->value.first_value = 8;
+    add_channel(&list, 12, 3, CHANNEL_VIEW_APERTURE, 0, 1, 2)->value.first_value = 10;
+    add_channel(&list, 13, 3, CHANNEL_VIEW_EXPOSURE, 0, 1, 2)->value.first_value = 12;
     add_clip(&list, 4, (float[]){0, 7}, 2);
     add_channel(&list, 14, 4, CHANNEL_VIEW_FOCUS, 0, 1, 1);
     expect_commit(scene, &list);
@@ -336,7 +336,7 @@ TEST(a_lens_is_sharp_where_it_looks)
     }
     /* An orthographic camera has no lens. */
     struct draft_list list = {0};
-    add_set(&list, OBJECT_CAMERA, 1)->set.camera.height = 1;
+    add_set(&list, OBJECT_CAMERA, 1)->set.camera.value.height = 1;
     expect_commit(scene, &list);
     struct engine_job job = job_of(CAMERA_NODE, &use, 1);
     job.frame.aperture = 0.1f;
@@ -441,9 +441,9 @@ TEST(a_given_camera_sees_the_scene_of_that_time)
     add_turning(&list, 90);
     add_clip(&list, 3, (float[]){0, 9, 9, 9, 0.25f}, 5);
     struct scene_channel *eye = add_channel(&list, 4, 3, CHANNEL_VIEW_EYE, 0, 3, 1);
-    eye->first_value = 1;
+    eye->value.first_value = 1;
     struct scene_channel *aperture = add_channel(&list, 5, 3, CHANNEL_VIEW_APERTURE, 0, 1, 1);
-    aperture->first_value = 4;
+    aperture->value.first_value = 4;
     expect_commit(scene, &list);
     struct clip_use uses[] = {{.clip = 1, .speed = 1}, {.clip = 3, .speed = 1}};
     struct engine_job job = job_of(CAMERA_KEYS, uses, 2);

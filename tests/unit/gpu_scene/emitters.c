@@ -125,7 +125,8 @@ TEST(a_cone_of_both_has_all_normals_of_either_up_to_their_sign)
 TEST(a_part_of_a_texture_is_as_bright_as_its_texels)
 {
     enum { SIZE = 256 };
-    struct scene_texture texture = {.base.id = 1, .width = SIZE, .height = SIZE, .format = TEXTURE_RGBA8_LINEAR};
+    struct scene_texture texture = {
+        .base.id = 1, .value.width = SIZE, .value.height = SIZE, .value.format = TEXTURE_RGBA8_LINEAR};
     texture.texels = blob_create(SIZE * SIZE * 4);
     struct emission_map *map = malloc(sizeof(*map));
     assert_true(texture.texels && map);

@@ -96,7 +96,7 @@ static void expect_near(const char *what, size_t vertex, const float *got, const
 static void deformed_tangent(const struct fixture *fixture, const struct scene_pose *pose,
                              const struct scene_node *node, size_t vertex, double out[3])
 {
-    const struct scene_mesh *mesh = scene_mesh(fixture->scene, node->object);
+    const struct scene_mesh *mesh = scene_mesh(fixture->scene, node->value.object);
     const float *tangents = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
     const float *added = (const float *)(const void *)mesh->arrays[MESH_TARGET_TANGENTS]->data;
     const uint16_t *joints = (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data;
@@ -105,15 +105,15 @@ static void deformed_tangent(const struct fixture *fixture, const struct scene_p
     double tangent[3], moved[3] = {0}, sum = 0;
     struct error error = {0};
     scene_pose_weights(pose, node, mesh, weights);
-    assert_true(
-        scene_skin_matrices(fixture->scene, pose, scene_skin(fixture->scene, node->skin), matrices[0], &error));
+    assert_true(scene_skin_matrices(fixture->scene, pose, scene_skin(fixture->scene, node->value.skin),
+                                    matrices[0], &error));
     for (size_t k = 0; k < 3; k++) {
         tangent[k] = tangents[4 * vertex + k];
         for (size_t t = 0; t < TEST_TARGETS; t++)
-            tangent[k] += (double)weights[t] * added[3 * (t * mesh->vertex_count + vertex) + k];
+            tangent[k] += (double)weights[t] * added[3 * (t * mesh->value.vertex_count + vertex) + k];
     }
-    for (size_t i = 0; i < mesh->influence_count; i++) {
-        size_t at = vertex * mesh->influence_count + i;
+    for (size_t i = 0; i < mesh->value.influence_count; i++) {
+        size_t at = vertex * mesh->value.influence_count + i;
         const float *m = matrices[joints[at]];
         sum += joint_weights[at];
         for (size_t row = 0; row < 3; row++)
@@ -423,7 +423,7 @@ TEST(materials_and_lights_follow_the_first_pose)
     struct light light;
     fixture_init(&fixture, test_scene_soup());
     *(&test_add(&fixture.edits, OBJECT_LIGHT)->set.light) =
-        (struct scene_light){.base.id = 1, .kind = LIGHT_POINT, .colour = {1, 2, 3}};
+        (struct scene_light){.base.id = 1, .value.kind = LIGHT_POINT, .value.colour = {1, 2, 3}};
     test_node(&fixture.edits, 50, 0, NODE_LIGHT, 1, NULL);
     test_commit(&fixture.edits);
     update(&fixture, NULL);
@@ -431,11 +431,11 @@ TEST(materials_and_lights_follow_the_first_pose)
     struct scene_pose *first = &motion.poses[0];
     first->materials = malloc(sizeof(*first->materials));
     first->materials[0] = *scene_material(fixture.scene, 2);
-    first->materials[0].transmission = 0.5f;
+    first->materials[0].value.transmission = 0.5f;
     first->material_count = 1;
     first->lights = malloc(sizeof(*first->lights));
     first->lights[0] = *scene_light(fixture.scene, 1);
-    first->lights[0].colour[0] = 9;
+    first->lights[0].value.colour[0] = 9;
     first->light_count = 1;
     test_transform(m, 1, 1, 1, 0, 0, 7, 8, 9);
     test_pose_node(first, 50, m);

@@ -106,7 +106,7 @@ TEST(what_surfaces_have_is_known_of_the_meshes_and_materials_in_use)
     struct fixture fixture;
     fixture_init(&fixture, test_scene_soup());
     assert_true(fixture.gpu.has_texcoords && fixture.gpu.has_colours && !fixture.gpu.has_tangents);
-    test_material(&fixture.edits, 2, 0.4f, 0.5f, 0.6f)->anisotropy = 0.5f;
+    test_material(&fixture.edits, 2, 0.4f, 0.5f, 0.6f)->value.anisotropy = 0.5f;
     test_commit(&fixture.edits);
     update(&fixture);
     assert_true(fixture.gpu.has_tangents);
@@ -126,10 +126,10 @@ TEST(only_what_is_more_than_a_factor_changes_surfaces)
     struct scene_material glass = *scene_material(fixture.scene, 3), cutout = *scene_material(fixture.scene, 1);
     struct scene_material *edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
     memcpy(edited->textures, glass.textures, sizeof(glass.textures));
-    edited->transmission = 0.5f;
-    edited->roughness = 0.2f;
-    edited->emission[0] = 3.0f;
-    edited->base_colour[3] = 0.5f;
+    edited->value.transmission = 0.5f;
+    edited->value.roughness = 0.2f;
+    edited->value.emission[0] = 3.0f;
+    edited->value.base_colour[3] = 0.5f;
     test_commit(&fixture.edits);
     update(&fixture);
     assert_true((fixture.changes.bits & CHANGED_SHADING) && !(fixture.changes.bits & CHANGED_SURFACES));
@@ -141,8 +141,8 @@ TEST(only_what_is_more_than_a_factor_changes_surfaces)
     assert_true((fixture.changes.bits & CHANGED_SURFACES));
     edited = test_material(&fixture.edits, 1, 0.1f, 0.2f, 0.3f);
     memcpy(edited->textures, cutout.textures, sizeof(cutout.textures));
-    edited->alpha_mode = ALPHA_MASK;
-    edited->alpha_cutoff = 0.25f;
+    edited->value.alpha_mode = ALPHA_MASK;
+    edited->value.alpha_cutoff = 0.25f;
     test_commit(&fixture.edits);
     update(&fixture);
     assert_true((fixture.changes.bits & CHANGED_SURFACES));
@@ -241,7 +241,7 @@ TEST(a_material_asks_for_tangents_of_the_coordinates_of_the_first_texture_that_n
     fixture_init(&fixture, test_scene_create());
     test_texture(&fixture.edits, 1, 1, 1, TEXTURE_RGBA8_LINEAR, WRAP_REPEAT, WRAP_REPEAT, 1);
     for (uint32_t second = 0; second < 2; second++) {
-        struct texture_use *uses = test_material(&fixture.edits, 1, 0.5f, 0.5f, 0.5f)->textures;
+        struct record_texture_use *uses = test_material(&fixture.edits, 1, 0.5f, 0.5f, 0.5f)->textures;
         uses[MATERIAL_NORMAL].texture = uses[MATERIAL_BUMP].texture = 1;
         uses[MATERIAL_NORMAL].texcoord_set = second;
         uses[MATERIAL_BUMP].texcoord_set = !second;
@@ -263,10 +263,10 @@ TEST(a_texture_is_halved_in_linear_light_down_to_one_texel)
     for (uint32_t id = 1; id <= 2; id++) {
         struct scene_texture *texture = &test_add(&fixture.edits, OBJECT_TEXTURE)->set.texture;
         texture->base.id = id;
-        texture->width = 2;
-        texture->height = 3;
-        texture->format = id == 1 ? TEXTURE_RGBA8_SRGB : TEXTURE_RGBA8_LINEAR;
-        texture->wrap_u = WRAP_MIRROR;
+        texture->value.width = 2;
+        texture->value.height = 3;
+        texture->value.format = id == 1 ? TEXTURE_RGBA8_SRGB : TEXTURE_RGBA8_LINEAR;
+        texture->value.wrap_u = WRAP_MIRROR;
         texture->texels = test_blob(texels, sizeof(texels));
     }
     test_commit(&fixture.edits);
@@ -293,9 +293,9 @@ TEST(the_last_column_of_an_odd_width_counts_in_the_next_level)
     fixture_init(&fixture, test_scene_create());
     struct scene_texture *texture = &test_add(&fixture.edits, OBJECT_TEXTURE)->set.texture;
     *texture = (struct scene_texture){.base.id = 1,
-                                      .width = 5,
-                                      .height = 1,
-                                      .format = TEXTURE_RGBA8_LINEAR,
+                                      .value.width = 5,
+                                      .value.height = 1,
+                                      .value.format = TEXTURE_RGBA8_LINEAR,
                                       .texels = test_blob(texels, sizeof(texels))};
     test_commit(&fixture.edits);
     update(&fixture);
@@ -314,10 +314,14 @@ TEST(lights_go_along_minus_z_of_their_nodes)
     float m[12];
     fixture_init(&fixture, test_scene_create());
     struct scene_light *spot = &test_add(&fixture.edits, OBJECT_LIGHT)->set.light;
-    *spot = (struct scene_light){
-        .base.id = 1, .kind = LIGHT_SPOT, .colour = {1, 2, 3}, .range = 9, .inner_cone = 0.3f, .outer_cone = 0.6f};
+    *spot = (struct scene_light){.base.id = 1,
+                                 .value.kind = LIGHT_SPOT,
+                                 .value.colour = {1, 2, 3},
+                                 .value.range = 9,
+                                 .value.inner_cone = 0.3f,
+                                 .value.outer_cone = 0.6f};
     struct scene_light *rectangle = &test_add(&fixture.edits, OBJECT_LIGHT)->set.light;
-    *rectangle = (struct scene_light){.base.id = 2, .kind = LIGHT_RECTANGLE, .size = {2, 4}};
+    *rectangle = (struct scene_light){.base.id = 2, .value.kind = LIGHT_RECTANGLE, .value.size = {2, 4}};
     test_transform(m, 2, 2, 2, 1, 1.5707963f, 5, 6, 7); /* z to x */
     test_node(&fixture.edits, 1, 0, NODE_LIGHT, 1, m);
     test_node(&fixture.edits, 2, 0, NODE_LIGHT, 2, m);
@@ -345,12 +349,12 @@ TEST(a_light_is_in_the_group_of_the_nearest_node_that_has_one)
     const float groups[3] = {5, 2, 0};
     fixture_init(&fixture, test_scene_create());
     test_add(&fixture.edits, OBJECT_LIGHT)->set.light =
-        (struct scene_light){.base.id = 1, .kind = LIGHT_SPHERE, .size = {1}};
-    test_node(&fixture.edits, 1, 4, NODE_LIGHT, 1, NULL)->light_group = 5;
+        (struct scene_light){.base.id = 1, .value.kind = LIGHT_SPHERE, .value.size = {1}};
+    test_node(&fixture.edits, 1, 4, NODE_LIGHT, 1, NULL)->value.light_group = 5;
     test_node(&fixture.edits, 2, 4, NODE_LIGHT, 1, NULL);
     test_node(&fixture.edits, 3, 0, NODE_LIGHT, 1, NULL);
     test_node(&fixture.edits, 4, 5, NODE_GROUP, 0, NULL);
-    test_node(&fixture.edits, 5, 0, NODE_GROUP, 0, NULL)->light_group = 2;
+    test_node(&fixture.edits, 5, 0, NODE_GROUP, 0, NULL)->value.light_group = 2;
     test_commit(&fixture.edits);
     update(&fixture);
     gpu_buffer_read(device, &fixture.gpu.lights, 0, back, sizeof(back));
@@ -366,7 +370,7 @@ TEST(the_radius_of_a_sphere_light_is_scaled_by_the_mean_of_its_node)
     float m[12];
     fixture_init(&fixture, test_scene_create());
     test_add(&fixture.edits, OBJECT_LIGHT)->set.light =
-        (struct scene_light){.base.id = 1, .kind = LIGHT_SPHERE, .size = {0.5f}};
+        (struct scene_light){.base.id = 1, .value.kind = LIGHT_SPHERE, .value.size = {0.5f}};
     test_transform(m, 1, 2, 4, 1, 0.7f, 5, 6, 7);
     test_node(&fixture.edits, 1, 0, NODE_LIGHT, 1, m);
     test_commit(&fixture.edits);
@@ -383,8 +387,10 @@ static void bring_environment_image(struct fixture *fixture, uint16_t half)
     uint16_t half_floats[2 * 1 * 4] = {half};
     struct scene_edit *edit = test_add(&fixture->edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
-    edit->set.environment = (struct scene_environment){
-        .colour = {1, 1, 1}, .width = 2, .height = 1, .texels = test_blob(half_floats, sizeof(half_floats))};
+    edit->set.environment = (struct scene_environment){.value.colour = {1, 1, 1},
+                                                       .value.width = 2,
+                                                       .value.height = 1,
+                                                       .texels = test_blob(half_floats, sizeof(half_floats))};
     test_commit(&fixture->edits);
     update(fixture);
     assert_true(fixture->gpu.has_environment_image && (fixture->changes.bits & CHANGED_LIGHTS));
@@ -411,7 +417,7 @@ TEST(an_environment_image_stays_until_it_is_removed)
     bring_environment_image(&fixture, 0x3c00);
     struct scene_edit *edit = test_add(&fixture.edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
-    edit->set.environment = (struct scene_environment){.colour = {0.5f, 0.5f, 0.5f}, .rotation = 1};
+    edit->set.environment = (struct scene_environment){.value.colour = {0.5f, 0.5f, 0.5f}, .value.rotation = 1};
     test_commit(&fixture.edits);
     update(&fixture);
     assert_false(fixture.gpu.has_environment_image);

@@ -151,6 +151,8 @@ static inline void case_struct(struct case_maker *maker, const struct struct_des
     for (const struct field_desc *field = desc->fields; field->name; field++) {
         if (field_is_counted(field)) {
             case_counted(maker, field, body);
+        } else if (field->kind == FIELD_RECORD) {
+            case_struct(maker, field->record(), body + field->offset);
         } else {
             case_fixed(maker, field, body + field->offset);
         }
@@ -195,6 +197,11 @@ static inline void plain_struct(struct plain_bytes *out, const struct struct_des
     for (const struct field_desc *field = desc->fields; field->name; field++) {
         const char *pointer = NULL;
         uint32_t count = 0;
+        if (field->kind == FIELD_RECORD) {
+            plain_put(out, field->record()->wire_fixed_bytes, 2);
+            plain_struct(out, field->record(), body + field->offset);
+            continue;
+        }
         if (!field_is_counted(field)) {
             /* this test runs on little-endian hosts, where memory and wire are alike */
             plain_copy(out, body + field->offset, (size_t)field->width_bytes * field->count);
@@ -234,6 +241,12 @@ static inline const char *case_difference(const struct struct_desc *desc, const 
     for (const struct field_desc *field = desc->fields; field->name; field++) {
         const char *a = NULL, *b = NULL;
         uint32_t a_count = 0, b_count = 0;
+        if (field->kind == FIELD_RECORD) {
+            const char *inner = case_difference(field->record(), left + field->offset, right + field->offset);
+            if (inner)
+                return inner;
+            continue;
+        }
         if (!field_is_counted(field)) {
             if (memcmp(left + field->offset, right + field->offset, (size_t)field->width_bytes * field->count) !=
                 0) {

@@ -214,7 +214,7 @@ TEST(a_shorter_fixed_part_gets_defaults_and_a_longer_one_is_read_past)
                 fail_msg("%s.%s is not what it should be after %zu fixed bytes", desc->info.name, difference,
                          fixed_bytes);
             }
-            for (size_t part = 1; part < size; part++) { /* cut within the field */
+            for (size_t part = 1; part < size && field->kind != FIELD_RECORD; part++) { /* cut within the field */
                 char path[128];
                 snprintf(path, sizeof(path), "%s.%s", desc->info.name, field->name);
                 encode_fixed_part(&message, fixed_bytes + part, 0);
@@ -222,8 +222,9 @@ TEST(a_shorter_fixed_part_gets_defaults_and_a_longer_one_is_read_past)
                 assert_string_equal(error.field, path);
                 assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
             }
+            size_t memory_bytes = field->kind == FIELD_RECORD ? field->record()->size_bytes : size;
             memcpy((char *)&expected + MESSAGE_BODY_OFFSET + field->offset,
-                   (char *)&message + MESSAGE_BODY_OFFSET + field->offset, size);
+                   (char *)&message + MESSAGE_BODY_OFFSET + field->offset, memory_bytes);
             fixed_bytes += size;
         }
         for (size_t extra = 0; extra <= 11; extra++) {

@@ -186,6 +186,9 @@ static void try_wrong_fields(const struct message *message, const struct struct_
             break;
         case FIELD_BYTES:
             break;
+        case FIELD_RECORD:
+            try_wrong_fields(message, field->record(), body + field->offset, path);
+            break;
         case FIELD_STRING:
             try_wrong_string(message, field, body, path);
             break;

@@ -17,7 +17,7 @@ static int begin_animated(void **state)
     begin_scene(state);
     add_node(&list, 1, 0);
     add_node(&list, 2, 1);
-    add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
+    add_shown(&list, 3, NODE_MESH, 1)->value.skin = 1;
     add_targets(add_joints(add_mesh(&list, 1), two_joints, halves), lifts, 2);
     add_skin(&list, 1, (uint32_t[]){1, 2}, 2);
     add_set(&list, OBJECT_LIGHT, 1);
@@ -38,17 +38,17 @@ EACH_TEST(begin_animated, end_scene)
 TEST_WITH(joints_and_targets_come_with_all_they_need, begin_scene, end_scene)
 {
     struct scene_mesh *mesh = add_mesh(&list, 7);
-    mesh->influence_count = 2;
+    mesh->value.influence_count = 2;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[7] (joints)");
     mesh = add_joints(add_mesh(&list, 7), two_joints, halves);
     blob_unref(mesh->arrays[MESH_WEIGHTS]);
     mesh->arrays[MESH_WEIGHTS] = NULL;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[8] (joint weights)");
     mesh = add_joints(add_mesh(&list, 7), two_joints, halves);
-    mesh->influence_count = 0;
+    mesh->value.influence_count = 0;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[7] (joints)");
     mesh = add_mesh(&list, 7);
-    mesh->target_count = 1;
+    mesh->value.target_count = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[9] (target positions)");
     for (int array = MESH_TARGET_POSITIONS; array <= MESH_TARGET_TANGENTS; array++) {
         const char *names[] = {"target positions", "target normals", "target tangents"};
@@ -72,11 +72,11 @@ TEST_WITH(joints_and_targets_come_with_all_they_need, begin_scene, end_scene)
 
 TEST_WITH(joints_fit_their_counts_and_weights_are_not_negative, begin_scene, end_scene)
 {
-    add_joints(add_mesh(&list, 7), two_joints, halves)->influence_count = 1;
+    add_joints(add_mesh(&list, 7), two_joints, halves)->value.influence_count = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[7] (joints)");
-    add_joints(add_mesh(&list, 7), two_joints, halves)->influence_count = UINT32_MAX;
+    add_joints(add_mesh(&list, 7), two_joints, halves)->value.influence_count = UINT32_MAX;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).influence_count");
-    add_targets(add_mesh(&list, 7), lifts, 2)->target_count = UINT32_MAX;
+    add_targets(add_mesh(&list, 7), lifts, 2)->value.target_count = UINT32_MAX;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).target_count");
     const float bad[] = {-1e-30f, NAN, INFINITY, 2e18f};
     for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
@@ -92,7 +92,7 @@ TEST_WITH(joints_fit_their_counts_and_weights_are_not_negative, begin_scene, end
     node->weights = make_weights((float[]){NAN}, 1);
     node->weight_count = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 7).weights[0]");
-    add_node(&list, 7, 0)->skin = 1;
+    add_node(&list, 7, 0)->value.skin = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 7).skin"); /* shows no mesh */
 }
 
@@ -100,13 +100,13 @@ TEST(skins_clips_and_channels_make_sense_alone)
 {
     const uint32_t joints[] = {1, 2};
     float matrices[24] = {0};
-    add_skin(&list, 5, joints, 2)->joint_count = 0;
+    add_skin(&list, 5, joints, 2)->value.joint_count = 0;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).joint_count");
-    add_skin(&list, 5, joints, 2)->joint_count = SKIN_JOINTS_MAX + 1;
+    add_skin(&list, 5, joints, 2)->value.joint_count = SKIN_JOINTS_MAX + 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).joint_count");
-    add_skin(&list, 5, joints, 2)->joint_count = 3;
+    add_skin(&list, 5, joints, 2)->value.joint_count = 3;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).arrays[0] (joints)");
-    add_set(&list, OBJECT_SKIN, 5)->set.skin.joint_count = 2;
+    add_set(&list, OBJECT_SKIN, 5)->set.skin.value.joint_count = 2;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).arrays[0] (joints)");
     add_skin(&list, 5, joints, 2)->joint_from_mesh = make_blob(matrices, 48);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).arrays[1] (joint_from_mesh)");
@@ -123,7 +123,7 @@ TEST(skins_clips_and_channels_make_sense_alone)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).path");
     add_channel(&list, 5, 1, (enum channel_path)1000, 1, 3, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).path");
-    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->interpolation = (enum interpolation)5;
+    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.interpolation = (enum interpolation)5;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).interpolation");
     add_channel(&list, 5, 1, CHANNEL_NODE_ROTATION, 1, 3, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).width");
@@ -143,7 +143,7 @@ TEST(skins_and_channels_refer_to_existing_objects)
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (skin 5).arrays[0] (joints)[1]");
     add_skin(&list, 5, (uint32_t[]){0, 2}, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (skin 5).arrays[0] (joints)[0]");
-    add_shown(&list, 4, NODE_MESH, 1)->skin = 9;
+    add_shown(&list, 4, NODE_MESH, 1)->value.skin = 9;
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (node 4).skin");
     add_channel(&list, 5, 9, CHANNEL_NODE_SCALE, 1, 3, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (channel 5).clip");
@@ -170,23 +170,23 @@ TEST(skins_and_channels_refer_to_existing_objects)
 
 TEST(channels_have_their_numbers_in_their_clips)
 {
-    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->first_time = 7;
+    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.first_time = 7;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_time");
-    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->first_time = UINT32_MAX;
+    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.first_time = UINT32_MAX;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_time");
-    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->key_count = UINT32_MAX;
+    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.key_count = UINT32_MAX;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_time");
-    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->first_value = 3;
+    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.first_value = 3;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_value");
-    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->first_value = UINT32_MAX;
+    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.first_value = UINT32_MAX;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_value");
     const enum interpolation three_values[] = {INTERPOLATION_CUBIC_SPLINE, INTERPOLATION_BEZIER};
     for (int i = 0; i < 2; i++) {
-        add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->interpolation = three_values[i];
+        add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.interpolation = three_values[i];
         expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_value");
     }
     /* 1, 1: the third and fourth number of the clip. */
-    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->first_time = 1;
+    add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 1, 3, 2)->value.first_time = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (channel 5).first_time");
     /* A clip that is set again must do for the channels that it has. */
     add_clip(&list, 1, keys, 7);
@@ -211,17 +211,17 @@ TEST(many_channels_with_equal_times_stay_distinct)
         times[i] = (float)(i < LEAP ? i : i - LEAP);
     add_clip(&list, 2, times, COUNT);
     for (uint32_t i = 0; i < CHANNELS; i++)
-        add_channel(&list, 10 + i, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP)->first_value = 0;
-    add_channel(&list, 50, 2, CHANNEL_NODE_HIDDEN, 1, 1, 3)->first_time = LEAP;
+        add_channel(&list, 10 + i, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP)->value.first_value = 0;
+    add_channel(&list, 50, 2, CHANNEL_NODE_HIDDEN, 1, 1, 3)->value.first_time = LEAP;
     expect_commit(scene, &list);
     times[LEAP] = LEAP;
     add_clip(&list, 2, times, COUNT);
-    add_channel(&list, 51, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP + 1)->first_value = 0;
-    add_channel(&list, 50, 2, CHANNEL_NODE_HIDDEN, 1, 1, 2)->first_time = LEAP + 1;
+    add_channel(&list, 51, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP + 1)->value.first_value = 0;
+    add_channel(&list, 50, 2, CHANNEL_NODE_HIDDEN, 1, 1, 2)->value.first_time = LEAP + 1;
     expect_commit(scene, &list);
     for (uint32_t i = 0; i < CHANNELS; i++)
-        add_channel(&list, 10 + i, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP + 1)->first_value = 0;
-    add_channel(&list, 52, 2, CHANNEL_NODE_HIDDEN, 1, 1, 3)->first_time = LEAP - 1;
+        add_channel(&list, 10 + i, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP + 1)->value.first_value = 0;
+    add_channel(&list, 52, 2, CHANNEL_NODE_HIDDEN, 1, 1, 3)->value.first_time = LEAP - 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[20] (channel 52).first_time");
     free(times);
 }
@@ -234,7 +234,7 @@ TEST(joints_of_a_mesh_have_their_places_in_its_skin)
     add_joints(add_mesh(&list, 1), beyond, halves);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[7] (joints)");
     add_joints(add_mesh(&list, 2), beyond, halves);
-    add_shown(&list, 4, NODE_MESH, 2)->skin = 1;
+    add_shown(&list, 4, NODE_MESH, 2)->value.skin = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[1] (node 4).skin");
     /* All three at once. */
     add_joints(add_mesh(&list, 1), beyond, halves);
@@ -242,7 +242,7 @@ TEST(joints_of_a_mesh_have_their_places_in_its_skin)
     expect_commit(scene, &list);
     /* A mesh without joints may have a skin, which does nothing; and one with joints need not have one. */
     add_mesh(&list, 3);
-    add_shown(&list, 4, NODE_MESH, 3)->skin = 1;
+    add_shown(&list, 4, NODE_MESH, 3)->value.skin = 1;
     add_shown(&list, 5, NODE_MESH, 1);
     expect_commit(scene, &list);
 }
@@ -265,7 +265,7 @@ TEST(what_changes_something_removed_goes_along)
     add_remove(&list, OBJECT_NODE, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 2)");
     add_remove(&list, OBJECT_NODE, 1);
-    add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
+    add_shown(&list, 3, NODE_MESH, 1)->value.skin = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1)");
     add_remove(&list, OBJECT_NODE, 1);
     add_shown(&list, 3, NODE_MESH, 1);
@@ -289,7 +289,7 @@ TEST(a_skin_in_use_is_not_removed)
     add_remove(&list, OBJECT_SKIN, 1);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 1)");
     add_remove(&list, OBJECT_SKIN, 1);
-    add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
+    add_shown(&list, 3, NODE_MESH, 1)->value.skin = 1;
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (node 3).skin");
     add_remove(&list, OBJECT_SKIN, 1);
     add_remove(&list, OBJECT_NODE, 3);
@@ -334,12 +334,12 @@ TEST_WITH(memory_of_what_moves_is_counted, begin_scene, end_scene)
 TEST(revisions_tell_what_moved)
 {
     /* A joint is a node like any other, with nothing below it. */
-    add_node(&list, 2, 1)->parent_from_node[3] = 5;
+    add_node(&list, 2, 1)->value.parent_from_node[3] = 5;
     expect_commit(scene, &list);
     assert_int_equal(scene->instances_revision, scene->revision);
     assert_true(scene->geometry_revision < scene->revision);
     struct scene_node *node = add_shown(&list, 3, NODE_MESH, 1);
-    node->skin = 1;
+    node->value.skin = 1;
     node->weights = make_weights((float[]){1}, 1);
     node->weight_count = 1;
     expect_commit(scene, &list);

@@ -21,16 +21,16 @@ static const float up_normals[12] = {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1};
 TEST(a_vertex_is_the_mean_of_where_its_joints_put_it)
 {
     /* Joint 1 moves by 10 along x; joint 2 below it turns a quarter about z. */
-    add_node(&list, 1, 0)->parent_from_node[3] = 10;
+    add_node(&list, 1, 0)->value.parent_from_node[3] = 10;
     const float quarter[12] = {0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
-    memcpy(add_node(&list, 2, 1)->parent_from_node, quarter, sizeof(quarter));
+    memcpy(add_node(&list, 2, 1)->value.parent_from_node, quarter, sizeof(quarter));
     /* Weights of vertex 0: none; 1: the first alone; 2: a quarter and three, of a sum of 8; 3: the second alone.
      */
     const float weights[8] = {0, 0, 5, 0, 2, 6, 0, 0.125f};
     add_joints(add_mesh(&list, 1), both, weights);
     struct scene_node *node = add_shown(&list, 3, NODE_MESH, 1);
-    node->skin = 1;
-    node->parent_from_node[3] = 1e6f; /* not looked at */
+    node->value.skin = 1;
+    node->value.parent_from_node[3] = 1e6f; /* not looked at */
     struct scene_skin *skin = add_skin(&list, 1, (uint32_t[]){1, 2}, 2);
     /* The second joint's own place in the mesh is at 1 0 0. */
     const float inverse_binds[24] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -61,10 +61,10 @@ TEST(joints_below_joints_follow_a_clip)
 {
     /* Joints at the origin and, 1 along x below it; each turns by a right angle about z in a second. */
     add_node(&list, 1, 0);
-    add_node(&list, 2, 1)->parent_from_node[3] = 1;
+    add_node(&list, 2, 1)->value.parent_from_node[3] = 1;
     const float weights[8] = {1, 0, 1, 0, 0, 1, 0, 1};
     add_joints(add_mesh(&list, 1), both, weights);
-    add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
+    add_shown(&list, 3, NODE_MESH, 1)->value.skin = 1;
     struct scene_skin *skin = add_skin(&list, 1, (uint32_t[]){1, 2}, 2);
     const float inverse_binds[24] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0};
     skin->joint_from_mesh = make_blob(inverse_binds, sizeof(inverse_binds));
@@ -100,7 +100,7 @@ TEST(joints_below_joints_follow_a_clip)
 TEST(targets_are_added_before_joints_move)
 {
     const float doubled[12] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
-    memcpy(add_node(&list, 1, 0)->parent_from_node, doubled, sizeof(doubled));
+    memcpy(add_node(&list, 1, 0)->value.parent_from_node, doubled, sizeof(doubled));
     const float weights[8] = {1, 0, 1, 0, 1, 0, 1, 0};
     const float targets[24] = {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     add_targets(add_joints(add_mesh(&list, 1), both, weights), targets, 2);
@@ -109,8 +109,8 @@ TEST(targets_are_added_before_joints_move)
         struct scene_node *node = add_shown(&list, id, NODE_MESH, 1);
         node->weights = make_weights((float[]){0.5f, -1}, 2);
         node->weight_count = 2;
-        node->skin = id == 3;
-        node->parent_from_node[3] = 100;
+        node->value.skin = id == 3;
+        node->value.parent_from_node[3] = 100;
     }
     expect_commit(scene, &list);
     const double morphed[12] = {-3, 0, 0.5, 1, 0, 0.5, 1, 1, 0.5, 0, 1, 0.5};
@@ -147,12 +147,12 @@ TEST(normals_follow_scaled_sheared_and_mirrored_joints)
         {1, 0, 0, 0, 0, 1, 0, 0, 0.5f, -0.25f, -1, 0},
     };
     for (size_t i = 0; i < sizeof(matrices) / sizeof(matrices[0]); i++) {
-        memcpy(add_node(&list, 1, 0)->parent_from_node, matrices[i], sizeof(matrices[i]));
+        memcpy(add_node(&list, 1, 0)->value.parent_from_node, matrices[i], sizeof(matrices[i]));
         const float weights[8] = {1, 0, 1, 0, 1, 0, 1, 0};
         struct scene_mesh *mesh = add_joints(add_mesh(&list, 1), both, weights);
         mesh->arrays[MESH_NORMALS] = make_blob(up_normals, sizeof(up_normals));
         add_skin(&list, 1, (uint32_t[]){1, 1}, 2);
-        add_shown(&list, 2, NODE_MESH, 1)->skin = 1;
+        add_shown(&list, 2, NODE_MESH, 1)->value.skin = 1;
         expect_commit(scene, &list);
         float p[12], n[12];
         deform(NULL, 2, p, n);
@@ -191,13 +191,14 @@ TEST(vertices_that_leave_the_floats_are_no_part_of_the_bounds)
     /* Four scales by 1e12, one below the other. */
     for (uint32_t id = 1; id <= 4; id++) {
         struct scene_node *node = add_node(&list, id, id - 1);
-        node->parent_from_node[0] = node->parent_from_node[5] = node->parent_from_node[10] = 1e12f;
+        node->value.parent_from_node[0] = node->value.parent_from_node[5] = node->value.parent_from_node[10] =
+            1e12f;
     }
     add_node(&list, 5, 0);
     const float weights[8] = {1, 0, 1, 0, 1, 0, 0, 1};
     add_joints(add_mesh(&list, 1), both, weights);
     add_skin(&list, 1, (uint32_t[]){5, 4}, 2);
-    add_shown(&list, 6, NODE_MESH, 1)->skin = 1;
+    add_shown(&list, 6, NODE_MESH, 1)->value.skin = 1;
     expect_commit(scene, &list);
     float lower[3], upper[3];
     assert_true(scene_bounds(scene, NULL, lower, upper));

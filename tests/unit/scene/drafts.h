@@ -39,8 +39,8 @@ static inline void add_remove(struct draft_list *list, enum object_kind kind, ui
 static inline struct scene_node *add_node(struct draft_list *list, uint32_t id, uint32_t parent)
 {
     struct scene_node *node = &add_set(list, OBJECT_NODE, id)->set.node;
-    node->parent = parent;
-    node->parent_from_node[0] = node->parent_from_node[5] = node->parent_from_node[10] = 1.0f;
+    node->value.parent = parent;
+    node->value.parent_from_node[0] = node->value.parent_from_node[5] = node->value.parent_from_node[10] = 1.0f;
     return node;
 }
 
@@ -48,8 +48,8 @@ static inline struct scene_node *add_shown(struct draft_list *list, uint32_t id,
                                            uint32_t object)
 {
     struct scene_node *node = add_node(list, id, 0);
-    node->kind = kind;
-    node->object = object;
+    node->value.kind = kind;
+    node->value.object = object;
     return node;
 }
 
@@ -68,8 +68,8 @@ static const uint32_t square_indices[6] = {0, 1, 2, 0, 2, 3};
 static inline struct scene_mesh *add_mesh(struct draft_list *list, uint32_t id)
 {
     struct scene_mesh *mesh = &add_set(list, OBJECT_MESH, id)->set.mesh;
-    mesh->vertex_count = 4;
-    mesh->triangle_count = 2;
+    mesh->value.vertex_count = 4;
+    mesh->value.triangle_count = 2;
     mesh->arrays[MESH_POSITIONS] = make_blob(square, sizeof(square));
     mesh->arrays[MESH_INDICES] = make_blob(square_indices, sizeof(square_indices));
     return mesh;
@@ -79,14 +79,14 @@ static inline void add_range(struct scene_mesh *mesh, uint32_t first, uint32_t c
 {
     mesh->ranges = realloc(mesh->ranges, (mesh->range_count + 1) * sizeof(*mesh->ranges));
     assert_non_null(mesh->ranges);
-    mesh->ranges[mesh->range_count++] = (struct material_range){first, count, material};
+    mesh->ranges[mesh->range_count++] = (struct record_material_range){first, count, material};
 }
 
 static inline struct scene_spheres *add_spheres(struct draft_list *list, uint32_t id, const float *numbers,
                                                 uint32_t count)
 {
     struct scene_spheres *spheres = &add_set(list, OBJECT_SPHERES, id)->set.spheres;
-    spheres->sphere_count = count;
+    spheres->value.sphere_count = count;
     spheres->centres_radii = make_blob(numbers, count * 16);
     return spheres;
 }
@@ -155,7 +155,7 @@ static inline struct scene_skin *add_skin(struct draft_list *list, uint32_t id, 
                                           uint32_t count)
 {
     struct scene_skin *skin = &add_set(list, OBJECT_SKIN, id)->set.skin;
-    skin->joint_count = count;
+    skin->value.joint_count = count;
     skin->joints = make_blob(joints, count * sizeof(*joints));
     return skin;
 }
@@ -173,13 +173,13 @@ static inline struct scene_channel *add_channel(struct draft_list *list, uint32_
                                                 uint32_t key_count)
 {
     struct scene_channel *channel = &add_set(list, OBJECT_CHANNEL, id)->set.channel;
-    channel->clip = clip;
-    channel->path = path;
-    channel->object = object;
-    channel->interpolation = INTERPOLATION_LINEAR;
-    channel->width = width;
-    channel->key_count = key_count;
-    channel->first_value = key_count;
+    channel->value.clip = clip;
+    channel->value.path = path;
+    channel->value.object = object;
+    channel->value.interpolation = INTERPOLATION_LINEAR;
+    channel->value.width = width;
+    channel->value.key_count = key_count;
+    channel->value.first_value = key_count;
     return channel;
 }
 
@@ -187,7 +187,7 @@ static inline struct scene_channel *add_channel(struct draft_list *list, uint32_
 static inline struct scene_mesh *add_joints(struct scene_mesh *mesh, const uint16_t joints[8],
                                             const float weights[8])
 {
-    mesh->influence_count = 2;
+    mesh->value.influence_count = 2;
     mesh->arrays[MESH_JOINTS] = make_blob(joints, 8 * sizeof(*joints));
     mesh->arrays[MESH_WEIGHTS] = make_blob(weights, 8 * sizeof(*weights));
     return mesh;
@@ -196,7 +196,7 @@ static inline struct scene_mesh *add_joints(struct scene_mesh *mesh, const uint1
 /* Morph targets of the same square. */
 static inline struct scene_mesh *add_targets(struct scene_mesh *mesh, const float *positions, uint32_t count)
 {
-    mesh->target_count = count;
+    mesh->value.target_count = count;
     mesh->arrays[MESH_TARGET_POSITIONS] = make_blob(positions, count * sizeof(square));
     return mesh;
 }

@@ -38,7 +38,7 @@ static struct scene *scene_with_camera(void)
     assert_non_null(scene);
     struct scene_edit edit = {.kind = EDIT_SET, .object = OBJECT_CAMERA};
     edit.set.camera.base.id = 1;
-    edit.set.camera.fov_y = 1;
+    edit.set.camera.value.fov_y = 1;
     commit(scene, &edit, 1);
     return scene;
 }
@@ -47,10 +47,10 @@ static struct scene_edit node_edit(uint32_t id, uint32_t parent, enum node_kind 
 {
     struct scene_edit edit = {.kind = EDIT_SET, .object = OBJECT_NODE};
     edit.set.node.base.id = id;
-    edit.set.node.parent = parent;
-    edit.set.node.kind = kind;
-    edit.set.node.object = kind == NODE_GROUP ? 0 : 1;
-    memcpy(edit.set.node.parent_from_node, m, 12 * sizeof(*m));
+    edit.set.node.value.parent = parent;
+    edit.set.node.value.kind = kind;
+    edit.set.node.value.object = kind == NODE_GROUP ? 0 : 1;
+    memcpy(edit.set.node.value.parent_from_node, m, 12 * sizeof(*m));
     return edit;
 }
 
@@ -59,14 +59,14 @@ static bool plain_world(const struct scene *scene, uint32_t id, double world[12]
 {
     const struct scene_node *node = scene_node(scene, id);
     double above[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    bool visible = !node->hidden;
-    if (node->parent)
-        visible = plain_world(scene, node->parent, above) && visible;
+    bool visible = !node->value.hidden;
+    if (node->value.parent)
+        visible = plain_world(scene, node->value.parent, above) && visible;
     for (int row = 0; row < 3; row++) {
         for (int column = 0; column < 4; column++) {
             double sum = column == 3 ? above[4 * row + 3] : 0;
             for (int i = 0; i < 3; i++)
-                sum += above[4 * row + i] * (double)node->parent_from_node[4 * i + column];
+                sum += above[4 * row + i] * (double)node->value.parent_from_node[4 * i + column];
             world[4 * row + column] = sum;
         }
     }
@@ -98,7 +98,7 @@ TEST(instances_agree_with_the_plain_recursion_in_the_order_of_ids)
         for (int k = 0; k < 12; k++)
             m[k] = random_float();
         edits[i] = node_edit(ids[i], parent, random_number() % 3 ? NODE_CAMERA : NODE_GROUP, m);
-        edits[i].set.node.hidden = random_number() % 10 == 0;
+        edits[i].set.node.value.hidden = random_number() % 10 == 0;
     }
     commit(scene, edits, NODES);
     free(edits);
@@ -108,7 +108,7 @@ TEST(instances_agree_with_the_plain_recursion_in_the_order_of_ids)
     for (uint32_t i = 0; i < NODES; i++) {
         double world[12];
         bool visible = plain_world(scene, ids[i], world);
-        expected_count += visible && scene_node(scene, ids[i])->kind == NODE_CAMERA;
+        expected_count += visible && scene_node(scene, ids[i])->value.kind == NODE_CAMERA;
         float got[12];
         assert_true(scene_world_from_node(scene, NULL, ids[i], got));
         expect_matrix(got, world, ids[i]);
@@ -152,7 +152,7 @@ TEST(a_hidden_node_hides_everything_below)
         node_edit(3, 2, NODE_CAMERA, identity),
         node_edit(4, 0, NODE_CAMERA, identity),
     };
-    edits[0].set.node.hidden = true;
+    edits[0].set.node.value.hidden = true;
     commit(scene, edits, 4);
     struct scene_instance *instances;
     size_t count;
@@ -205,8 +205,8 @@ TEST(the_bounds_are_those_of_visible_geometry_and_discs_stand_in)
     assert_false(scene_bounds(scene, NULL, lower, upper));
     struct scene_edit disc = {.kind = EDIT_SET, .object = OBJECT_DISC};
     disc.set.disc.base.id = 1;
-    disc.set.disc.normal_world[1] = 1;
-    disc.set.disc.radius = 9;
+    disc.set.disc.value.normal_world[1] = 1;
+    disc.set.disc.value.radius = 9;
     commit(scene, &disc, 1);
     assert_true(scene_bounds(scene, NULL, lower, upper));
     assert_memory_equal(lower, ((float[]){-9, 0, -9}), 12);
@@ -219,10 +219,10 @@ TEST(the_bounds_are_those_of_visible_geometry_and_discs_stand_in)
         node_edit(2, 0, NODE_SPHERES, far_away),
     };
     edits[0].set.spheres.base.id = 1;
-    edits[0].set.spheres.sphere_count = 1;
+    edits[0].set.spheres.value.sphere_count = 1;
     edits[0].set.spheres.centres_radii = blob_create(16);
     memcpy(edits[0].set.spheres.centres_radii->data, ((float[]){3, 0, 0, 1}), 16);
-    edits[2].set.node.hidden = true;
+    edits[2].set.node.value.hidden = true;
     commit(scene, edits, 3);
     assert_true(scene_bounds(scene, NULL, lower, upper));
     assert_memory_equal(lower, ((float[]){8, 4, -2}), 12);

@@ -41,7 +41,7 @@ TEST(a_part_that_no_channel_gives_is_that_of_the_node)
     /* Turned by 90 degrees about x, scaled by 2, 3, -4: a mirror; and moved. */
     const float mirrored[12] = {2, 0, 0, 10, 0, 0, 4, 20, 0, 3, 0, 30};
     for (uint32_t node = 1; node <= 3; node++)
-        memcpy(add_node(&list, node, 0)->parent_from_node, mirrored, sizeof(mirrored));
+        memcpy(add_node(&list, node, 0)->value.parent_from_node, mirrored, sizeof(mirrored));
     add_clip(&list, 1, (float[]){0, 1, 1, 2, 3, 5, 6, 7}, 8);
     add_channel(&list, 1, 1, CHANNEL_NODE_TRANSLATION, 1, 3, 2);
     add_channel(&list, 2, 1, CHANNEL_NODE_SCALE, 2, 3, 2);
@@ -58,14 +58,14 @@ TEST(a_part_that_no_channel_gives_is_that_of_the_node)
     expect_near("scaled", scene_pose_parent_from_node(&pose, scene_node(scene, 2)), scaled, 12, 1e-6);
     /* Node 3 is in no clip. */
     assert_ptr_equal(scene_pose_parent_from_node(&pose, scene_node(scene, 3)),
-                     scene_node(scene, 3)->parent_from_node);
+                     scene_node(scene, 3)->value.parent_from_node);
     scene_pose_finish(&pose);
 }
 
 TEST(a_turned_mirror_stays_a_mirror_and_keeps_its_size)
 {
     const float mirrored[12] = {0, 3, 0, 1, 2, 0, 0, 2, 0, 0, 4, 3}; /* determinant -24 */
-    memcpy(add_node(&list, 1, 0)->parent_from_node, mirrored, sizeof(mirrored));
+    memcpy(add_node(&list, 1, 0)->value.parent_from_node, mirrored, sizeof(mirrored));
     add_clip(&list, 1, quarter_turns, 15);
     add_channel(&list, 1, 1, CHANNEL_NODE_ROTATION, 1, 4, 3);
     expect_commit(scene, &list);
@@ -81,8 +81,8 @@ TEST(a_turned_mirror_stays_a_mirror_and_keeps_its_size)
 TEST(a_flat_node_can_be_scaled_up_again)
 {
     const float flat[12] = {0, 0, 0, 0, 0, 0, 5, 0, 0, -5, 0, 0}, point[12] = {0};
-    memcpy(add_node(&list, 1, 0)->parent_from_node, flat, sizeof(flat));
-    memcpy(add_node(&list, 2, 0)->parent_from_node, point, sizeof(point));
+    memcpy(add_node(&list, 1, 0)->value.parent_from_node, flat, sizeof(flat));
+    memcpy(add_node(&list, 2, 0)->value.parent_from_node, point, sizeof(point));
     add_clip(&list, 1, (float[]){0, 1, 2, 3}, 4);
     add_channel(&list, 1, 1, CHANNEL_NODE_SCALE, 1, 3, 1);
     add_channel(&list, 2, 1, CHANNEL_NODE_SCALE, 2, 3, 1);
@@ -100,7 +100,7 @@ TEST(what_hangs_below_moves_along)
 {
     /* An arm of two bones of length 1 and 2 along x; both turn by a quarter a second. */
     add_node(&list, 1, 0);
-    add_node(&list, 2, 1)->parent_from_node[3] = 1;
+    add_node(&list, 2, 1)->value.parent_from_node[3] = 1;
     add_clip(&list, 1, quarter_turns, 15);
     add_channel(&list, 1, 1, CHANNEL_NODE_ROTATION, 1, 4, 3);
     add_channel(&list, 2, 1, CHANNEL_NODE_ROTATION, 2, 4, 3);
@@ -121,8 +121,8 @@ TEST(clips_begin_end_repeat_and_run_at_their_speed)
     add_clip(&list, 1, (float[]){1, 3, 10, 0, 0, 30, 0, 0, 4, 1, 1, 1}, 12);
     add_channel(&list, 1, 1, CHANNEL_NODE_TRANSLATION, 1, 3, 2);
     struct scene_channel *last = add_channel(&list, 2, 1, CHANNEL_NODE_SCALE, 1, 3, 1);
-    last->first_time = 8;
-    last->first_value = 9;
+    last->value.first_time = 8;
+    last->value.first_value = 9;
     expect_commit(scene, &list);
     assert_true(scene_clip_duration_s(scene, 1) == 4.0);
     assert_true(scene_clip_duration_s(scene, 9) == 0.0);
@@ -196,12 +196,12 @@ TEST(lights_materials_and_the_view_stay_within_what_the_protocol_allows)
     /* From far below to far above. */
     add_clip(&list, 1, (float[]){0, 2, -3e38f, -3e38f, -3e38f, -3e38f, 3e38f, 3e38f, 3e38f, 3e38f}, 10);
     struct scene_light *light = &add_set(&list, OBJECT_LIGHT, 1)->set.light;
-    light->kind = LIGHT_SPHERE;
-    light->size[0] = 1;
-    add_set(&list, OBJECT_MATERIAL, 1)->set.material.alpha_cutoff = 0.25f;
+    light->value.kind = LIGHT_SPHERE;
+    light->value.size[0] = 1;
+    add_set(&list, OBJECT_MATERIAL, 1)->set.material.value.alpha_cutoff = 0.25f;
     for (uint32_t i = 0; i < 15; i++) {
         enum channel_path path = i < 2 ? lights[i] : i < 8 ? materials[i - 2] : views[i - 8];
-        add_channel(&list, i + 1, 1, path, i < 8, widths[i], 2)->first_value = 6 - widths[i];
+        add_channel(&list, i + 1, 1, path, i < 8, widths[i], 2)->value.first_value = 6 - widths[i];
     }
     expect_commit(scene, &list);
     struct scene_pose low = pose_at(&plain_use, 1, 0), high = pose_at(&plain_use, 1, 2);
@@ -210,16 +210,19 @@ TEST(lights_materials_and_the_view_stay_within_what_the_protocol_allows)
     assert_int_equal(low.node_count, 0);
     const struct scene_light *dark = scene_pose_light(&low, scene_light(scene, 1)),
                              *bright = scene_pose_light(&high, scene_light(scene, 1));
-    assert_true(dark->kind == LIGHT_SPHERE && dark->colour[1] == 0.0f && bright->colour[1] == 1e12f);
-    assert_true(dark->size[0] > 0.0f && dark->size[0] <= 1e-6f && bright->size[0] == 1e12f);
+    assert_true(dark->value.kind == LIGHT_SPHERE && dark->value.colour[1] == 0.0f &&
+                bright->value.colour[1] == 1e12f);
+    assert_true(dark->value.size[0] > 0.0f && dark->value.size[0] <= 1e-6f && bright->value.size[0] == 1e12f);
     const struct scene_material *a = scene_pose_material(&low, scene_material(scene, 1)),
                                 *b = scene_pose_material(&high, scene_material(scene, 1));
-    assert_true(a->base_colour[3] == 0.0f && b->base_colour[3] == 1.0f);
-    assert_true(a->emission[0] == 0.0f && b->emission[0] == 1e6f);
-    assert_true(a->metallic == 0.0f && a->roughness == 0.0f && a->transmission == 0.0f && a->ior == 1.0f);
-    assert_true(b->metallic == 1.0f && b->roughness == 1.0f && b->transmission == 1.0f && b->ior == 10.0f);
-    assert_true(a->alpha_cutoff == 0.25f);
-    assert_true(scene_material(scene, 1)->emission[0] == 0.0f);
+    assert_true(a->value.base_colour[3] == 0.0f && b->value.base_colour[3] == 1.0f);
+    assert_true(a->value.emission[0] == 0.0f && b->value.emission[0] == 1e6f);
+    assert_true(a->value.metallic == 0.0f && a->value.roughness == 0.0f && a->value.transmission == 0.0f &&
+                a->value.ior == 1.0f);
+    assert_true(b->value.metallic == 1.0f && b->value.roughness == 1.0f && b->value.transmission == 1.0f &&
+                b->value.ior == 10.0f);
+    assert_true(a->value.alpha_cutoff == 0.25f);
+    assert_true(scene_material(scene, 1)->value.emission[0] == 0.0f);
     assert_int_equal(low.view.given, 127);
     assert_true(low.view.eye_world[2] == -1e12f && high.view.look_at_world[0] == 1e12f);
     assert_true(low.view.up_world[1] == -1e6f && high.view.up_world[1] == 1e6f);
@@ -237,8 +240,8 @@ TEST(lights_materials_and_the_view_stay_within_what_the_protocol_allows)
 TEST(a_node_is_hidden_from_a_half_on_and_all_below_with_it)
 {
     add_mesh(&list, 1);
-    add_node(&list, 1, 0)->hidden = true;
-    add_shown(&list, 2, NODE_MESH, 1)->parent = 1;
+    add_node(&list, 1, 0)->value.hidden = true;
+    add_shown(&list, 2, NODE_MESH, 1)->value.parent = 1;
     add_clip(&list, 1, (float[]){0, 1, 1, 0}, 4);
     add_channel(&list, 1, 1, CHANNEL_NODE_HIDDEN, 1, 1, 2);
     expect_commit(scene, &list);
@@ -250,7 +253,7 @@ TEST(a_node_is_hidden_from_a_half_on_and_all_below_with_it)
         assert_int_equal(count, i > 4);
         /* Where it is does not change by that, not even in the last bit. */
         assert_memory_equal(scene_pose_parent_from_node(&pose, scene_node(scene, 1)),
-                            scene_node(scene, 1)->parent_from_node, 48);
+                            scene_node(scene, 1)->value.parent_from_node, 48);
         free(instances);
         scene_pose_finish(&pose);
     }

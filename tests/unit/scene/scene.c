@@ -25,10 +25,10 @@ TEST(an_edit_may_refer_to_what_a_later_one_makes)
     add_range(add_mesh(&list, 7), 0, 2, 5);
     add_set(&list, OBJECT_MATERIAL, 5)->set.material.textures[MATERIAL_BASE_COLOUR].texture = 9;
     struct scene_texture *texture = &add_set(&list, OBJECT_TEXTURE, 9)->set.texture;
-    texture->width = texture->height = 1;
+    texture->value.width = texture->value.height = 1;
     texture->texels = make_blob("\1\2\3\4", 4);
     expect_commit(scene, &list);
-    assert_int_equal(scene_node(scene, 3)->parent, 2);
+    assert_int_equal(scene_node(scene, 3)->value.parent, 2);
     assert_int_equal(scene_node(scene, 2)->child_count, 1);
     assert_int_equal(scene_mesh(scene, 7)->ranges[0].material, 5);
     assert_int_equal(scene_mesh(scene, 7)->base.revision, 1);
@@ -74,8 +74,8 @@ TEST(references_to_nothing_are_refused_and_named)
     add_set(&list, OBJECT_MATERIAL, 6)->set.material.textures[MATERIAL_NORMAL].texture = 2;
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (material 6).textures[1].texture");
     struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 1)->set.disc;
-    disc->material = 5;
-    disc->normal_world[1] = disc->radius = 1;
+    disc->value.material = 5;
+    disc->value.normal_world[1] = disc->value.radius = 1;
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (disc 1).material");
     add_node(&list, 0, 0);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 0)");
@@ -87,12 +87,12 @@ TEST(what_is_in_use_is_not_removed)
     add_range(add_mesh(&list, 7), 0, 2, 5);
     add_set(&list, OBJECT_MATERIAL, 5)->set.material.textures[MATERIAL_BUMP].texture = 9;
     struct scene_texture *texture = &add_set(&list, OBJECT_TEXTURE, 9)->set.texture;
-    texture->width = texture->height = 1;
+    texture->value.width = texture->value.height = 1;
     texture->texels = make_blob("\1\2\3\4", 4);
     add_set(&list, OBJECT_MATERIAL, 6);
     struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 3)->set.disc;
-    disc->normal_world[1] = disc->radius = 1.0f;
-    disc->material = 6;
+    disc->value.normal_world[1] = disc->value.radius = 1.0f;
+    disc->value.material = 6;
     expect_commit(scene, &list);
     add_remove(&list, OBJECT_MESH, 7);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7)");
@@ -131,11 +131,11 @@ TEST(a_refused_transaction_leaves_its_blobs_with_the_edits)
 
 TEST(arrays_must_fit_their_counts)
 {
-    add_mesh(&list, 1)->vertex_count = 5;
+    add_mesh(&list, 1)->value.vertex_count = 5;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[0] (positions)");
-    add_mesh(&list, 1)->triangle_count = 1;
+    add_mesh(&list, 1)->value.triangle_count = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
-    add_mesh(&list, 1)->triangle_count = 0x55555556; /* 3 of it wrap to 2 in 32 bits */
+    add_mesh(&list, 1)->value.triangle_count = 0x55555556; /* 3 of it wrap to 2 in 32 bits */
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
     struct scene_mesh *mesh = add_mesh(&list, 1);
     blob_unref(mesh->arrays[MESH_INDICES]);
@@ -147,12 +147,12 @@ TEST(arrays_must_fit_their_counts)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[6] (colours)");
     add_mesh(&list, 1)->arrays[MESH_TANGENTS] = make_blob(square, 48);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[3] (tangents)");
-    add_mesh(&list, 1)->vertex_count = 0;
+    add_mesh(&list, 1)->value.vertex_count = 0;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).vertex_count");
-    add_spheres(&list, 2, square, 3)->sphere_count = 2;
+    add_spheres(&list, 2, square, 3)->value.sphere_count = 2;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (spheres 2).arrays[0] (centres and radii)");
     struct scene_texture *texture = &add_set(&list, OBJECT_TEXTURE, 9)->set.texture;
-    texture->width = texture->height = 65536; /* wraps to 0 in 32 bits */
+    texture->value.width = texture->value.height = 65536; /* wraps to 0 in 32 bits */
     texture->texels = make_blob(square, 4);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (texture 9).arrays[0] (texels)");
 }
@@ -184,8 +184,8 @@ TEST(numbers_that_are_no_place_are_refused)
     list.edits[0] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
     list.count = 1;
     environment = &list.edits[0].set.environment;
-    environment->width = 2;
-    environment->height = 1;
+    environment->value.width = 2;
+    environment->value.height = 1;
     environment->texels = make_blob((const uint16_t[]){0, 0, 0, 0, 0, 0x7c00, 0, 0}, 16);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (environment).arrays[0] (texels)");
 }
@@ -210,7 +210,7 @@ TEST(a_large_mesh_is_checked_to_its_end_and_its_bounds_hold_each_used_vertex)
         assert_non_null(mesh->arrays[MESH_INDICES]);
         uint32_t *indices = (uint32_t *)(void *)mesh->arrays[MESH_INDICES]->data;
         memset(indices, 0, (size_t)TRIANGLES * 12);
-        mesh->triangle_count = TRIANGLES;
+        mesh->value.triangle_count = TRIANGLES;
         indices[3 * BAD + 1] = has_bad ? 4 : 1;
         indices[3 * TRIANGLES - 1] = has_bad ? 5 : 2;
         struct error error = {0};
@@ -249,17 +249,17 @@ TEST(ranges_ascend_without_overlap_and_within_bounds)
 TEST(lights_cameras_and_discs_make_sense)
 {
     struct scene_light *light = &add_set(&list, OBJECT_LIGHT, 1)->set.light;
-    light->kind = LIGHT_SPOT;
-    light->inner_cone = 0.5f;
-    light->outer_cone = 0.4f;
+    light->value.kind = LIGHT_SPOT;
+    light->value.inner_cone = 0.5f;
+    light->value.outer_cone = 0.4f;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (light 1).outer_cone");
-    add_set(&list, OBJECT_LIGHT, 1)->set.light.kind = LIGHT_RECTANGLE;
+    add_set(&list, OBJECT_LIGHT, 1)->set.light.value.kind = LIGHT_RECTANGLE;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (light 1).size");
     add_set(&list, OBJECT_CAMERA, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (camera 2).height");
     struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 3)->set.disc;
-    disc->normal_world[0] = 0.99f;
-    disc->radius = 1;
+    disc->value.normal_world[0] = 0.99f;
+    disc->value.radius = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (disc 3).normal_world");
 }
 
@@ -296,7 +296,7 @@ TEST(parents_exist_and_circles_do_not)
     expect_commit(scene, &list);
     add_node(&list, 1, 3); /* the circle closes through nodes of an earlier transaction */
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
-    assert_int_equal(scene_node(scene, 1)->parent, 0);
+    assert_int_equal(scene_node(scene, 1)->value.parent, 0);
 }
 
 /* A chain of `length` nodes from the root, ids from `first`. */
@@ -327,7 +327,7 @@ TEST(a_removed_node_takes_along_what_hangs_below_it)
     add_node(&list, 1, 0);
     add_node(&list, 2, 1);
     add_node(&list, 3, 2);
-    add_shown(&list, 4, NODE_MESH, 1)->parent = 3;
+    add_shown(&list, 4, NODE_MESH, 1)->value.parent = 3;
     add_node(&list, 5, 1);
     add_mesh(&list, 1);
     expect_commit(scene, &list);
@@ -408,19 +408,19 @@ TEST(revisions_tell_what_a_transaction_touched)
 {
     add_mesh(&list, 1);
     add_set(&list, OBJECT_LIGHT, 1);
-    add_set(&list, OBJECT_CAMERA, 1)->set.camera.fov_y = 1;
+    add_set(&list, OBJECT_CAMERA, 1)->set.camera.value.fov_y = 1;
     add_set(&list, OBJECT_MATERIAL, 1);
     add_shown(&list, 1, NODE_MESH, 1);
     add_shown(&list, 2, NODE_LIGHT, 1);
     add_shown(&list, 3, NODE_CAMERA, 1);
     add_node(&list, 4, 0);
-    add_shown(&list, 5, NODE_MESH, 1)->parent = 4;
+    add_shown(&list, 5, NODE_MESH, 1)->value.parent = 4;
     expect_commit(scene, &list);
     expect_touched((struct revisions){1, 1, 1, 1});
     add_mesh(&list, 1);
     expect_commit(scene, &list);
     expect_touched((struct revisions){.geometry = 1});
-    add_shown(&list, 1, NODE_MESH, 1)->hidden = true;
+    add_shown(&list, 1, NODE_MESH, 1)->value.hidden = true;
     expect_commit(scene, &list);
     expect_touched((struct revisions){.instances = 1});
     add_shown(&list, 2, NODE_LIGHT, 1);
@@ -458,27 +458,27 @@ TEST(an_environment_keeps_its_image_if_the_edit_says_so)
     struct scene_edit read;
     struct error error = {0};
     struct scene_environment *environment = set_environment(0);
-    environment->width = environment->height = 1;
+    environment->value.width = environment->value.height = 1;
     environment->texels = make_blob(dark, sizeof(dark));
     expect_commit(scene, &list);
     const struct blob *image = scene->environment.texels;
     const uint64_t bytes = scene->host_bytes;
     assert_true(scene_read_object(scene, OBJECT_ENVIRONMENT, 1, &read, &error));
-    assert_true(read.set.environment.keeps_image && !read.set.environment.texels);
-    set_environment(0)->colour[0] = 3;
-    list.edits[0].set.environment.keeps_image = true;
+    assert_true(read.set.environment.value.keeps_image && !read.set.environment.texels);
+    set_environment(0)->value.colour[0] = 3;
+    list.edits[0].set.environment.value.keeps_image = true;
     expect_commit(scene, &list);
-    assert_true(scene->environment.texels == image && scene->environment.colour[0] == 3);
-    assert_int_equal(scene->environment.width, 1);
+    assert_true(scene->environment.texels == image && scene->environment.value.colour[0] == 3);
+    assert_int_equal(scene->environment.value.width, 1);
     assert_int_equal(scene->host_bytes, bytes);
     /* Of two edits the second keeps the image of the first, which is looked through all the same. */
     environment = set_environment(0);
-    environment->width = environment->height = 1;
+    environment->value.width = environment->value.height = 1;
     environment->texels = make_blob(infinite, sizeof(infinite));
-    set_environment(1)->keeps_image = true;
+    set_environment(1)->value.keeps_image = true;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[1] (environment).arrays[0] (texels)");
-    set_environment(0)->keeps_image = true;
-    list.edits[0].set.environment.backdrop = true;
+    set_environment(0)->value.keeps_image = true;
+    list.edits[0].set.environment.value.backdrop = true;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (environment).backdrop");
     assert_true(scene->environment.texels == image);
 }
@@ -552,8 +552,8 @@ TEST(a_mesh_of_871_thousand_triangles_is_checked)
 {
     const uint32_t triangles = 871414, vertices = 437645;
     struct scene_mesh *mesh = &add_set(&list, OBJECT_MESH, 1)->set.mesh;
-    mesh->vertex_count = vertices;
-    mesh->triangle_count = triangles;
+    mesh->value.vertex_count = vertices;
+    mesh->value.triangle_count = triangles;
     mesh->arrays[MESH_POSITIONS] = blob_create(vertices * 12ul);
     mesh->arrays[MESH_NORMALS] = blob_create(vertices * 12ul);
     mesh->arrays[MESH_INDICES] = blob_create(triangles * 12ul);

@@ -30,8 +30,8 @@ static void add_cloud(struct draft_list *list, uint32_t id, uint32_t first, uint
     for (uint32_t i = 0; i < triangles * 3; i++)
         indices[i] = first + i % (VERTICES - first);
     struct scene_mesh *mesh = &add_set(list, OBJECT_MESH, id)->set.mesh;
-    mesh->vertex_count = VERTICES;
-    mesh->triangle_count = triangles;
+    mesh->value.vertex_count = VERTICES;
+    mesh->value.triangle_count = triangles;
     mesh->arrays[MESH_POSITIONS] = make_blob(positions, sizeof(positions));
     mesh->arrays[MESH_INDICES] = make_blob(indices, (size_t)triangles * 12);
     free(indices);
@@ -48,12 +48,12 @@ static void expect_supports(const struct scene *scene, uint32_t root, const doub
 
 static void reach_of_used(const struct scene *scene, uint32_t node, double expected[SCENE_SUPPORTS_MAX])
 {
-    const struct scene_mesh *mesh = scene_mesh(scene, scene_node(scene, node)->object);
+    const struct scene_mesh *mesh = scene_mesh(scene, scene_node(scene, node)->value.object);
     const float *positions = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data;
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
     float world_from_node[12], point[3];
     assert_true(scene_world_from_node(scene, NULL, node, world_from_node));
-    for (uint32_t k = 0; k < mesh->triangle_count * 3; k++) {
+    for (uint32_t k = 0; k < mesh->value.triangle_count * 3; k++) {
         affine_point(point, world_from_node, positions + 3 * (size_t)indices[k]);
         for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++)
             expected[i] = fmax(expected[i], along(i, point));
@@ -87,8 +87,8 @@ TEST(what_turns_about_an_axis_reaches_as_far_as_all_its_places)
     double supports[SCENE_SUPPORTS_MAX];
     assert_non_null(scene);
     struct scene_mesh *mesh = &add_set(&list, OBJECT_MESH, 1)->set.mesh;
-    mesh->vertex_count = 6;
-    mesh->triangle_count = 2;
+    mesh->value.vertex_count = 6;
+    mesh->value.triangle_count = 2;
     mesh->arrays[MESH_POSITIONS] = make_blob(places, sizeof(places));
     mesh->arrays[MESH_INDICES] = make_blob(indices, sizeof(indices));
     add_shown(&list, 1, NODE_MESH, 1);
@@ -111,10 +111,10 @@ TEST(supports_are_those_of_the_vertices_that_triangles_use)
     assert_non_null(scene);
     add_cloud(&list, 1, 0, VERTICES);     /* more corners than vertices */
     add_cloud(&list, 2, VERTICES - 9, 3); /* whose other vertices are those of others */
-    memcpy(add_shown(&list, 1, NODE_MESH, 1)->parent_from_node, turned, sizeof(turned));
-    memcpy(add_shown(&list, 2, NODE_MESH, 2)->parent_from_node, turned, sizeof(turned));
+    memcpy(add_shown(&list, 1, NODE_MESH, 1)->value.parent_from_node, turned, sizeof(turned));
+    memcpy(add_shown(&list, 2, NODE_MESH, 2)->value.parent_from_node, turned, sizeof(turned));
     add_shown(&list, 3, NODE_MESH, 1);
-    add_shown(&list, 4, NODE_MESH, 1)->hidden = true;
+    add_shown(&list, 4, NODE_MESH, 1)->value.hidden = true;
     expect_commit(scene, &list);
     double all[SCENE_SUPPORTS_MAX], few[SCENE_SUPPORTS_MAX];
     for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++)
@@ -135,8 +135,8 @@ TEST(spheres_and_discs_reach_as_far_as_their_surfaces)
     assert_non_null(scene);
     assert_false(scene_supports_below(scene, NULL, 0, NULL, directions, supports, SCENE_SUPPORTS_MAX));
     struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 1)->set.disc;
-    disc->normal_world[1] = 1;
-    disc->radius = 9;
+    disc->value.normal_world[1] = 1;
+    disc->value.radius = 9;
     expect_commit(scene, &list);
     for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++)
         expected[i] = 9 * hypot(directions[i][0], directions[i][2]);
@@ -144,7 +144,7 @@ TEST(spheres_and_discs_reach_as_far_as_their_surfaces)
     const float two[] = {3, 0, 0, 1, -2, 1, 0, 0.5f};
     add_spheres(&list, 1, two, 2);
     struct scene_node *node = add_shown(&list, 1, NODE_SPHERES, 1);
-    node->parent_from_node[0] = node->parent_from_node[5] = node->parent_from_node[10] = 2;
+    node->value.parent_from_node[0] = node->value.parent_from_node[5] = node->value.parent_from_node[10] = 2;
     expect_commit(scene, &list);
     for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++) {
         const double length =

@@ -247,8 +247,10 @@ static inline void expect_alive(struct client *client, uint32_t request)
 
 static inline void send_hello(struct client *client, uint64_t capabilities)
 {
-    struct handshake_hello hello = {
-        .version_min = 1, .version_max = 1, .capabilities = capabilities, .name = "test"};
+    struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN,
+                                    .version_max = HANDSHAKE_VERSION_MAX,
+                                    .capabilities = capabilities,
+                                    .name = "test"};
     uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
     send_bytes(client, bytes, handshake_hello_encode(bytes, &hello));
 }
@@ -268,7 +270,7 @@ static inline uint64_t greet_with(struct client *client, uint64_t capabilities)
 {
     send_hello(client, capabilities);
     struct handshake_reply reply = receive_reply(client);
-    assert_int_equal(reply.version, 1);
+    assert_int_equal(reply.version, HANDSHAKE_VERSION_MAX);
     client->limits = reply.limits;
     return client->capabilities = reply.capabilities;
 }
@@ -284,9 +286,9 @@ static inline void send_node(struct client *client, uint32_t request, uint32_t n
 {
     struct message message = made(MESSAGE_SET_NODE);
     message.set_node.node = node;
-    message.set_node.parent = parent;
+    message.set_node.value.parent = parent;
     for (int axis = 0; axis < 3; axis++)
-        message.set_node.parent_from_node[5 * axis] = 1;
+        message.set_node.value.parent_from_node[5 * axis] = 1;
     send_message(client, request, 0, &message);
 }
 

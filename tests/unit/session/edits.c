@@ -220,22 +220,22 @@ static void send_skinned(uint32_t request, struct record_blob_ref *joints_and_ma
     struct record_morph_weight weights[] = {{0.25f}, {-4}};
     struct message message = made(MESSAGE_SET_NODE);
     message.set_node.node = 7;
-    message.set_node.kind = PROTOCOL_NODE_MESH;
-    message.set_node.object = 3;
-    message.set_node.skin = 5;
+    message.set_node.value.kind = PROTOCOL_NODE_MESH;
+    message.set_node.value.object = 3;
+    message.set_node.value.skin = 5;
     message.set_node.weights = weights;
     message.set_node.weights_count = 2;
     send_message(request, 0, &message);
     message = made(MESSAGE_SET_MESH);
     message.set_mesh.mesh = 3;
-    message.set_mesh.influence_count = 4;
-    message.set_mesh.target_count = 2;
+    message.set_mesh.value.influence_count = 4;
+    message.set_mesh.value.target_count = 2;
     message.set_mesh.weights = weights + 1;
     message.set_mesh.weights_count = 1;
     send_message(request, 0, &message);
     message = made(MESSAGE_SET_SKIN);
     message.set_skin.skin = 5;
-    message.set_skin.joint_count = 1;
+    message.set_skin.value.joint_count = 1;
     message.set_skin.arrays = joints_and_matrices;
     message.set_skin.arrays_count = 2;
     message.set_skin.name = "bones";
@@ -249,14 +249,14 @@ static void send_skinned(uint32_t request, struct record_blob_ref *joints_and_ma
     message = made(MESSAGE_SET_CHANNEL);
     message.set_channel = (struct message_set_channel){
         .channel = 8,
-        .clip = 6,
-        .path = PROTOCOL_CHANNEL_LIGHT_SIZE,
-        .object = 9,
-        .interpolation = PROTOCOL_INTERPOLATION_BEZIER,
-        .width = 2,
-        .key_count = 1,
-        .first_time = 1,
-        .first_value = 2,
+        .value.clip = 6,
+        .value.path = PROTOCOL_CHANNEL_LIGHT_SIZE,
+        .value.object = 9,
+        .value.interpolation = PROTOCOL_INTERPOLATION_BEZIER,
+        .value.width = 2,
+        .value.key_count = 1,
+        .value.first_time = 1,
+        .value.first_value = 2,
     };
     send_message(request, 0, &message);
 }
@@ -277,13 +277,13 @@ SESSION_TEST(skins_clips_and_channels_become_edits)
         usleep(1000);
     assert_int_equal(kept->edit_count, 5);
     const struct scene_node *node = &kept->edits[0].set.node;
-    assert_true(kept->edits[0].object == OBJECT_NODE && node->skin == 5 && node->weight_count == 2);
+    assert_true(kept->edits[0].object == OBJECT_NODE && node->value.skin == 5 && node->weight_count == 2);
     assert_true(node->weights[0] == 0.25f && node->weights[1] == -4.0f);
     const struct scene_mesh *mesh = &kept->edits[1].set.mesh;
-    assert_true(mesh->influence_count == 4 && mesh->target_count == 2);
+    assert_true(mesh->value.influence_count == 4 && mesh->value.target_count == 2);
     assert_true(mesh->weight_count == 1 && mesh->weights[0] == -4.0f);
     const struct scene_skin *skin = &kept->edits[2].set.skin;
-    assert_true(kept->edits[2].object == OBJECT_SKIN && skin->base.id == 5 && skin->joint_count == 1);
+    assert_true(kept->edits[2].object == OBJECT_SKIN && skin->base.id == 5 && skin->value.joint_count == 1);
     assert_string_equal(skin->base.name, "bones");
     assert_memory_equal(skin->joints->data, &joint, 4);
     assert_memory_equal(skin->joint_from_mesh->data, matrix, sizeof(matrix));
@@ -291,10 +291,11 @@ SESSION_TEST(skins_clips_and_channels_become_edits)
     assert_true(kept->edits[3].object == OBJECT_CLIP && clip->base.id == 6);
     assert_memory_equal(clip->floats->data, numbers, sizeof(numbers));
     const struct scene_channel *channel = &kept->edits[4].set.channel;
-    assert_true(kept->edits[4].object == OBJECT_CHANNEL && channel->base.id == 8 && channel->clip == 6);
-    assert_true(channel->path == CHANNEL_LIGHT_SIZE && channel->object == 9);
-    assert_true(channel->interpolation == INTERPOLATION_BEZIER && channel->width == 2);
-    assert_true(channel->key_count == 1 && channel->first_time == 1 && channel->first_value == 2);
+    assert_true(kept->edits[4].object == OBJECT_CHANNEL && channel->base.id == 8 && channel->value.clip == 6);
+    assert_true(channel->value.path == CHANNEL_LIGHT_SIZE && channel->value.object == 9);
+    assert_true(channel->value.interpolation == INTERPOLATION_BEZIER && channel->value.width == 2);
+    assert_true(channel->value.key_count == 1 && channel->value.first_time == 1 &&
+                channel->value.first_value == 2);
     release_commit();
     expect(MESSAGE_OK, 2);
     /* An array that is not held is named. */

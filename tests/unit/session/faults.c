@@ -39,7 +39,8 @@ static void record(void *context, uint32_t request, uint32_t channel, const stru
 static int make_recording(void **state)
 {
     (void)state;
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "recorded"};
+    struct handshake_hello hello = {
+        .version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX, .name = "recorded"};
     recording.count = handshake_hello_encode(recording.bytes, &hello);
     recording.ends[recording.message_count++] = recording.count;
     recorded_session(record, NULL);

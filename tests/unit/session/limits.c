@@ -312,7 +312,7 @@ TEST(memory_of_a_scene_is_limited)
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
     upload(client, 1, &reference, spheres);
     struct message message = made(MESSAGE_SET_SPHERES);
-    message.set_spheres.sphere_count = SPHERES;
+    message.set_spheres.value.sphere_count = SPHERES;
     message.set_spheres.arrays = &reference;
     message.set_spheres.arrays_count = 1;
     for (uint32_t set = 1; set <= 2; set++) {
@@ -333,8 +333,8 @@ static void send_texture(struct client *client, uint32_t request, uint32_t width
 {
     struct message message = made(MESSAGE_SET_TEXTURE);
     message.set_texture.texture = 1;
-    message.set_texture.width = width;
-    message.set_texture.height = height;
+    message.set_texture.value.width = width;
+    message.set_texture.value.height = height;
     message.set_texture.arrays = reference;
     message.set_texture.arrays_count = 1;
     begin_edit(client, request, 1);
@@ -357,8 +357,8 @@ TEST(edges_of_images_are_limited)
     send_texture(client, 5, 1, 65, &reference);
     expect_limit(client, 5, "set_texture", "limits.texture_edge");
     struct message message = made(MESSAGE_SET_ENVIRONMENT);
-    message.set_environment.width = 65;
-    message.set_environment.height = 1;
+    message.set_environment.value.width = 65;
+    message.set_environment.value.height = 1;
     message.set_environment.arrays = &reference;
     message.set_environment.arrays_count = 1;
     begin_edit(client, 6, 1);

@@ -35,11 +35,11 @@ static void add_geometry(struct draft_list *list)
 {
     struct scene_mesh *mesh = add_mesh(list, 10);
     name_it(&mesh->base, "mesh");
-    mesh->closed = true;
-    mesh->influence_count = 4;
+    mesh->value.closed = true;
+    mesh->value.influence_count = 4;
     mesh->arrays[MESH_JOINTS] = make_blob(four_joints, sizeof(four_joints));
     mesh->arrays[MESH_WEIGHTS] = make_blob(four_weights, sizeof(four_weights));
-    mesh->target_count = 1;
+    mesh->value.target_count = 1;
     mesh->arrays[MESH_TARGET_POSITIONS] = make_blob(offsets, sizeof(offsets));
     mesh->weights = weights_of(0.25f, 0);
     mesh->weight_count = 1;
@@ -49,90 +49,90 @@ static void add_geometry(struct draft_list *list)
     name_it(&spheres->base, "spheres");
     spheres->ranges = malloc(sizeof(*spheres->ranges));
     assert_non_null(spheres->ranges);
-    spheres->ranges[0] = (struct material_range){0, 2, 30};
+    spheres->ranges[0] = (struct record_material_range){0, 2, 30};
     spheres->range_count = 1;
     struct scene_disc *disc = &add_set(list, OBJECT_DISC, 25)->set.disc;
     name_it(&disc->base, "disc");
-    disc->material = 30;
-    disc->normal_world[1] = 1;
-    disc->radius = 3;
+    disc->value.material = 30;
+    disc->value.normal_world[1] = 1;
+    disc->value.radius = 3;
 }
 
 static void add_looks(struct draft_list *list)
 {
     struct scene_texture *texture = &add_set(list, OBJECT_TEXTURE, 40)->set.texture;
     name_it(&texture->base, "texture");
-    texture->width = texture->height = 2;
-    texture->format = TEXTURE_RGBA8_SRGB;
-    texture->nearest = true;
+    texture->value.width = texture->value.height = 2;
+    texture->value.format = TEXTURE_RGBA8_SRGB;
+    texture->value.nearest = true;
     texture->texels = make_blob(texels, sizeof(texels));
     struct scene_material *material = &add_set(list, OBJECT_MATERIAL, 30)->set.material;
     name_it(&material->base, "material");
-    material->double_sided = material->unlit = material->emission_seen_only = true;
-    material->base_colour[0] = 0.25f;
-    material->emission[1] = 5;
-    material->metallic = 0.5f;
-    material->roughness = 0.75f;
-    material->transmission = 0.125f;
-    material->ior = 1.25f;
-    material->alpha_cutoff = 0.375f;
-    material->anisotropy = 0.625f;
-    material->anisotropy_rotation = -2;
-    material->attenuation_distance = 3;
-    material->attenuation[2] = 0.25f;
-    material->thickness = 1.5f;
-    material->specular = 0.75f;
-    material->specular_colour[1] = 2.5f;
-    material->clearcoat = 0.5f;
-    material->clearcoat_roughness = 0.375f;
-    material->sheen[2] = 0.25f;
-    material->sheen_roughness = 0.125f;
-    material->iridescence = 0.75f;
-    material->iridescence_ior = 1.5f;
-    material->iridescence_minimum_nm = 50;
-    material->iridescence_maximum_nm = 500;
-    material->dispersion = 2;
-    material->diffuse_transmission = 0.625f;
-    material->diffuse_transmission_colour[1] = 0.5f;
-    material->thin_walled = true;
-    material->textures[MATERIAL_ANISOTROPY] = (struct texture_use){40, 0, {1, 0, 0, 0, 1, 0}, 1};
-    material->textures[MATERIAL_EMISSION] = (struct texture_use){40, 1, {1, 2, 3, 4, 5, 6}, 0.5f};
+    material->value.double_sided = material->value.unlit = material->value.emission_seen_only = true;
+    material->value.base_colour[0] = 0.25f;
+    material->value.emission[1] = 5;
+    material->value.metallic = 0.5f;
+    material->value.roughness = 0.75f;
+    material->value.transmission = 0.125f;
+    material->value.ior = 1.25f;
+    material->value.alpha_cutoff = 0.375f;
+    material->value.anisotropy = 0.625f;
+    material->value.anisotropy_rotation = -2;
+    material->value.attenuation_distance = 3;
+    material->value.attenuation_colour[2] = 0.25f;
+    material->value.thickness = 1.5f;
+    material->value.specular = 0.75f;
+    material->value.specular_colour[1] = 2.5f;
+    material->value.clearcoat = 0.5f;
+    material->value.clearcoat_roughness = 0.375f;
+    material->value.sheen[2] = 0.25f;
+    material->value.sheen_roughness = 0.125f;
+    material->value.iridescence = 0.75f;
+    material->value.iridescence_ior = 1.5f;
+    material->value.iridescence_minimum_nm = 50;
+    material->value.iridescence_maximum_nm = 500;
+    material->value.dispersion = 2;
+    material->value.diffuse_transmission = 0.625f;
+    material->value.diffuse_transmission_colour[1] = 0.5f;
+    material->value.thin_walled = true;
+    material->textures[MATERIAL_ANISOTROPY] = (struct record_texture_use){40, 0, {1, 0, 0, 0, 1, 0}, 1};
+    material->textures[MATERIAL_EMISSION] = (struct record_texture_use){40, 1, {1, 2, 3, 4, 5, 6}, 0.5f};
     struct scene_light *light = &add_set(list, OBJECT_LIGHT, 50)->set.light;
     name_it(&light->base, "light");
-    light->kind = LIGHT_SPOT;
-    light->colour[2] = 9;
-    light->range = 11;
-    light->inner_cone = 0.25f;
-    light->outer_cone = 0.5f;
+    light->value.kind = LIGHT_SPOT;
+    light->value.colour[2] = 9;
+    light->value.range = 11;
+    light->value.inner_cone = 0.25f;
+    light->value.outer_cone = 0.5f;
     struct scene_camera *camera = &add_set(list, OBJECT_CAMERA, 60)->set.camera;
     name_it(&camera->base, "camera");
-    camera->fov_y = 0.75f;
-    camera->near = 0.125f;
+    camera->value.fov_y = 0.75f;
+    camera->value.near = 0.125f;
     struct scene_edit *edit = &list->edits[list->count++];
     *edit = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
-    edit->set.environment.colour[0] = 2;
-    edit->set.environment.rotation = 1.5f;
-    edit->set.environment.display_values = true;
-    edit->set.environment.light_group = 7;
-    edit->set.environment.width = 2;
-    edit->set.environment.height = 1;
+    edit->set.environment.value.colour[0] = 2;
+    edit->set.environment.value.rotation = 1.5f;
+    edit->set.environment.value.display_values = true;
+    edit->set.environment.value.light_group = 7;
+    edit->set.environment.value.width = 2;
+    edit->set.environment.value.height = 1;
     edit->set.environment.texels = make_blob(half_floats, sizeof(half_floats));
 }
 
 static void add_nodes(struct draft_list *list)
 {
-    add_node(list, 2, 0)->parent_from_node[3] = 7;
+    add_node(list, 2, 0)->value.parent_from_node[3] = 7;
     struct scene_node *shown = add_shown(list, 1, NODE_MESH, 10);
     name_it(&shown->base, "shown");
-    shown->parent = 2;
-    shown->hidden = true;
-    shown->skin = 70;
-    shown->light_group = 3;
+    shown->value.parent = 2;
+    shown->value.hidden = true;
+    shown->value.skin = 70;
+    shown->value.light_group = 3;
     shown->weights = weights_of(0.5f, 0);
     shown->weight_count = 1;
     struct scene_skin *skin = &add_set(list, OBJECT_SKIN, 70)->set.skin;
     name_it(&skin->base, "skin");
-    skin->joint_count = 1;
+    skin->value.joint_count = 1;
     skin->joints = make_blob(joint, sizeof(joint));
     struct scene_clip *clip = &add_set(list, OBJECT_CLIP, 80)->set.clip;
     name_it(&clip->base, "clip");
@@ -209,31 +209,35 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
     /* Structs are compared but for what they own, and where it is compared by the bytes below. */
     const struct scene_material *one = scene_material(scene, 30), *other = scene_material(again, 30);
     assert_memory_equal(one->textures, other->textures, sizeof(one->textures));
-    assert_true(one->ior == other->ior && one->anisotropy_rotation == other->anisotropy_rotation &&
-                one->specular == other->specular && one->thickness == other->thickness &&
-                one->attenuation_distance == other->attenuation_distance &&
-                memcmp(one->attenuation, other->attenuation, sizeof(one->attenuation)) == 0 &&
-                memcmp(one->specular_colour, other->specular_colour, sizeof(one->specular_colour)) == 0);
+    assert_true(
+        one->value.ior == other->value.ior && one->value.anisotropy_rotation == other->value.anisotropy_rotation &&
+        one->value.specular == other->value.specular && one->value.thickness == other->value.thickness &&
+        one->value.attenuation_distance == other->value.attenuation_distance &&
+        memcmp(one->value.attenuation_colour, other->value.attenuation_colour,
+               sizeof(one->value.attenuation_colour)) == 0 &&
+        memcmp(one->value.specular_colour, other->value.specular_colour, sizeof(one->value.specular_colour)) == 0);
     const size_t layers =
-        offsetof(struct scene_material, thin_walled) - offsetof(struct scene_material, clearcoat);
-    assert_memory_equal(&one->clearcoat, &other->clearcoat, layers);
-    assert_true(other->thin_walled);
-    assert_true(other->unlit && other->double_sided && other->emission_seen_only &&
-                other->alpha_cutoff == 0.375f && other->emission[1] == 5);
+        offsetof(struct scene_material, value.thin_walled) - offsetof(struct scene_material, value.clearcoat);
+    assert_memory_equal(&one->value.clearcoat, &other->value.clearcoat, layers);
+    assert_true(other->value.thin_walled);
+    assert_true(other->value.unlit && other->value.double_sided && other->value.emission_seen_only &&
+                other->value.alpha_cutoff == 0.375f && other->value.emission[1] == 5);
     assert_string_equal(other->base.name, "material");
     const struct scene_node *node = scene_node(again, 1);
-    assert_true(node->parent == 2 && node->hidden && node->skin == 70 && node->weight_count == 1 &&
-                node->weights[0] == 0.5f);
+    assert_true(node->value.parent == 2 && node->value.hidden && node->value.skin == 70 &&
+                node->weight_count == 1 && node->weights[0] == 0.5f);
     const struct scene_mesh *mesh = scene_mesh(again, 10);
-    assert_true(mesh->closed && mesh->range_count == 1 && mesh->ranges[0].material == 30 &&
-                mesh->weights[0] == 0.25f && mesh->influence_count == 4 && mesh->target_count == 1);
+    assert_true(mesh->value.closed && mesh->range_count == 1 && mesh->ranges[0].material == 30 &&
+                mesh->weights[0] == 0.25f && mesh->value.influence_count == 4 && mesh->value.target_count == 1);
     for (int i = 0; i < MESH_ARRAY_COUNT; i++)
         assert_true(mesh->arrays[i] == scene_mesh(scene, 10)->arrays[i]);
-    assert_true(scene_light(again, 50)->outer_cone == 0.5f && scene_light(again, 50)->kind == LIGHT_SPOT);
-    assert_true(scene_camera(again, 60)->near == 0.125f && scene_texture(again, 40)->nearest);
-    assert_true(again->environment.display_values && again->environment.light_group == 7 &&
-                node->light_group == 3);
-    assert_true(again->environment.rotation == 1.5f && again->environment.texels == scene->environment.texels);
+    assert_true(scene_light(again, 50)->value.outer_cone == 0.5f &&
+                scene_light(again, 50)->value.kind == LIGHT_SPOT);
+    assert_true(scene_camera(again, 60)->value.near == 0.125f && scene_texture(again, 40)->value.nearest);
+    assert_true(again->environment.value.display_values && again->environment.value.light_group == 7 &&
+                node->value.light_group == 3);
+    assert_true(again->environment.value.rotation == 1.5f &&
+                again->environment.texels == scene->environment.texels);
     struct store_record second = record_of(again);
     assert_int_equal(second.content_bytes, first.content_bytes);
     assert_int_equal(second.blob_count, first.blob_count);

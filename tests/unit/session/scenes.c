@@ -65,16 +65,16 @@ static void commit_sphere(struct client *client, uint32_t scene)
     begin_edit(client, 3, scene);
     struct message message = made(MESSAGE_SET_SPHERES);
     message.set_spheres.spheres = 1;
-    message.set_spheres.sphere_count = 1;
+    message.set_spheres.value.sphere_count = 1;
     message.set_spheres.arrays = &reference;
     message.set_spheres.arrays_count = 1;
     send_message(client, 3, 0, &message);
     message = made(MESSAGE_SET_NODE);
     message.set_node.node = 1;
-    message.set_node.kind = PROTOCOL_NODE_SPHERES;
-    message.set_node.object = 1;
+    message.set_node.value.kind = PROTOCOL_NODE_SPHERES;
+    message.set_node.value.object = 1;
     for (int axis = 0; axis < 3; axis++)
-        message.set_node.parent_from_node[5 * axis] = 1;
+        message.set_node.value.parent_from_node[5 * axis] = 1;
     send_message(client, 3, 0, &message);
     commit(client, 3);
     assert_int_equal(expect_ok(client, 3), 1);
@@ -184,7 +184,7 @@ static void submit_material(struct client *client, uint32_t request, uint64_t ba
     send_message(client, request, 0, &message);
     message = made(MESSAGE_SET_MATERIAL);
     message.set_material.material = 8;
-    message.set_material.roughness = roughness;
+    message.set_material.value.roughness = roughness;
     message.set_material.name = "steel";
     send_message(client, request, 0, &message);
     commit(client, request);
@@ -200,16 +200,17 @@ TEST(an_object_is_read_as_it_was_set)
     attach(other, 4, "model");
     get_object(other, 5, 4, PROTOCOL_OBJECT_MATERIAL, 8);
     expect(other, MESSAGE_SET_MATERIAL, 5);
-    assert_true(other->message.set_material.roughness == 0.25f);
+    assert_true(other->message.set_material.value.roughness == 0.25f);
     assert_string_equal(other->message.set_material.name, "steel");
     assert_int_equal(expect_ok(other, 5), 2);
     get_object(other, 6, 4, PROTOCOL_OBJECT_NODE, 1);
     expect(other, MESSAGE_SET_NODE, 6);
-    assert_int_equal(other->message.set_node.kind, PROTOCOL_NODE_SPHERES);
+    assert_int_equal(other->message.set_node.value.kind, PROTOCOL_NODE_SPHERES);
     expect_ok(other, 6);
     get_object(other, 6, 4, PROTOCOL_OBJECT_ENVIRONMENT, 1); /* black until it is set */
     expect(other, MESSAGE_SET_ENVIRONMENT, 6);
-    assert_true(other->message.set_environment.colour[0] == 0 && other->message.set_environment.keeps_image == 1);
+    assert_true(other->message.set_environment.value.colour[0] == 0 &&
+                other->message.set_environment.value.keeps_image == 1);
     expect_ok(other, 6);
     /* What is not there, or cannot be read, is an error of that request. */
     get_object(other, 7, 4, PROTOCOL_OBJECT_MATERIAL, 9);
@@ -304,7 +305,7 @@ TEST(an_edit_of_what_has_changed_since_it_was_read_is_refused)
     assert_int_equal(expect_ok(one, 25), 5);
     get_object(one, 26, 1, PROTOCOL_OBJECT_MATERIAL, 8);
     expect(one, MESSAGE_SET_MATERIAL, 26);
-    assert_true(one->message.set_material.roughness == 0.75f);
+    assert_true(one->message.set_material.value.roughness == 0.75f);
 }
 
 TEST(contents_of_a_scene_are_reported)
@@ -414,7 +415,7 @@ TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_do
     begin_edit(one, 3, 1);
     struct message message = made(MESSAGE_SET_SPHERES);
     message.set_spheres.spheres = 1;
-    message.set_spheres.sphere_count = 12500;
+    message.set_spheres.value.sphere_count = 12500;
     message.set_spheres.arrays = references;
     message.set_spheres.arrays_count = 1;
     send_message(one, 3, 0, &message);

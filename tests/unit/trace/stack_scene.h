@@ -24,7 +24,7 @@ static inline struct scene_mesh *add_box_mesh(struct test_edits *edits, uint32_t
     }
     struct scene_mesh *mesh =
         test_mesh(edits, id, (const float(*)[3])positions, 8, (const uint32_t *)triangles, 12);
-    mesh->closed = true;
+    mesh->value.closed = true;
     return mesh;
 }
 

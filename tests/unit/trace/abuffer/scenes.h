@@ -37,7 +37,7 @@ static inline struct scene_mesh *add_round_mesh(struct test_edits *edits, uint32
     }
     struct scene_mesh *mesh =
         test_mesh(edits, id, (const float(*)[3])positions, vertices, (const uint32_t *)triangles, count);
-    mesh->closed = true;
+    mesh->value.closed = true;
     free(positions);
     free(triangles);
     return mesh;
@@ -90,16 +90,16 @@ static inline struct scene *scene_of_bodies_and_others(void)
 static inline struct scene *scene_of_cut_bodies(void)
 {
     struct test_edits edits = {.scene = test_scene_create()};
-    const struct material_range ranges[] = {{0, 100, 1}};
+    const struct record_material_range ranges[] = {{0, 100, 1}};
     const float spheres[2][4] = {{2, 0, 0, 0.6f}, {2, 1, 0, 0.7f}};
     struct scene_material *cutout = test_material(&edits, 1, 0.4f, 0.5f, 0.6f);
-    cutout->alpha_mode = ALPHA_MASK;
-    cutout->base_colour[3] = 0.25f; /* below its cutoff: none of it is there */
+    cutout->value.alpha_mode = ALPHA_MASK;
+    cutout->value.base_colour[3] = 0.25f; /* below its cutoff: none of it is there */
     struct scene_mesh *mesh = add_round_mesh(&edits, 10, 16, false);
     mesh->ranges = test_ranges(ranges, 1);
     mesh->range_count = 1;
     struct scene_spheres *set = test_spheres(&edits, 20, spheres, 2);
-    set->ranges = test_ranges((const struct material_range[]){{1, 1, 1}}, 1);
+    set->ranges = test_ranges((const struct record_material_range[]){{1, 1, 1}}, 1);
     set->range_count = 1;
     test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
     test_node(&edits, 2, 0, NODE_SPHERES, 20, NULL);

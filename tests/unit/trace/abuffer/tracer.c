@@ -135,8 +135,8 @@ static struct scene *scene_of_sheets(double apart)
     float positions[4 * SHEETS][3];
     uint32_t triangles[2 * SHEETS][3];
     struct scene_material *film = test_material(&edits, 1, 0.4f, 0.5f, 0.6f);
-    film->alpha_mode = ALPHA_BLEND;
-    film->base_colour[3] = 0.1f;
+    film->value.alpha_mode = ALPHA_BLEND;
+    film->value.base_colour[3] = 0.1f;
     for (uint32_t i = 0; i < SHEETS; i++) {
         const uint32_t first = 4 * i;
         for (uint32_t k = 0; k < 4; k++)
@@ -147,7 +147,7 @@ static struct scene *scene_of_sheets(double apart)
     }
     struct scene_mesh *mesh =
         test_mesh(&edits, 1, (const float(*)[3])positions, 4 * SHEETS, (const uint32_t *)triangles, 2 * SHEETS);
-    mesh->ranges = test_ranges(&(struct material_range){0, 2 * SHEETS, 1}, 1);
+    mesh->ranges = test_ranges(&(struct record_material_range){0, 2 * SHEETS, 1}, 1);
     mesh->range_count = 1;
     test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
     test_commit(&edits);
@@ -214,7 +214,7 @@ TEST(it_is_built_when_something_changes_and_at_no_other_time)
     update(&fixture);
     expect_built(&fixture, true);
     expect_distance(&fixture, distance_below(&fixture, 0, 0), 7);
-    test_node(&fixture.edits, 1, 0, NODE_MESH, 1, m)->hidden = true;
+    test_node(&fixture.edits, 1, 0, NODE_MESH, 1, m)->value.hidden = true;
     update(&fixture);
     expect_built(&fixture, true);
     assert_true(distance_below(&fixture, 0, 0) < 0);
@@ -234,14 +234,14 @@ TEST(cutouts_are_part_of_it)
     uint64_t whole = told(fixture.tracer, "samples");
     assert_true(whole > cut);
     struct scene_material *cutout = test_material(&fixture.edits, 1, 0.4f, 0.5f, 0.6f);
-    cutout->alpha_mode = ALPHA_MASK;
-    cutout->base_colour[3] = 0.25f;
+    cutout->value.alpha_mode = ALPHA_MASK;
+    cutout->value.base_colour[3] = 0.25f;
     update(&fixture);
     expect_built(&fixture, true);
     assert_int_equal(told(fixture.tracer, "samples"), cut);
     cutout = test_material(&fixture.edits, 1, 0.9f, 0.5f, 0.6f); /* of another colour */
-    cutout->alpha_mode = ALPHA_MASK;
-    cutout->base_colour[3] = 0.25f;
+    cutout->value.alpha_mode = ALPHA_MASK;
+    cutout->value.base_colour[3] = 0.25f;
     update(&fixture);
     assert_int_equal(told(fixture.tracer, "samples"), cut);
     fixture_finish(&fixture);

@@ -33,17 +33,17 @@ static struct scene *scene_of_shapes(enum look look)
     struct scene_material *second = test_material(&edits, 2, 0.4f, 0.8f, 0.95f);
     if (look == LOOK_CUTOUT) {
         test_texture(&edits, 1, 13, 8, TEXTURE_RGBA8_SRGB, WRAP_REPEAT, WRAP_MIRROR, 17);
-        first->alpha_mode = ALPHA_MASK;
+        first->value.alpha_mode = ALPHA_MASK;
         first->textures[MATERIAL_BASE_COLOUR].texture = 1;
     } else if (look == LOOK_TINTED) {
-        first->transmission = 0.9f;
-        second->alpha_mode = ALPHA_BLEND;
-        second->base_colour[3] = 0.3f;
+        first->value.transmission = 0.9f;
+        second->value.alpha_mode = ALPHA_BLEND;
+        second->value.base_colour[3] = 0.3f;
     }
     test_soup_mesh(&edits, 10, 90, 0.4f, 1);
     test_soup_mesh(&edits, 11, 60, 0.4f, 2);
     struct scene_mesh *slab = test_mesh(&edits, 12, square, 4, indices, 4);
-    slab->ranges = test_ranges(&(struct material_range){0, 4, 2}, 1);
+    slab->ranges = test_ranges(&(struct record_material_range){0, 4, 2}, 1);
     slab->range_count = 1;
     test_commit(&edits);
     return edits.scene;

@@ -18,7 +18,7 @@ static void add_target(struct scene_mesh *mesh)
         for (int k = 0; k < 3; k++)
             ways[v][k] = (v % 3 ? ways[v - v % 3][k] + test_uniform(&seed, -0.01f, 0.01f)
                                 : test_uniform(&seed, -0.3f, 0.3f));
-    mesh->target_count = 1;
+    mesh->value.target_count = 1;
     mesh->arrays[MESH_TARGET_POSITIONS] = test_blob(ways, TRIANGLES * 3 * sizeof(*ways));
     mesh->weights = calloc(1, sizeof(*mesh->weights));
     mesh->weight_count = 1;

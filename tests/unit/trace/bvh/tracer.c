@@ -480,8 +480,8 @@ TEST(a_first_step_has_fewer_rays_where_each_may_meet_much)
     const uint32_t translucent = first_step_of(test_scene_translucent());
     struct test_edits edits = {.scene = scene_of_instances()};
     for (uint32_t i = 1; i <= 100; i++)
-        test_add(&edits, OBJECT_DISC)->set.disc =
-            (struct scene_disc){.base.id = i, .centre_world = {100, 0, 0}, .normal_world = {0, 0, 1}, .radius = 1};
+        test_add(&edits, OBJECT_DISC)->set.disc = (struct scene_disc){
+            .base.id = i, .value.centre_world = {100, 0, 0}, .value.normal_world = {0, 0, 1}, .value.radius = 1};
     test_commit(&edits);
     device->facts.list_tests_max = 100 * RAY_COUNT / 4;
     const uint32_t discs = first_step_of(edits.scene);

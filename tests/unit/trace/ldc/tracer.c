@@ -158,7 +158,7 @@ TEST(what_was_hidden_and_comes_back_is_dynamic)
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small);
     for (int turn = 0; turn < 2; turn++) {
-        test_node(&fixture.edits, 1, 0, NODE_MESH, 10, NULL)->hidden = true;
+        test_node(&fixture.edits, 1, 0, NODE_MESH, 10, NULL)->value.hidden = true;
         update(&fixture);
         expect_built(&fixture, turn == 0, false);
         assert_true(distance_below(&fixture, 0, 0) < 0);
@@ -243,7 +243,7 @@ TEST(an_edit_of_a_texture_builds_all_and_a_factor_nothing)
     struct scene_material glass = *scene_material(fixture.scene, 3);
     struct scene_material *edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
     memcpy(edited->textures, glass.textures, sizeof(glass.textures));
-    edited->transmission = 0.2f;
+    edited->value.transmission = 0.2f;
     update(&fixture);
     expect_built(&fixture, false, false);
     test_texture(&fixture.edits, 2, 5, 5, TEXTURE_RGBA8_LINEAR, WRAP_CLAMP, WRAP_REPEAT, 20);

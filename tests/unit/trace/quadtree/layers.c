@@ -439,10 +439,10 @@ static struct scene *half_sphere(bool far_half)
     test_texture(&edits, 1, 2, 1, TEXTURE_RGBA8_LINEAR, WRAP_CLAMP, WRAP_CLAMP, 1);
     memcpy(edits.edits[edits.count - 1].set.texture.texels->data, texels, sizeof(texels));
     struct scene_material *cutout = test_material(&edits, 1, 0.4f, 0.5f, 0.6f);
-    cutout->alpha_mode = ALPHA_MASK;
+    cutout->value.alpha_mode = ALPHA_MASK;
     cutout->textures[MATERIAL_BASE_COLOUR].texture = 1;
     struct scene_spheres *spheres = test_spheres(&edits, 20, sphere, 1);
-    spheres->ranges = test_ranges((const struct material_range[]){{0, 1, 1}}, 1);
+    spheres->ranges = test_ranges((const struct record_material_range[]){{0, 1, 1}}, 1);
     spheres->range_count = 1;
     test_transform(m, 1, 1, 1, 1, 1.5707963f, 0, 0, -2); /* the texture's middle is on the side */
     test_node(&edits, 1, 0, NODE_SPHERES, 20, m);

@@ -46,11 +46,11 @@ static inline void add_disc(struct test_edits *edits)
 {
     struct scene_disc *disc = &test_add(edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
-    disc->material = 1;
-    disc->centre_world[2] = -7.5f;
-    disc->normal_world[0] = 0.28f;
-    disc->normal_world[2] = 0.96f;
-    disc->radius = 3;
+    disc->value.material = 1;
+    disc->value.centre_world[2] = -7.5f;
+    disc->value.normal_world[0] = 0.28f;
+    disc->value.normal_world[2] = 0.96f;
+    disc->value.radius = 3;
 }
 
 /* Hills, balls of triangles, round and squeezed, spheres likewise, and a disc behind them. */

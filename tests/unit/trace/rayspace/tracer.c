@@ -134,17 +134,17 @@ static struct scene *scene_below_disc(float radius)
     struct test_edits edits = {.scene = test_scene_create()};
     test_material(&edits, 1, 0.9f, 0.95f, 0.9f);
     struct scene_material *pane = test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.4f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.4f;
     test_soup_mesh(&edits, 10, 600, 0.3f, 29);
     test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
     for (uint32_t i = 0; i < 2; i++) {
         struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
         disc->base.id = i + 1;
-        disc->material = i + 1;
-        disc->centre_world[2] = 1.5f + 0.5f * (float)i;
-        disc->normal_world[2] = 1.0f;
-        disc->radius = radius;
+        disc->value.material = i + 1;
+        disc->value.centre_world[2] = 1.5f + 0.5f * (float)i;
+        disc->value.normal_world[2] = 1.0f;
+        disc->value.radius = radius;
     }
     test_commit(&edits);
     return edits.scene;
@@ -261,10 +261,10 @@ static struct scene *scene_of_large_triangles(void)
     struct test_edits edits = {.scene = test_scene_create()};
     struct scene_material *pane = test_material(&edits, 1, 0.9f, 0.95f, 0.9f);
     test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
-    pane->alpha_mode = ALPHA_BLEND;
-    pane->base_colour[3] = 0.02f;
+    pane->value.alpha_mode = ALPHA_BLEND;
+    pane->value.base_colour[3] = 0.02f;
     test_soup_mesh(&edits, 10, 600, 3.0f, 23);
-    const struct material_range ranges[] = {{0, 600, 1}};
+    const struct record_material_range ranges[] = {{0, 600, 1}};
     struct scene_mesh *mesh = test_last_mesh(&edits);
     free(mesh->ranges);
     mesh->ranges = test_ranges(ranges, 1);
