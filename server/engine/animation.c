@@ -21,7 +21,7 @@ double animation_time_s(const struct engine_job *job, uint32_t frame)
 
 /* ---- keys --------------------------------------------------------------------------------------- */
 
-/* The numbers of a key follow its time. */
+/* A key's numbers lie behind its time, without gaps. */
 #define KEY_FLOATS (sizeof(struct camera_key) / sizeof(float))
 _Static_assert(offsetof(struct camera_key, eye_world) == sizeof(float) &&
                    offsetof(struct camera_key, fov_y) == (KEY_FLOATS - 1) * sizeof(float),
@@ -95,7 +95,7 @@ static bool animation_turn(struct frame_camera *camera, const float axis_world[3
     return true;
 }
 
-/* Of everything at time 0 of the job, or of the node that is framed. */
+/* Bounds of the whole scene, or of the framed node, at the job's time 0. */
 static bool find_bounds(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
                         struct error *error)
 {
@@ -138,8 +138,8 @@ float animation_distance(const struct frame_camera *camera, const float point_wo
     return distance > 0.0 ? (float)fmin(distance, (double)PLACE_MAX) : 0.0f;
 }
 
-/* By the vertices: round models leave the corners of their bounds empty. False: nothing is visible. Only after
- * find_bounds(). */
+/* Extent of the vertices, as round models leave the corners of their bounds empty. False: nothing is visible.
+ * Needs find_bounds() first. */
 static bool find_reach(const struct engine_job *job, const struct scene *scene, float aspect,
                        struct animation_bounds *bounds)
 {
@@ -282,7 +282,7 @@ bool animation_check(const struct engine_job *job, struct error *error)
     return true;
 }
 
-/* A key of the path, with the values that clips replace. */
+/* Camera of the path's key at that time, in which clips may replace values. */
 static bool keys_camera(const struct engine_job *job, const struct pose_view *given, double time_s,
                         struct frame_camera *camera, float *focus, struct error *error)
 {

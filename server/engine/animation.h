@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a job's camera is in a frame. Pure: the same scene, job and frame give the same camera, whatever frames
- * came before. */
+/* A job's camera in a frame. Pure: the same scene, job and frame give the same camera, whatever frames came
+ * before. */
 #ifndef FARLIGHT_ENGINE_ANIMATION_H
 #define FARLIGHT_ENGINE_ANIMATION_H
 
@@ -25,23 +25,23 @@ struct animation_bounds {
     bool known;
     uint64_t revision;
     float lower[3], upper[3];
-    bool reach_known; /* of the vertices, in these directions */
+    bool reach_known; /* whether `supports` has the vertices' extent in these directions */
     double directions[FRAME_CAMERA_DIRECTIONS][3], supports[FRAME_CAMERA_DIRECTIONS];
     bool ground_known; /* engine/ground.h */
     uint64_t ground_revision;
     struct frame_ground ground;
 };
-/* That of one key; false if its vectors do not span a view. */
+/* Camera of one key; false if its vectors do not span a view. */
 bool animation_key_camera(const struct camera_key *key, const char *field, struct frame_camera *camera,
                           struct error *error);
-/* Along the view; 0 where the point is not in front. */
+/* Distance along the view; 0 where the point is not in front. */
 float animation_distance(const struct frame_camera *camera, const float point_world[3]);
 struct animation_view {
     struct frame_camera camera;
     float focus; /* distance along the view to the look-at point, or to the middle of the scene; metres */
 };
-/* At a time of the job. `pose`: at that time, NULL: the scene as it was committed; its view counts, as far as it
- * is given. `bounds` may be NULL. */
+/* Camera at a time of the job. `pose`: the scene at that time, whose view overrides the job's as far as it is
+ * given; NULL: the scene as it was committed. `bounds` may be NULL. */
 bool animation_view(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
                     double time_s, struct animation_bounds *bounds, struct animation_view *view,
                     struct error *error);

@@ -18,7 +18,7 @@ struct list {
 struct aside {
     void (*on_done)(void *context);
     void *context;
-    pthread_mutex_t lock; /* of what follows */
+    pthread_mutex_t lock; /* guards the members below */
     pthread_cond_t changed;
     struct list waiting, done;
     struct aside_commit *running[THREADS];
@@ -35,7 +35,7 @@ static void append(struct list *list, struct aside_commit *commit)
     list->end = &commit->next;
 }
 
-/* `place`: where the list refers to it. */
+/* Removes the task to which `place` points. */
 static struct aside_commit *take(struct list *list, struct aside_commit **place)
 {
     struct aside_commit *commit = *place;
@@ -56,7 +56,7 @@ static bool is_busy(const struct aside *aside, uint64_t client)
     return false;
 }
 
-/* The first of a client that has none running; NULL: none. */
+/* First task of a client that has none running; NULL: none. */
 static struct aside_commit *next_locked(struct aside *aside)
 {
     struct aside_commit **place = &aside->waiting.first;
@@ -69,14 +69,14 @@ static void carry_out(struct aside_commit *commit)
 {
     struct engine_command *command = commit->command;
     if (command->kind == ENGINE_JOB_START) {
-        struct error found_again = {0}; /* by the job */
+        struct error found_again = {0}; /* the job reports it */
         (void)shot_check(&command->job, commit->scene, &commit->bounds, &found_again);
         return;
     }
     uint64_t start_ns = clock_now_ns();
     commit->applied = scene_commit_unless(commit->scene, command->edits, command->edit_count, &commit->abandoned,
                                           &commit->error);
-    /* What was replaced, and what was refused, takes its time to release, too. */
+    /* Releasing replaced or refused data takes time too, so it happens on this thread. */
     engine_command_release_edits(command);
     commit->start_ns = start_ns;
     commit->duration_ns = clock_now_ns() - start_ns;

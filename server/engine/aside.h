@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Transactions that take long, and jobs that begin with a search through a large scene, carried out beside the
  * thread that owns GL: a few threads, of which one client has at most one at a time, so that others find one free.
- * The caller keeps everything else away from a scene until its transaction comes back, and changes from one that
+ * The caller keeps everything else away from a scene until its transaction is done, and changes from one that
  * is searched. */
 #ifndef FARLIGHT_ENGINE_ASIDE_H
 #define FARLIGHT_ENGINE_ASIDE_H
@@ -12,18 +12,18 @@
 
 #include <stdatomic.h>
 
-/* A transaction, or a job's start. All of it belongs to a thread of the pool until aside_take_done() gives it
- * back; only `abandoned` may be set in between. */
+/* A transaction, or a job's start. It belongs to a thread of the pool until aside_take_done() returns it; only
+ * `abandoned` may be set in between. */
 struct aside_commit {
     struct aside_commit *next; /* for the pool */
     struct scene *scene;
     struct engine_command *command; /* owned; its edits are gone afterwards */
-    struct animation_bounds bounds; /* that a job needs */
+    struct animation_bounds bounds; /* bounds that a job's start has found */
     atomic_bool abandoned;
     bool applied;
     struct error error; /* why not */
     uint64_t start_ns, duration_ns;
-    uint64_t promised_bytes; /* of tables, at most; for the caller */
+    uint64_t promised_bytes; /* maximum that its tables may take; for the caller */
 };
 
 struct aside;

@@ -15,7 +15,7 @@ static bool no_memory_for_attachments(struct error *error)
     return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for a frame's attachments");
 }
 
-/* Given up when `like` is. */
+/* A picture whose encoding is abandoned together with that of `like`. */
 static struct picture picture_of(const struct engine_frame *frame, const struct picture *like,
                                  const uint8_t *pixels, uint32_t pixel_bytes)
 {
@@ -32,7 +32,7 @@ const float *attachments_depths(const struct frame_result *result)
     return (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH);
 }
 
-/* *rounded: malloc'ed; NULL: metres are what the frame has. */
+/* *rounded: malloc'ed; NULL: the frame's depths are in metres. */
 static bool round_depths(struct engine_frame *frame, uint16_t **rounded, struct error *error)
 {
     const struct frame_result *result = &frame->result;
@@ -46,7 +46,7 @@ static bool round_depths(struct engine_frame *frame, uint16_t **rounded, struct 
     return frame->depth.form != DEPTH_FORM_INVERSE || depth_round(&picture, rounded, &frame->depth_step, error);
 }
 
-/* Takes `added` over. */
+/* Appends the bytes and frees them. */
 static bool append_bytes(struct engine_frame *frame, uint8_t *added, size_t added_bytes, struct error *error)
 {
     uint8_t *bytes = realloc(frame->bytes, frame->size_bytes + added_bytes);
@@ -67,7 +67,7 @@ static bool append(struct engine_frame *frame, const struct picture *picture, si
            append_bytes(frame, encoded, *added_bytes, error);
 }
 
-/* Of a frame in parts, before the depth. */
+/* Coarse depths, which only a frame in parts has; they precede the depths. */
 static bool append_coarse_depth(struct engine_frame *frame, const uint16_t *rounded, struct error *error)
 {
     uint8_t *encoded;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* What follows a frame's encoded pixels, and the order of all if it is in parts. Any thread. */
+/* Attachments, which follow a frame's encoded pixels, and the order of both in a frame in parts. Any thread. */
 #ifndef FARLIGHT_ENGINE_ATTACHMENTS_H
 #define FARLIGHT_ENGINE_ATTACHMENTS_H
 
 #include "engine/engine.h"
 
-/* Of a frame whose pixels, `picture`, are encoded. */
+/* Encodes the attachments of a frame whose pixels, `picture`, are encoded already, and appends them. */
 bool attachments_append(struct engine_frame *frame, const struct picture *picture, struct error *error);
-/* NULL: there are none. */
+/* Depths of a frame; NULL: it has none. */
 const float *attachments_depths(const struct frame_result *result);
 
 #endif

@@ -6,7 +6,8 @@
 #include "gpu/device.h"
 #include "render/frame/frame.h"
 
-/* Every function is called on the engine's thread and does as the one that gives it its name. */
+/* Every function is called on the engine's thread, and does what the function of the same name in gpu/ or render/
+ * does. */
 struct engine_backend {
     struct gpu_device *(*device_create)(const struct gpu_options *options, struct error *error);
     void (*device_destroy)(struct gpu_device *device);

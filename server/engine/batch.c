@@ -21,7 +21,7 @@ static bool can_encode(const struct engine_job *spec, enum encoding encoding)
            (spec->kind == JOB_VIEW && encoder_stream_supports(encoding, pixel_bytes));
 }
 
-/* What is found of the scene's bounds is kept. */
+/* Keeps the bounds that the check has found, for the first frame. */
 static bool spec_check(const struct engine_job *spec, const struct scene *scene, struct animation_bounds *bounds,
                        struct error *error)
 {
@@ -214,7 +214,8 @@ void jobs_reap(struct engine *engine)
     }
 }
 
-/* The last frame is rendered, or no more can be rendered; the answer follows the frames that are under way. */
+/* Posts the job's answer, which follows the frames under way: its last frame is rendered, or none can be rendered
+ * any more. */
 static void job_finish(struct job *job, const struct error *error)
 {
     job->next_frame = (uint64_t)job->spec.last_frame + 1;
@@ -238,13 +239,13 @@ bool job_wants_frame(const struct job *job)
            (job->spec.kind == JOB_BATCH ? job_output_has_credit(job->output) : view_due_ns(job) != UINT64_MAX);
 }
 
-/* Something waits for the frames in progress to end. */
+/* Whether something waits for the frames in progress to end. */
 static bool is_waited_for(const struct engine_scene *scene)
 {
     return scene->commit || scene->waiting_count || (scene->put_off && job_wants_frame(scene->put_off));
 }
 
-/* A frame of a batch may take minutes, in which views of the scene would show nothing: while such a frame delays
+/* Views of the scene would show nothing for the minutes that a batch's frame may take. While such a frame delays
  * the waiting commands anyway, frames of views may begin, as they delay them no further. */
 static bool may_begin_meanwhile(const struct engine *engine, const struct job *job)
 {
@@ -257,7 +258,7 @@ static bool may_begin_meanwhile(const struct engine *engine, const struct job *j
     return batch && job->spec.kind == JOB_VIEW && view_has_news(job) && job->refused_after != scene->frames_ended;
 }
 
-/* New frames do not delay commands that wait for the frames in progress. */
+/* New frames must not delay commands that wait for the frames in progress. */
 static bool may_begin(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
@@ -270,7 +271,7 @@ static bool may_begin(const struct engine *engine, const struct job *job)
     return !is_waited_for(scene) || (scene->put_off != job && may_begin_meanwhile(engine, job));
 }
 
-/* When it is ready; in the past: now. UINT64_MAX: not before something happens. */
+/* Time at which the job is ready; in the past: now. UINT64_MAX: not before something happens. */
 static uint64_t ready_ns(const struct engine *engine, const struct job *job)
 {
     if (job->rendering)
@@ -296,12 +297,12 @@ uint64_t jobs_idle_ns(const struct engine *engine)
     return first_ns == UINT64_MAX ? UINT64_MAX : first_ns > now_ns ? first_ns - now_ns : 0;
 }
 
-/* Frames in progress are rendered again, from the scenes that are held in memory. */
+/* Reopens the device. Frames in progress are rendered again, from the scenes that are held in memory. */
 static void device_lost(struct engine *engine, struct job *job)
 {
     struct error error = {0};
     engine_drop_device(engine);
-    if (!engine_job_may_go_on(job, &error))
+    if (!engine_job_may_continue(job, &error))
         job_finish(job, &error);
     error = (struct error){0};
     if (engine_need_device(engine, &error))
@@ -312,7 +313,7 @@ static void device_lost(struct engine *engine, struct job *job)
     engine_post_device_gone(engine);
 }
 
-/* Whether the frame is worth another try; if not, the job has failed. */
+/* Retries the frame where that is worthwhile; if not, fails the job. */
 static void frame_failed(struct engine *engine, struct job *job, struct error *error)
 {
     job_abandon_frame(engine, job);
@@ -320,12 +321,12 @@ static void frame_failed(struct engine *engine, struct job *job, struct error *e
         device_lost(engine, job);
         return;
     }
-    const bool has_room = error->kind == ERROR_OUT_OF_MEMORY && engine_make_room(engine, job);
-    if (!has_room && !(job->spec.kind == JOB_VIEW && view_goes_without(job, error)))
+    const bool has_room = error->kind == ERROR_OUT_OF_MEMORY && engine_free_memory(engine, job);
+    if (!has_room && !(job->spec.kind == JOB_VIEW && view_drop_hidden_layers(job, error)))
         job_finish(job, error);
 }
 
-/* Or puts it off. */
+/* Begins the frame, or puts it off where the renderer cannot begin it beside those in progress. */
 static bool frame_begin_shot(struct engine *engine, struct job *job, struct shot *shot, struct error *error)
 {
     struct engine_scene *scene = job->scene;
@@ -353,13 +354,13 @@ static bool frame_begin_shot(struct engine *engine, struct job *job, struct shot
     return true;
 }
 
-static bool frame_take_up(struct engine *engine, struct job *job, struct error *error)
+static bool job_begin_frame(struct engine *engine, struct job *job, struct error *error)
 {
     struct engine_scene *scene = job->scene;
     struct shot shot;
     job->begin_ns = clock_now_ns();
     bool made = job->spec.kind == JOB_VIEW
-                    ? view_take_up(job, &shot, error)
+                    ? view_begin_frame(job, &shot, error)
                     : shot_make(&shot, &job->spec, scene->scene, (uint32_t)job->next_frame, &job->bounds, error);
     if (!made)
         return false;
@@ -418,7 +419,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
         job_finish(job, NULL);
 }
 
-static void frame_go_on(struct engine *engine, struct job *job)
+static void job_continue_frame(struct engine *engine, struct job *job)
 {
     struct error error = {0};
     struct engine_frame *frame = calloc(1, sizeof(*frame));
@@ -442,10 +443,10 @@ void job_step(struct engine *engine, struct job *job)
     if (job->rendering && job->spec.kind == JOB_VIEW && view_is_stale(job)) {
         job_abandon_frame(engine, job);
     } else if (job->rendering) {
-        frame_go_on(engine, job);
+        job_continue_frame(engine, job);
     } else {
         struct error error = {0};
-        if (!frame_take_up(engine, job, &error))
+        if (!job_begin_frame(engine, job, &error))
             frame_failed(engine, job, &error);
     }
 }

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Commands that may wait for one scene's frames; more are answered with busy. */
+/* Maximum of commands that wait for one scene's frames; further ones are answered with busy. */
 #define WAITING_MAX 256
 /* Instances times primitives of a scene whose bounds are found at once: some milliseconds. */
 #define SEARCHED_HERE_MAX (UINT64_C(1) << 22)
@@ -55,7 +55,8 @@ static void limit_tables(const struct engine *engine, struct engine_scene *scene
         scene->scene->limits.table_bytes = held_bytes < limit_bytes ? limit_bytes - held_bytes : 1;
 }
 
-/* `by` NULL: it is gone, and hears no answer. */
+/* Answers a transaction and notifies the scene's other holders. `by` NULL: its client is gone and gets no answer.
+ */
 static void committed(struct engine *engine, struct engine_scene *scene, const struct engine_reference *by,
                       const struct aside_commit *commit)
 {
@@ -87,7 +88,7 @@ static void commit_here(struct engine *engine, const struct engine_reference *re
     committed(engine, scene, reference, &commit);
 }
 
-/* False: the command stays the caller's. */
+/* False: the caller keeps the command. */
 static bool commit(struct engine *engine, const struct engine_reference *reference, struct engine_command *command)
 {
     struct engine_scene *scene = reference->scene;
@@ -123,7 +124,8 @@ static void start(struct engine *engine, struct engine_reference *reference, str
         fail(engine, command, &error);
 }
 
-/* Whether its first frame needs the bounds of so large a scene that other jobs would wait for them. */
+/* Whether the job's first frame needs the bounds of a scene so large that other jobs would have to wait for them.
+ */
 static bool searches_long(struct engine_scene *scene, const struct engine_job *job)
 {
     const bool is_framed = job->path == CAMERA_AUTO || (job->path == CAMERA_ORBIT && job->key_count == 0);
@@ -133,7 +135,7 @@ static bool searches_long(struct engine_scene *scene, const struct engine_job *j
     return (uint64_t)scene->instances * (scene->triangles + scene->spheres) > SEARCHED_HERE_MAX;
 }
 
-/* False: the command stays the caller's. */
+/* False: the caller keeps the command. */
 static bool start_aside(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
 {
     struct aside_commit *search = searches_long(scene, &command->job) ? calloc(1, sizeof(*search)) : NULL;
@@ -157,7 +159,7 @@ static void finish_commit(struct engine *engine, struct engine_scene *scene, str
     } else if (scene->references) {
         committed(engine, scene, by, commit);
     } else {
-        engine_scene_note(engine, scene); /* it has no holder to be told, and may end now */
+        engine_scene_note(engine, scene); /* no holder is left to notify, so the scene may end now */
     }
 }
 
@@ -179,7 +181,7 @@ void engine_finish_commits(struct engine *engine)
     }
 }
 
-/* False: it stays the caller's. */
+/* False: the caller keeps the command. */
 static bool keep_waiting(struct engine_scene *scene, struct engine_command *command)
 {
     struct engine_command **waiting = realloc(scene->waiting, (scene->waiting_count + 1) * sizeof(*waiting));
@@ -230,8 +232,8 @@ struct engine_command *engine_take_waiting(struct engine_scene *scene, const str
     return NULL;
 }
 
-/* False: it must wait for an earlier command of this client, which waits for another client's frame or is carried
- * out. */
+/* False: the command must wait for an earlier one of this client, which waits for another client's frame or is in
+ * progress. */
 static bool scene_close(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
 {
     struct engine_scene *scene = reference->scene;
@@ -255,7 +257,7 @@ static const char *scene_field(enum engine_command_kind kind)
                                            : "edit_begin.scene";
 }
 
-/* For commands that name a scene. */
+/* Carries out a command that names a scene. */
 static void handle_of_scene(struct engine *engine, struct engine_command *command)
 {
     struct engine_reference *reference = engine_find_reference(engine, command->client, command->scene);
@@ -307,7 +309,7 @@ void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 
 /* ---- jobs --------------------------------------------------------------------------------------- */
 
-/* Where a command of that request waits for frames; false: none does. */
+/* Finds the command of that request among those that wait for frames; false: none does. */
 static bool find_waiting(struct engine *engine, const struct engine_command *by, struct engine_scene **found,
                          size_t *place)
 {
@@ -425,8 +427,8 @@ void engine_handle(struct engine *engine, struct engine_command *command)
     case ENGINE_JOB_CANCEL:
         job_cancel(engine, command);
         break;
-    case ENGINE_VIEW_LOOK:
-        break; /* the view sees for itself whenever the thread is awake */
+    case ENGINE_VIEW_CHANGED:
+        break; /* the command only wakes the thread, which then reads the latest wishes of each view */
     case ENGINE_STATS:
         report_stats(engine, command);
         break;

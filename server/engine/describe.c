@@ -87,7 +87,7 @@ static int by_number(const void *a, const void *b)
     return left < right ? -1 : left > right;
 }
 
-/* Puts a number into the ascending first ENGINE_DESCRIPTION_MAX of all that are given so. */
+/* Inserts a number into the smallest ENGINE_DESCRIPTION_MAX numbers so far, which are ascending. */
 static void keep_first(uint32_t numbers[ENGINE_DESCRIPTION_MAX], uint32_t *count, uint32_t number)
 {
     if (*count == ENGINE_DESCRIPTION_MAX && number > numbers[*count - 1])
@@ -151,7 +151,7 @@ static void describe_clips(struct engine_scene_description *description, const s
         describe_channel(description, numbers, scene, value);
 }
 
-/* A transform may leave the floats: whatever comes of that is brought back. */
+/* Transforms may exceed the range of floats; the bounds are clamped to what the protocol allows. */
 static void describe_bounds(struct engine_scene_description *description, const struct scene *scene)
 {
     description->empty = !scene_bounds(scene, NULL, description->lower_world, description->upper_world);
@@ -162,7 +162,7 @@ static void describe_bounds(struct engine_scene_description *description, const 
     }
 }
 
-/* Kept, as a large scene takes its time. NULL: out of memory. */
+/* Description of the scene, kept for its revision, as that of a large scene takes time. NULL: out of memory. */
 static const struct engine_scene_description *need_description(struct engine_scene *from)
 {
     const struct scene *scene = from->scene;

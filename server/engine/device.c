@@ -7,7 +7,7 @@
 #include "base/host.h"
 #include "base/log.h"
 
-/* What is configured, or a share of what there is. */
+/* The configured limit, or a share of the device's memory. */
 static uint64_t device_limit(const struct engine *engine)
 {
     const struct gpu_memory *memory = &engine->device->facts.memory;
@@ -129,14 +129,15 @@ void engine_drop_device(struct engine *engine)
     engine->device = NULL;
 }
 
-/* Of a ring of times, whether the one that is the next to be overwritten is recent. */
+/* Whether DEVICE_REBUILDS_MAX losses lie within the window: the ring's oldest time, which is overwritten next, is
+ * recent. */
 static bool too_often(const uint64_t times_ns[DEVICE_REBUILDS_MAX], unsigned count, uint64_t now_ns)
 {
     return count >= DEVICE_REBUILDS_MAX &&
            now_ns - times_ns[count % DEVICE_REBUILDS_MAX] < DEVICE_REBUILDS_WINDOW_NS;
 }
 
-bool engine_job_may_go_on(struct job *job, struct error *error)
+bool engine_job_may_continue(struct job *job, struct error *error)
 {
     uint64_t now_ns = clock_now_ns();
     job->losses_ns[job->losses++ % DEVICE_REBUILDS_MAX] = now_ns;

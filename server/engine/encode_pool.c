@@ -15,27 +15,27 @@
 #include <xxhash.h>
 
 #define THREADS_MAX 64
-/* So that one is left to others where one user's frames take long. */
+/* A thread must be left to other users where one user's frames take long. */
 #define THREADS_MIN 2
 #define THREADS_AUTO_MAX 4
-/* Bytes that are hashed between two looks at whether they are wanted. */
+/* Bytes that are hashed between two checks whether the frame is still wanted. */
 #define DIGEST_STEP_BYTES ((size_t)16 << 20)
 
 struct encode_task {
     struct job_output *output;
-    struct encode_lane *lane; /* NULL: it goes its own way */
+    struct encode_lane *lane; /* NULL: the frame is no part of a stream */
     uint64_t position;
     struct engine_frame *frame;
-    struct encode_task *next; /* of those that wait, in the lane or in the pool */
+    struct encode_task *next; /* next waiting task of the lane or of the pool */
     struct encode_pool *pool;
 };
 
 struct encode_pool {
     struct encode_pool_options options;
     atomic_bool closed;
-    pthread_mutex_t lock; /* of what follows, but for the threads */
+    pthread_mutex_t lock; /* guards the members below, except the threads */
     pthread_cond_t changed;
-    struct encode_task *first, **end; /* that wait, in order */
+    struct encode_task *first, **end; /* waiting tasks, in order */
     struct encode_task *running[THREADS_MAX];
     unsigned numbered; /* threads that know their place in `running` */
     unsigned thread_count;
@@ -47,9 +47,9 @@ struct encode_pool {
 struct encode_lane {
     atomic_uint references;
     float frames_per_second;
-    struct encoder_stream *stream; /* that of the current task; NULL before the first */
-    pthread_mutex_t lock;          /* of what follows */
-    bool busy;                     /* one of its tasks is queued or running */
+    struct encoder_stream *stream; /* encoder, used by the current task alone; NULL before the first */
+    pthread_mutex_t lock;          /* guards the members below */
+    bool busy;                     /* whether one of its tasks is queued or running */
     struct encode_task *first, **end;
 };
 
@@ -74,7 +74,7 @@ void encode_lane_unref(struct encode_lane *lane)
     free(lane);
 }
 
-/* False: the task waits for those before it; lane_next() will give it out. */
+/* False: the task waits for those before it; lane_next() will return it. */
 static bool lane_enter(struct encode_lane *lane, struct encode_task *task)
 {
     pthread_mutex_lock(&lane->lock);
@@ -88,7 +88,7 @@ static bool lane_enter(struct encode_lane *lane, struct encode_task *task)
     return free_now;
 }
 
-/* After the end of the current task. */
+/* Ends the lane's current task and returns the next one; NULL: none waits. */
 static struct encode_task *lane_next(struct encode_lane *lane)
 {
     pthread_mutex_lock(&lane->lock);
@@ -104,7 +104,7 @@ static struct encode_task *lane_next(struct encode_lane *lane)
 
 /* ---- tasks -------------------------------------------------------------------------------------- */
 
-/* The task that waited for it is the caller's; NULL: none. */
+/* Frees a task and returns the one that waited for it, which the caller owns; NULL: none. */
 static struct encode_task *task_end(struct encode_task *task)
 {
     struct encode_task *next = task->lane ? lane_next(task->lane) : NULL;
@@ -170,7 +170,8 @@ static bool make_digest(const struct encode_task *task, struct error *error)
     return done == result->size_bytes || encoder_given_up(error);
 }
 
-/* What no eye sees past what hides it is not there. */
+/* Fills pixels of a hidden layer that no eye can see: they are empty, and cost least in colours of their
+ * neighbours. */
 static void fill_hidden(const struct engine_frame *frame)
 {
     const struct frame_result *result = &frame->result;
@@ -207,7 +208,7 @@ static bool encode(const struct encode_task *task, struct error *error)
         !attachments_append(frame, &picture, error))
         return false;
     if (!encoder_loses(frame->encoding))
-        frame->quality = 0; /* a level, which costs no picture */
+        frame->quality = 0; /* a compression level, not a loss */
     free(result->pixels);
     result->pixels = NULL;
     frame->encoded_ns = clock_now_ns();
@@ -245,7 +246,8 @@ static unsigned running_of(const struct encode_pool *pool, uint64_t client)
     return count;
 }
 
-/* The first of the client that has the fewest threads; NULL: none waits, or one thread is to be left to others. */
+/* First task of the client that occupies the fewest threads; NULL: none waits, or one thread must be left to
+ * others. */
 static struct encode_task *next_locked(struct encode_pool *pool)
 {
     struct encode_task **best = NULL;
@@ -291,7 +293,7 @@ static void *run_thread(void *context)
         while (task) {
             run_task(task);
             set_running(pool, self, NULL);
-            task = task_end(task); /* one that waited for it in its lane */
+            task = task_end(task); /* next task of the same lane */
             set_running(pool, self, task);
             pool->options.on_done(pool->options.context);
         }
@@ -319,7 +321,7 @@ struct encode_pool *encode_pool_create(const struct encode_pool_options *options
                   : processors < THREADS_MIN    ? THREADS_MIN
                                                 : processors;
     threads = threads > THREADS_MAX ? THREADS_MAX : threads;
-    pthread_mutex_lock(&pool->lock); /* the threads wait until there are all */
+    pthread_mutex_lock(&pool->lock); /* the threads wait until all have started */
     while (pool->thread_count < threads &&
            pthread_create(&pool->threads[pool->thread_count], NULL, run_thread, pool) == 0)
         pool->thread_count++;

@@ -59,10 +59,10 @@ struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const c
     return event;
 }
 
-/* Any thread: there may be something to do. */
+/* Wakes the thread that owns GL, because there may be something to do. Any thread. */
 static void engine_nudge(struct engine *engine)
 {
-    /* One in the queue is enough. If the queue is full, that alone keeps the thread awake. */
+    /* A single nudge in the queue is enough, and a full queue keeps the thread awake by itself. */
     if (!atomic_exchange(&engine->nudged, true))
         queue_try_push(engine->commands, &nudge);
 }
@@ -130,7 +130,8 @@ static void take_commands(struct engine *engine, struct engine_command *first)
     uint64_t end_ns = clock_now_ns() + COMMANDS_NS;
     for (struct engine_command *command = first; command;) {
         if (command == &nudge)
-            atomic_store(&engine->nudged, false); /* what changes from here on is not seen by this turn, perhaps */
+            /* This turn may miss changes from here on, so they need a nudge of their own. */
+            atomic_store(&engine->nudged, false);
         else
             engine_handle(engine, command);
         command = clock_now_ns() < end_ns ? queue_try_pop(engine->commands) : NULL;
@@ -161,7 +162,7 @@ static void run(struct engine *engine)
     }
 }
 
-static void tell_start(struct engine *engine, bool opened)
+static void report_start(struct engine *engine, bool opened)
 {
     pthread_mutex_lock(&engine->start_lock);
     engine->start = opened ? START_DONE : START_FAILED;
@@ -176,12 +177,12 @@ static void *run_thread(void *context)
     bool opened = engine_open_device(engine, &engine->start_error);
     if (opened)
         engine->device_info = engine->device->info;
-    tell_start(engine, opened);
+    report_start(engine, opened);
     if (!opened)
         return NULL;
     run(engine);
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
-        scene->commit = NULL; /* it is destroyed here */
+        scene->commit = NULL; /* aside_destroy() frees it, and nothing waits for it any more */
     aside_destroy(engine->aside);
     engine->aside = NULL;
     engine_stop_keeping(engine);
@@ -205,7 +206,7 @@ void engine_set_limits(struct engine *engine, const struct engine_limits *limits
 
 /* ---- start and stop ----------------------------------------------------------------------------- */
 
-/* Beside the thread, something was finished. */
+/* Called when another thread has finished a task. */
 static void on_done(void *context)
 {
     engine_nudge(context);
@@ -267,7 +268,7 @@ struct engine *engine_create(const struct engine_options *options, struct error 
     pthread_cond_init(&engine->start_changed, NULL);
     size_t capacity = engine->options.queue_capacity;
     capacity = capacity < COMMANDS_WAITING_MAX ? capacity : COMMANDS_WAITING_MAX;
-    engine->commands = queue_create(capacity + 1, false); /* one more for the nudge */
+    engine->commands = queue_create(capacity + 1, false); /* the nudge needs a place of its own */
     engine->events = queue_create(engine->options.queue_capacity, true);
     if (!engine->commands || !engine->events)
         error_set(error, ERROR_OUT_OF_MEMORY, "queue_capacity", "no memory or descriptor for a queue of %zu",

@@ -28,7 +28,7 @@ struct view_wishes;
 #define ENGINE_LINGERING_SCENES 16u                     /* default of lingering_scenes */
 #define ENGINE_FRAME_WINDOW_BYTES ((uint64_t)512 << 20) /* default of frame_window_bytes */
 
-/* Those that may change while the engine runs. */
+/* Limits that may change while the engine runs. */
 struct engine_limits {
     struct scene_limits scene; /* host_bytes also limits the tables of all scenes together */
     uint64_t scene_linger_ms;  /* how long an attachable scene lingers without a holder; 0: it ends at once */
@@ -36,16 +36,16 @@ struct engine_limits {
                                   oldest; 0: default */
 };
 
-/* Who keeps attachable scenes for the next process. */
+/* Storage of attachable scenes for the next process. */
 struct engine_keeper {
     void *context;
-    /* The first two are called on a thread of their own, one after the other. read() takes from the scene, which
-     * does not change in that time, what write() writes: NULL: nothing is to be written. Both end soon once
-     * *abandoned is set; write() releases the record in any case. */
+    /* read() and write() are called on a thread of their own, one after the other. read() copies from the scene,
+     * which does not change in that time, what write() is to store; NULL: there is nothing to store. Both end soon
+     * once *abandoned is set; write() releases the record in any case. */
     void *(*read)(void *context, const struct scene *scene, uint64_t principal, enum sharing sharing,
                   const atomic_bool *abandoned);
     void (*write)(void *context, void *record, const atomic_bool *abandoned);
-    /* The scene has ended. On the same thread, after what was written before. */
+    /* The scene has ended. Called on the same thread, after earlier writes. */
     void (*forget)(void *context, uint64_t principal, const char *name);
 };
 
@@ -56,8 +56,8 @@ struct engine_options {
     unsigned encode_threads;     /* 0: one per core, at most 4 */
     size_t queue_capacity;       /* commands and events; 0: 1024 */
     uint32_t frames_in_flight;   /* per job, rendered and not yet fetched; 0: the default */
-    uint64_t frame_window_bytes; /* the same in bytes of pixels, if that means fewer frames; at least one frame; 0:
-                                    default */
+    uint64_t frame_window_bytes; /* limit of the same frames' pixels, which may allow fewer of them, but at least
+                                    one; 0: default */
     struct engine_limits limits;
     uint64_t device_bytes_limit;          /* 0: gpu_memory_default_limit() */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
@@ -80,62 +80,62 @@ struct view_depth {
 /* A job's terms; engine/shot.h makes the request and the poses of each frame from them. */
 struct engine_job {
     enum job_kind kind;
-    uint32_t scene; /* that of the command, which is the one that counts */
+    uint32_t scene; /* ignored: the command's scene counts */
     uint32_t first_frame, last_frame, frame_step;
     float frames_per_second;
     uint32_t time_origin_frame;
     struct frame_request frame; /* camera, focus and seed are filled per frame */
-    float shutter;              /* how long it is open from the frame's time on, in frames */
+    float shutter;              /* time for which it is open from the frame's time on, in frames */
     enum encoding encoding;
     unsigned quality;
     enum camera_path path;
     uint32_t camera_node;
-    struct frame_framing framing; /* of the path auto */
+    struct frame_framing framing; /* framing of the path `auto` */
     uint32_t framed_node;         /* 0: all of the scene */
-    bool has_ground;              /* frames have one, see engine/ground.h */
+    bool has_ground;              /* whether frames have a ground, see engine/ground.h */
     float ground_up_world[3];     /* not 0 */
     float orbit_turn, orbit_seconds;
     struct camera_key *keys; /* owned */
     uint32_t key_count;
     struct clip_use *clips; /* owned */
     uint32_t clip_count;
-    /* Frames that may be handed out so far, absolute. Without any, nothing is rendered or reserved. Beyond it,
-     * frames of a batch are rendered as far as frames_in_flight goes, and kept; those of a view are not begun, so
-     * that none becomes stale. */
+    /* Frames that may be handed out so far, absolute. Without credit, nothing is rendered or reserved. Beyond it,
+     * a batch renders as many frames as may be in flight and keeps them; a view begins none, so that none becomes
+     * stale. */
     uint64_t credit;
-    /* Of a view, see engine/view_wishes.h; owned: a reference. It takes the place of a view that has the same
-     * wishes, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, go on. */
+    /* A view's wishes, see engine/view_wishes.h; owned: a reference. The view replaces a view with the same
+     * wishes, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, continue. */
     struct view_wishes *wishes;
-    uint32_t upsample;     /* of a batch: layers are rendered of every how manyth frame, from time 0 on; 0: 1 */
-    uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
+    uint32_t upsample;     /* batch: distance of the frames whose layers are rendered, counted from time 0; 0: 1 */
+    uint32_t pass_samples; /* view: samples that each frame adds, up to frame.samples */
     enum encoding still_encoding;
     unsigned weight;         /* its share of the device's time among the jobs of all clients; 0: 1 */
     bool adapt;              /* view: quality and size follow the link */
-    bool keeps_rate;         /* view: what is rendered follows what it takes */
-    struct view_depth depth; /* view: of what is attached */
-    float margin;            /* view: of frames while it moves, share of width and height on each side */
-    uint32_t hidden_layers;  /* view: frames of what is hidden that follow each while it moves */
-    bool parts;              /* view: frames may come in parts, as its wishes say */
+    bool keeps_rate;         /* view: resolution and bounces follow the time of rendering */
+    struct view_depth depth; /* view: form of attached depths */
+    float margin; /* view: margin of frames while the camera moves, share of width and height on each side */
+    uint32_t hidden_layers; /* view: hidden layers that follow each frame while the camera moves */
+    bool parts;             /* view: frames may come in parts where its wishes say so */
 };
 
 enum engine_command_kind {
     ENGINE_SCENE_OPEN,
-    ENGINE_SCENE_ATTACH, /* answered by ENGINE_DONE with its revision; ENGINE_SCENE_CHANGED may follow */
-    ENGINE_SCENE_CLOSE,  /* the jobs that the client has on it fail with ERROR_CANCELLED just before the answer */
-    ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
+    ENGINE_SCENE_ATTACH,   /* answered by ENGINE_DONE with its revision; ENGINE_SCENE_CHANGED may follow */
+    ENGINE_SCENE_CLOSE,    /* the client's jobs on the scene fail with ERROR_CANCELLED just before the answer */
+    ENGINE_SCENE_LIST,     /* answered by ENGINE_SCENES_LISTED */
     ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
     ENGINE_OBJECTS_LIST,   /* answered by ENGINE_OBJECTS_LISTED */
     ENGINE_OBJECT_READ,    /* answered by ENGINE_OBJECT_IS */
     ENGINE_SCENES_TRIM,    /* ends scenes without a holder until blobs of trim_bytes are unused; no answer */
-    ENGINE_COMMIT,         /* waits for the scene's frames in progress, and so do later commands for that scene */
-    /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
-     * finished and have credit. A view has no last frame: it is done when another one takes its place. */
+    ENGINE_COMMIT, /* waits for the scene's frames in progress; later commands for that scene wait behind it */
+    /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, which follows the finished frames that
+     * have credit. A view has no last frame: it is done when another view replaces it. */
     ENGINE_JOB_START,
     ENGINE_JOB_CREDIT, /* no answer */
     ENGINE_JOB_CANCEL, /* answered by ENGINE_DONE; the job's own request fails with ERROR_CANCELLED just before */
-    ENGINE_VIEW_LOOK,  /* a view's wishes have changed; no answer */
+    ENGINE_VIEW_CHANGED, /* a view's wishes have changed: wakes the engine; no answer */
     ENGINE_STATS,
-    ENGINE_LIMITS,      /* others from now on; a scene that is open keeps its number of nodes. No answer */
+    ENGINE_LIMITS,      /* new limits; a scene that is open keeps its limit of nodes. No answer */
     ENGINE_CLIENT_GONE, /* forgets its scenes and jobs; no answer, and no event for that client comes after
                            ENGINE_CLIENT_FORGOTTEN */
 };
@@ -218,11 +218,11 @@ struct engine_scene_description {
     struct engine_clip_entry clips[ENGINE_DESCRIPTION_MAX];
 };
 
-#define ENGINE_OBJECTS_MAX 256 /* of one answer */
+#define ENGINE_OBJECTS_MAX 256 /* maximum of objects in one answer */
 
 struct engine_object_entry {
     uint32_t object;
-    uint32_t parent, shows; /* of a node */
+    uint32_t parent, shows; /* a node's parent, and the object that it shows */
     enum node_kind shows_kind;
     char name[SCENE_NAME_MAX + 1];
 };
@@ -260,27 +260,28 @@ struct engine_frame {
     size_t size_bytes;
     uint64_t digest; /* XXH3-64 of the pixels before encoding, as they came: see result.ycbcr */
     float time_s, shutter_s;
-    uint64_t encoded_ns;              /* clock_now_ns() when it was ready to be sent */
-    unsigned quality;                 /* it was encoded with; 0: lossless */
-    unsigned scale_32nds;             /* of the width and height that the job asks for; 0: all of it */
-    unsigned margin_halves_less;      /* of the job's margin, as of struct view_effort */
-    unsigned depth_less;              /* of the job's bounces, likewise */
-    uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */
-    bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
-    bool key_frame;                   /* .. and so it was */
-    size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order, .. */
-    size_t sticking_bytes;            /* .. with these behind them .. */
-    bool in_parts;                    /* .. unless it is to be encoded in parts .. */
-    struct part_list parts;           /* .. which then say what the bytes are; none: it could not be cut */
-    size_t coarse_bytes;              /* of its coarse depths, likewise of size_bytes */
-    struct view_depth depth;          /* as it is to be encoded .. */
-    float depth_step;                 /* .. and as it was: 1 / metres; 0: metres */
-    uint32_t margin_x, margin_y;      /* pixels on each side beyond what the job asks for */
-    uint32_t of_frame;                /* of request.hidden_layer above 0: which it belongs to */
-    /* Of a view: the newest of its client's wishes that it shows; all 0 before the first wish. */
+    uint64_t encoded_ns;         /* clock_now_ns() when it was ready to be sent */
+    unsigned quality;            /* quality of the encoding; 0: lossless */
+    unsigned scale_32nds;        /* share of the job's width and height; 0: all */
+    unsigned margin_halves_less; /* part of the margin that was dropped, as in struct view_effort */
+    unsigned depth_less;         /* bounces that were dropped, as in struct view_effort */
+    uint64_t wanted_bytes;       /* target size, for an encoder with rate control; 0: not known */
+    bool wants_key;              /* whether it must be encoded as a key frame .. */
+    bool key_frame;              /* .. and whether it was */
+    /* Sizes of encoded attachments, which are the end of `bytes` in this order, .. */
+    size_t depth_bytes, normal_bytes;
+    size_t sticking_bytes;       /* .. followed by these .. */
+    bool in_parts;               /* .. unless the frame is encoded in parts .. */
+    struct part_list parts;      /* .. which this list describes; empty: it could not be divided */
+    size_t coarse_bytes;         /* size of its coarse depths, a part of size_bytes */
+    struct view_depth depth;     /* requested form of depths .. */
+    float depth_step;            /* .. and the step that was used, in 1 / metres; 0: depths are metres */
+    uint32_t margin_x, margin_y; /* pixels on each side beyond what the job asks for */
+    uint32_t of_frame;           /* request.hidden_layer above 0: the frame to which the layer belongs */
+    /* The latest camera command that a view's frame shows, and its arrival; 0 before the first. */
     uint64_t command, received_ns;
     bool moving;
-    uint64_t applied_ns, rendered_ns; /* clock_now_ns() when it began, and when it was read back */
+    uint64_t applied_ns, rendered_ns; /* clock_now_ns() at its begin, and when it was read back */
 };
 
 struct engine_event {
@@ -296,14 +297,14 @@ struct engine_event {
     struct engine_scene_description *description;
     struct engine_object_list *objects;
     struct scene_edit *object;
-    struct job_output *output; /* private to job/ */
+    struct job_output *output; /* private to engine/ */
 };
 void engine_event_destroy(struct engine_event *event); /* accepts NULL */
 void engine_stats_destroy(struct engine_stats *stats); /* accepts NULL */
 
 /* Starts the threads; the device is opened before it returns, so that a missing GPU is an error here. */
 struct engine *engine_create(const struct engine_options *options, struct error *error);
-/* Stops after the current slice; waiting commands are dropped. Accepts NULL. */
+/* Stops after the current slice and drops waiting commands. Accepts NULL. */
 void engine_destroy(struct engine *engine);
 const struct gpu_device_info *engine_device(const struct engine *engine);
 /* The limit of device memory, 0: none. For the creator of the engine, right after its creation. */

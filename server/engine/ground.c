@@ -3,13 +3,13 @@
 
 #include <math.h>
 
-/* At which the lowest point is looked for. What dips below it in between is shown all the same, and hides the
- * ground. */
+/* Number of times at which the lowest point is searched. Geometry that dips below it in between is shown, and
+ * hides the ground. */
 #define TIMES 17
-/* In diagonals of the scene: a sun 1 degree above the horizon throws shadows 57 times as long as things are high.
- */
+/* Radius in diagonals of the scene: a sun 1 degree above the horizon casts shadows 57 times as long as things are
+ * high. */
 #define RADIUS 64.0
-/* The same: so far below the lowest point that a floor of the model's own lies on it, and no ray can tell. */
+/* Distance below the lowest point, in diagonals: a floor of the model's own lies on it, and no ray can tell. */
 #define DEPTH (1.0 / 8192.0)
 
 static double job_end_s(const struct engine_job *job, const struct scene *scene)
@@ -21,9 +21,9 @@ static double job_end_s(const struct engine_job *job, const struct scene *scene)
     return end_s;
 }
 
-/* How far the scene reaches along `down` at a time of the job, if that is farther than `reach`. */
-static bool look_at(const struct engine_job *job, const struct scene *scene, double time_s,
-                    const double down[1][3], double *reach, struct error *error)
+/* Extends `reach` to the scene's extent along `down` at a time of the job. */
+static bool extend_reach(const struct engine_job *job, const struct scene *scene, double time_s,
+                         const double down[1][3], double *reach, struct error *error)
 {
     struct scene_pose pose;
     double support;
@@ -48,7 +48,8 @@ static bool find(const struct engine_job *job, const struct scene *scene, struct
     for (int axis = 0; axis < 3; axis++)
         down[0][axis] = -(double)up[axis] / length;
     for (uint32_t i = 0; i < times; i++)
-        if (!look_at(job, scene, job_end_s(job, scene) * i / (times > 1 ? times - 1 : 1), down, &reach, error))
+        if (!extend_reach(job, scene, job_end_s(job, scene) * i / (times > 1 ? times - 1 : 1), down, &reach,
+                          error))
             return false;
     if (!isfinite(reach) || !scene_bounds(scene, NULL, lower, upper))
         return true;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What may be spent on pictures of what others hide: a share of the time that passes while a view moves. They are
- * made for a picture when as much is saved as they took the last time. Pure: the caller has the clock. */
+/* Budget for hidden layers: a share of the time that passes while a view moves. A picture gets its layers when the
+ * budget holds as much as they took the last time. Pure: the caller has the clock. */
 #ifndef FARLIGHT_ENGINE_HIDDEN_BUDGET_H
 #define FARLIGHT_ENGINE_HIDDEN_BUDGET_H
 
@@ -9,16 +9,18 @@
 
 #define HIDDEN_SHARE_PERCENT 15u
 
-/* All-zero: nothing is known, and the first ones, which may have programs to compile, are made in spare time. */
+/* All-zero: nothing is known, and the first layers, which may have programs to compile, are rendered in spare
+ * time. */
 struct hidden_budget {
-    int64_t saved_ns; /* below 0: they took longer than was thought */
-    uint64_t cost_ns; /* of those of one picture */
+    int64_t saved_ns; /* below 0: layers took longer than expected */
+    uint64_t cost_ns; /* cost of one picture's layers */
 };
 
-/* Between the beginnings of two pictures. */
+/* Adds the share of the time that passed between the begins of two pictures. */
 void hidden_budget_earn(struct hidden_budget *budget, uint64_t passed_ns);
 bool hidden_budget_suffices(const struct hidden_budget *budget);
-/* All those of a picture were made. `spare`: in time that nothing else needed. */
+/* Subtracts the cost of a picture's layers, all of which are rendered. `spare`: in time that nothing else needed,
+ * so it is not charged. */
 void hidden_budget_spend(struct hidden_budget *budget, uint64_t cost_ns, bool spare);
 
 #endif

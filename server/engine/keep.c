@@ -21,12 +21,12 @@ struct keep {
     void (*on_change)(void *context);
     void *context;
     atomic_bool abandoned;
-    pthread_mutex_t lock; /* of what follows */
+    pthread_mutex_t lock; /* guards the members below */
     pthread_cond_t changed;
     struct order *first, **end;
-    bool was_read; /* and the caller does not know yet */
+    bool was_read; /* whether the caller must still be notified */
     uint64_t read_ns;
-    size_t left; /* orders that are not carried out */
+    size_t left; /* orders not yet carried out */
     bool closed;
     pthread_t thread;
     bool started; /* the owner's */

@@ -4,10 +4,12 @@
 
 #include "base/clock.h"
 
-/* Between two times that a scene is kept: at least this, and this many times as long as its changes waited. */
+/* Minimum time between two saves of a scene, and its multiple of the time for which changes waited during the last
+ * one. */
 #define PAUSE_NS UINT64_C(1000000000)
 #define PAUSE_OF_READ 20
-/* At the end, for changes that clients were told are made: a daemon that is told to stop ends within a second. */
+/* Time for saves at the end, since clients were told that their changes are made: a daemon that is told to stop
+ * ends within a second. */
 #define STOP_NS UINT64_C(800000000)
 
 static bool has_news(const struct engine_scene *scene)
@@ -19,12 +21,12 @@ static void keep_scene(struct engine *engine, struct engine_scene *scene, uint64
 {
     scene->keep_due_ns = now_ns + PAUSE_NS;
     if (!keep_save(engine->keep, scene->scene, scene->principal, scene->sharing))
-        return; /* later, perhaps */
+        return; /* tried again later */
     scene->kept_revision = scene->known.revision;
     engine->read_scene = scene;
 }
 
-/* The scene that was read may change again, and end. */
+/* Lets the scene that was read change again, or end. */
 static void finish_reading(struct engine *engine)
 {
     uint64_t read_ns;
@@ -53,12 +55,12 @@ uint64_t engine_keep_scenes(struct engine *engine)
         if (!has_news(scene))
             continue;
         if (!scene->keep_due_ns)
-            scene->keep_due_ns = now_ns + PAUSE_NS; /* who loads a scene goes on, perhaps */
+            scene->keep_due_ns = now_ns + PAUSE_NS; /* a client that loads a scene probably continues */
         if (!first || scene->keep_due_ns < first->keep_due_ns)
             first = scene;
     }
     if (!first || engine->read_scene || !keep_is_idle(engine->keep))
-        return UINT64_MAX; /* the end of what it does wakes this thread */
+        return UINT64_MAX; /* the keeper wakes this thread when it is done */
     if (first->keep_due_ns <= now_ns)
         keep_scene(engine, first, now_ns);
     return first->keep_due_ns - now_ns;
@@ -66,7 +68,7 @@ uint64_t engine_keep_scenes(struct engine *engine)
 
 void engine_forget_kept(struct engine *engine, const struct engine_scene *scene)
 {
-    /* What could not be restored is for the keeper to decide. */
+    /* A scene that could not be restored stays with the keeper, which decides on it. */
     if (engine->keep && scene->kept_revision && scene->known.revision >= scene->kept_revision)
         keep_forget(engine->keep, scene->principal, scene->scene->name);
 }

@@ -12,14 +12,14 @@ static bool has_frame(const struct engine *engine)
     return has;
 }
 
-bool engine_make_room(struct engine *engine, struct job *job)
+bool engine_free_memory(struct engine *engine, struct job *job)
 {
     if (!job->evicted && engine_evict_idle(engine, job)) {
         job->evicted = true;
         log_write(LOG_INFO, "engine", "evicted idle structures from device memory for a frame");
         return true;
     }
-    job->evicted = false; /* what is in use now may be idle by then */
+    job->evicted = false; /* structures in use now may be idle at the next failure */
     if (!has_frame(engine))
         return false;
     engine->needs_memory = job;

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LOOKS_MAX 65536u /* objects that one answer looks at: a millisecond or two */
+#define VISITS_MAX 65536u /* objects that one answer visits at: a millisecond or two */
 
 static void add(struct engine_object_list *list, enum object_kind kind, const struct scene_object *object)
 {
@@ -20,13 +20,13 @@ static void add(struct engine_object_list *list, enum object_kind kind, const st
     entry->shows = node->value.object;
 }
 
-/* A cursor is the number of objects in front, so that a whole list costs no more than one look at each object. */
+/* The cursor is the number of objects before it, so a whole list visits each object once. */
 static void list_from(struct engine_object_list *list, const struct hashmap *objects,
                       const struct engine_command *command)
 {
     size_t cursor = command->list_from;
     void *object = NULL;
-    for (size_t looks = 0; looks < LOOKS_MAX && list->count < ENGINE_OBJECTS_MAX; looks++) {
+    for (size_t visits = 0; visits < VISITS_MAX && list->count < ENGINE_OBJECTS_MAX; visits++) {
         if (!hashmap_next(objects, &cursor, NULL, &object))
             return;
         if (!command->name[0] || strcmp(((const struct scene_object *)object)->name, command->name) == 0)

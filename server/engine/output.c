@@ -93,7 +93,7 @@ static void close_locked(struct job_output *output, struct engine_event *final)
     drop_waiting(output);
 }
 
-/* Pushes all that may go out now. */
+/* Pushes every event that may go out now. */
 static void advance_locked(struct job_output *output)
 {
     while (!atomic_load(&output->closed)) {

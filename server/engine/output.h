@@ -26,25 +26,25 @@ void job_output_unref(struct job_output *output); /* accepts NULL */
 
 /* Reserves a place for one more frame; false: `window` frames are not fetched yet. One thread only. */
 bool job_output_has_room(const struct job_output *output);
-/* Whether the client wants any frame at all. */
+/* Whether the client has given any credit. */
 bool job_output_has_credit(const struct job_output *output);
 /* Takes that place; the number is the frame's position in the output. */
 uint64_t job_output_reserve(struct job_output *output);
 /* Adds the frame, or its error, for a reserved place. Takes over the event and fills in its client and request. */
 void job_output_put(struct job_output *output, uint64_t position, struct engine_event *event);
-/* Frames whose place is reserved and that are not put there: those in the hands of the encoders. */
+/* Frames whose place is reserved and that are not put there yet: the encoders have them. */
 uint32_t job_output_unfinished(const struct job_output *output);
-/* How long the last one took to encode; 0: none has been. */
+/* Time that the last frame took to encode; 0: none has been encoded. */
 uint64_t job_output_encode_ns(const struct job_output *output);
 void job_output_credit(struct job_output *output, uint64_t credit);
 /* The final event. `done` comes after the last frame; `failed` after the frames that credit lets out. */
 void job_output_finish(struct job_output *output, struct engine_event *final);
-/* Nothing comes any more but `final` (NULL: not even that), at once. False: it was closed already, and `final` is
+/* Closes the output with `final` at once (NULL: without an event). False: it was closed already, and `final` is
  * dropped. */
 bool job_output_close(struct job_output *output, struct engine_event *final);
 bool job_output_is_closed(const struct job_output *output);
 uint64_t job_output_client(const struct job_output *output);
-/* A frame left the event queue. */
+/* Notes that a frame has left the event queue. */
 void job_output_taken(struct job_output *output);
 
 /* An event of that kind; NULL: out of memory. */

@@ -49,7 +49,7 @@ static bool reference_add(struct engine *engine, struct engine_scene *scene, con
     return true;
 }
 
-/* Its jobs have ended, nothing that came by it waits. */
+/* Removes a reference whose jobs have ended and by which no command waits. */
 static void reference_remove(struct engine *engine, struct engine_reference *reference)
 {
     struct engine_reference **place = &reference->scene->references;
@@ -77,7 +77,7 @@ void engine_scene_close(struct engine *engine, struct engine_reference *referenc
 {
     struct engine_command *waiting;
     engine_abort_jobs(engine, reference, "its scene was closed");
-    /* Only where memory was short does anything wait still. */
+    /* Commands still wait only where memory was short. */
     while ((waiting = engine_take_waiting(reference->scene, reference))) {
         engine_post(engine, engine_cancelled(waiting->client, waiting->request, "its scene was closed"));
         engine_command_destroy(waiting);
@@ -116,7 +116,7 @@ bool engine_scene_may_change(const struct engine *engine, const struct engine_sc
     return !scene->frames && !scene->commit && engine->read_scene != scene;
 }
 
-/* Jobs have ended, nothing waits. */
+/* Frees a scene whose jobs have ended and for which nothing waits. */
 void engine_scene_free(struct engine *engine, struct engine_scene *scene)
 {
     scene_drop_shared(engine, scene);
@@ -127,7 +127,7 @@ void engine_scene_free(struct engine *engine, struct engine_scene *scene)
     free(scene);
 }
 
-/* A scene without a holder. */
+/* Ends a scene without a holder. */
 static void scene_end(struct engine *engine, struct engine_scene *scene)
 {
     bool lingered = scene->sharing != SHARING_PRIVATE;
@@ -154,13 +154,13 @@ static uint64_t lingers_until_ns(const struct engine *engine, const struct engin
     return scene->left_ns + engine->options.limits.scene_linger_ms * UINT64_C(1000000);
 }
 
-/* Nobody holds it, and nothing changes it any more. */
+/* Whether nobody holds the scene and no other thread changes it. */
 static bool is_left(const struct engine_scene *scene)
 {
     return !scene->references && !scene->commit;
 }
 
-/* The one that has lingered longest; NULL: there is none. */
+/* Scene that has lingered longest; NULL: there is none. */
 static struct engine_scene *first_to_go(const struct engine *engine, bool restored_too)
 {
     struct engine_scene *first = NULL;
@@ -171,7 +171,8 @@ static struct engine_scene *first_to_go(const struct engine *engine, bool restor
     return first;
 }
 
-/* Ends those whose time has passed. Of the rest: how many count against the limit, and when the next one ends. */
+/* Ends the scenes whose time has passed. Returns how many of the rest count against the limit; *wait_ns: time
+ * until the next one ends. */
 static size_t end_overdue(struct engine *engine, uint64_t *wait_ns)
 {
     uint64_t now_ns = clock_now_ns();
@@ -224,7 +225,7 @@ void engine_trim_tables(struct engine *engine)
         scene_end(engine, scene);
 }
 
-/* An upper bound: other scenes may use them too. */
+/* Upper bound of the blobs' bytes: other scenes may use them too. */
 static uint64_t blob_bytes_of(const struct engine_scene *scene)
 {
     return scene->known.host_bytes - scene->known.table_bytes;
@@ -244,7 +245,7 @@ void engine_trim_blobs(struct engine *engine, uint64_t bytes)
     }
 }
 
-/* ---- coming to a scene -------------------------------------------------------------------------- */
+/* ---- attaching to a scene ----------------------------------------------------------------------- */
 
 /* The scene of that name, the client's own kept one before a shared one; NULL: none. */
 static struct engine_scene *find_by_name(const struct engine *engine, const struct engine_command *command)
@@ -367,7 +368,7 @@ void engine_scene_changed(struct engine *engine, const struct engine_scene *scen
     for (const struct engine_reference *one = scene->references; one; one = one->next) {
         struct engine_event *event = one == by ? NULL : event_create(ENGINE_SCENE_CHANGED, one->client->client, 0);
         if (!event)
-            continue; /* without memory, the next change tells of this one, too */
+            continue; /* lacking memory, the notice of the next change will do for this one too */
         event->scene = one->id;
         event->revision = scene->known.revision;
         engine_post(engine, event);

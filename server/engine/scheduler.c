@@ -11,8 +11,8 @@ static uint64_t turn_ns(uint32_t ready_count)
     return SCHEDULE_TURN_NS + ready_count * (uint64_t)SCHEDULE_TURN_EACH_NS;
 }
 
-/* How far an entry may be beyond the minimum. It does not shorten turns, or entries with long ones would get more.
- */
+/* Maximum distance of an entry above the minimum. It does not shorten turns, or entries with long ones would get
+ * more. */
 static uint64_t debt_max_ns(uint32_t ready_count)
 {
     uint64_t waited_ns = SCHEDULE_WAIT_MAX_NS / ready_count, two_turns_ns = 2 * turn_ns(ready_count);
@@ -31,8 +31,8 @@ static bool was_ready(const struct scheduler *scheduler, const struct schedule_s
 }
 
 /* Entries that were ready and still are define the group's time. */
-static void group_look(struct schedule_group *group, const struct scheduler *scheduler,
-                       const struct schedule_share *share)
+static void group_add(struct schedule_group *group, const struct scheduler *scheduler,
+                      const struct schedule_share *share)
 {
     if (share->ready && was_ready(scheduler, share))
         group->next_ns = at_most(group->next_ns, share->virtual_ns);
@@ -44,7 +44,7 @@ static void group_advance(struct schedule_group *group)
         group->min_ns = group->next_ns;
 }
 
-/* Called more than once for a client with several jobs. */
+/* Settles a share for this pick; a client with several jobs is settled once. */
 static void share_settle(struct schedule_share *share, const struct scheduler *scheduler,
                          const struct schedule_group *group)
 {
@@ -70,7 +70,7 @@ static void begin(struct scheduler *scheduler, const struct schedule_entry *entr
     }
 }
 
-static void look(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
+static void mark_ready(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
         struct schedule_client *client = entries[i].client;
@@ -78,10 +78,10 @@ static void look(struct scheduler *scheduler, const struct schedule_entry *entri
         client->jobs.ready_count += entries[i].ready;
         client->share.ready |= entries[i].ready;
         entries[i].job->ready = entries[i].ready;
-        group_look(&client->jobs, scheduler, entries[i].job);
+        group_add(&client->jobs, scheduler, entries[i].job);
     }
     for (size_t i = 0; i < count; i++)
-        group_look(&scheduler->clients, scheduler, &entries[i].client->share);
+        group_add(&scheduler->clients, scheduler, &entries[i].client->share);
 }
 
 static bool entry_goes_before(const struct schedule_entry *a, const struct schedule_entry *b)
@@ -95,7 +95,7 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
     size_t best = SCHEDULE_NONE;
     scheduler->picks++;
     begin(scheduler, entries, count);
-    look(scheduler, entries, count);
+    mark_ready(scheduler, entries, count);
     group_advance(&scheduler->clients);
     for (size_t i = 0; i < count; i++) {
         const struct schedule_entry *entry = &entries[i];

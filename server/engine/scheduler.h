@@ -39,7 +39,7 @@ struct schedule_group {
 
 struct schedule_client {
     struct schedule_share share;
-    uint64_t mean_ns; /* of its slices, the last ones most */
+    uint64_t mean_ns; /* mean length of its slices, the last ones weighted most */
     struct schedule_group jobs;
 };
 
@@ -50,7 +50,7 @@ struct scheduler {
 };
 
 struct schedule_entry {
-    struct schedule_client *client; /* the same one of several jobs */
+    struct schedule_client *client; /* several jobs share one */
     struct schedule_share *job;
     bool ready;
 };

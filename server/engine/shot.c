@@ -11,7 +11,7 @@
 #define SHUTTER_MAX_S 1e6
 #define EXPOSURE_MAX_STOPS 64.0f
 
-/* The same for frame 0 as for the job; for others another noise. */
+/* Seed of a frame: the job's for frame 0, and different noise for each other frame. */
 static uint64_t shot_seed(uint64_t job_seed, uint32_t frame)
 {
     /* The finaliser of MurmurHash3 (Appleby): one to one, and 0 for 0. */
@@ -57,7 +57,7 @@ static bool motion_make(struct shot *shot, const struct engine_job *job, const s
     return error_set(error, local.kind, field, "%s", local.text);
 }
 
-/* The shutter and where things are while it is open. */
+/* Begins a shot with the shutter and the poses while it is open. */
 static bool shot_begin(struct shot *shot, const struct engine_job *job, const struct scene *scene, double time_s,
                        struct error *error)
 {
@@ -66,7 +66,7 @@ static bool shot_begin(struct shot *shot, const struct engine_job *job, const st
     return motion_make(shot, job, scene, time_s, error);
 }
 
-/* What a picture does not need is not made of layers: one sharp view from where it is rendered. */
+/* Layers are not used where a picture does not need them: one sharp view from where it is rendered. */
 static void set_source(struct frame_request *request)
 {
     if (!frame_has_views(request) && !(request->aperture > 0.0f) && !request->has_key)
@@ -82,9 +82,10 @@ static bool check_time(uint32_t frame, double time_s, struct error *error)
     return error_remedy(error, "use more frames a second, or smaller frame numbers");
 }
 
-/* A camera that there is none of at that time stands still. */
-static void look_beside(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
-                        double time_s, struct animation_bounds *bounds, struct frame_camera *camera)
+/* Camera at a neighbouring time; where there is none, it stays where it is. */
+static void neighbour_camera(const struct engine_job *job, const struct scene *scene,
+                             const struct scene_pose *pose, double time_s, struct animation_bounds *bounds,
+                             struct frame_camera *camera)
 {
     struct animation_view view;
     struct error none = {0};
@@ -92,8 +93,8 @@ static void look_beside(const struct engine_job *job, const struct scene *scene,
         *camera = view.camera;
 }
 
-/* Where things and the camera are a frame earlier and a frame later. The first frame has one before it, too, and
- * the last one after it: where motions go on, vectors do. */
+/* Adds poses and cameras of a frame earlier and a frame later. The first frame has one before it too, and the last
+ * one after it: motion vectors continue where motions do. */
 static bool add_neighbours(struct shot *shot, const struct engine_job *job, const struct scene *scene,
                            double time_s, struct animation_bounds *bounds, struct error *error)
 {
@@ -108,13 +109,14 @@ static bool add_neighbours(struct shot *shot, const struct engine_job *job, cons
     request->has_neighbours = true;
     request->clips_time_s = job->clip_count ? time_s : 0.0;
     request->camera_earlier = request->camera_later = request->camera;
-    look_beside(job, scene, job->clip_count ? &motion->earlier : NULL, times_s[0], bounds,
-                &request->camera_earlier);
-    look_beside(job, scene, job->clip_count ? &motion->later : NULL, times_s[1], bounds, &request->camera_later);
+    neighbour_camera(job, scene, job->clip_count ? &motion->earlier : NULL, times_s[0], bounds,
+                     &request->camera_earlier);
+    neighbour_camera(job, scene, job->clip_count ? &motion->later : NULL, times_s[1], bounds,
+                     &request->camera_later);
     return true;
 }
 
-/* A frame that is rendered. */
+/* A frame without a key frame for its layers. */
 static bool make_alone(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
                        struct animation_bounds *bounds, struct error *error)
 {
@@ -145,7 +147,7 @@ static bool make_alone(struct shot *shot, const struct engine_job *job, const st
 uint32_t shot_key_frame(const struct engine_job *job, uint32_t frame)
 {
     const int64_t every = job->upsample > 1 ? job->upsample : 1, origin = job->time_origin_frame;
-    const int64_t below = (((int64_t)frame - origin) % every + every) % every; /* from the last one on */
+    const int64_t below = (((int64_t)frame - origin) % every + every) % every; /* distance to the key before */
     const bool is_next = 2 * below > every || below > (int64_t)frame;          /* there is no frame below 0 */
     return (uint32_t)((int64_t)frame - below + (is_next ? every : 0));
 }
@@ -175,8 +177,8 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
     return true;
 }
 
-/* Where the view looks from is its client's word, whatever the clips say of the job's camera. */
-static bool look_from_key(const struct camera_key *key, struct animation_view *view, struct error *error)
+/* The client's key sets the view's camera, whatever the clips say of the job's camera. */
+static bool view_from_key(const struct camera_key *key, struct animation_view *view, struct error *error)
 {
     if (!animation_key_camera(key, "view_camera.up_world", &view->camera, error))
         return false;
@@ -184,10 +186,10 @@ static bool look_from_key(const struct camera_key *key, struct animation_view *v
     return true;
 }
 
-/* As a job along that node's path would, at that time. */
-static bool look_through_node(const struct engine_job *job, const struct scene *scene,
-                              const struct scene_pose *pose, const struct view_camera *from,
-                              struct animation_bounds *bounds, struct animation_view *view, struct error *error)
+/* Camera of that node at that time, as a job along the path `node` would have it. */
+static bool view_from_node(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
+                           const struct view_camera *from, struct animation_bounds *bounds,
+                           struct animation_view *view, struct error *error)
 {
     struct engine_job along = *job;
     along.path = CAMERA_NODE;
@@ -198,16 +200,16 @@ static bool look_through_node(const struct engine_job *job, const struct scene *
     return error_set(error, local.kind, "view_camera.node", "%s", local.text);
 }
 
-bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
-               const struct view_camera *from, struct animation_bounds *bounds, struct error *error)
+bool shot_make_at(struct shot *shot, const struct engine_job *job, const struct scene *scene,
+                  const struct view_camera *from, struct animation_bounds *bounds, struct error *error)
 {
     static const struct pose_view nothing = {0};
     if (!shot_begin(shot, job, scene, (double)from->key.time_s, error))
         return false;
     const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
     struct animation_view view = {0};
-    if (!(from->node ? look_through_node(job, scene, pose, from, bounds, &view, error)
-                     : look_from_key(&from->key, &view, error)) ||
+    if (!(from->node ? view_from_node(job, scene, pose, from, bounds, &view, error)
+                     : view_from_key(&from->key, &view, error)) ||
         !ground_place(job, scene, bounds, &shot->request.ground, error)) {
         shot_finish(shot);
         return false;

@@ -13,18 +13,18 @@ struct shot {
     float time_s, shutter_s;
 };
 
-/* The frame that `frame` is made from where layers of only every how manyth are rendered; itself, if its are. It
- * follows from the two numbers alone: a range may begin, and be divided, anywhere. */
+/* Key frame for `frame`, from whose layers it is made; the frame itself where it is rendered. It follows from the
+ * two numbers alone: a range may begin, and be divided, anywhere. */
 uint32_t shot_key_frame(const struct engine_job *job, uint32_t frame);
 /* `bounds` may be kept from frame to frame, or NULL. On failure there is nothing to finish. */
 bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
                struct animation_bounds *bounds, struct error *error);
-/* The same, with the camera and the time of `from` in place of the job's. Noise is the job's own, so that one
+/* Makes a shot with the camera and the time of `from` in place of the job's. Noise is the job's own, so that one
  * camera position gives one picture. */
-bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
-               const struct view_camera *from, struct animation_bounds *bounds, struct error *error);
+bool shot_make_at(struct shot *shot, const struct engine_job *job, const struct scene *scene,
+                  const struct view_camera *from, struct animation_bounds *bounds, struct error *error);
 void shot_finish(struct shot *shot);
-/* Whether a job can begin: checks what does not depend on the frame, and the first frame. `bounds` may be NULL. */
+/* Whether a job can begin: checks the job's terms and its first frame. `bounds` may be NULL. */
 bool shot_check(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
                 struct error *error);
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Statistics of the engine and its scenes, collected for one client. */
 #include "engine/engine_private.h"
 
 #include <stdlib.h>
@@ -23,7 +24,7 @@ static void describe_scene(struct engine_scene *from, uint64_t principal, struct
     memcpy(stat->name, scene->name, sizeof(stat->name));
 }
 
-/* Each job is looked at once, however many scenes there are. */
+/* Visits each job once, however many scenes there are. */
 static void add_device_bytes(const struct engine *engine, struct engine_stats *stats)
 {
     uint32_t i = 0;

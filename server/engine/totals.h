@@ -15,7 +15,7 @@ struct stage_totals {
 };
 
 void stage_totals_add(struct stage_totals *totals, enum stage stage, enum clock clock, uint64_t duration_ns);
-/* All spans of a frame. */
+/* Adds every span of a frame. */
 void stage_totals_add_times(struct stage_totals *totals, const struct stage_times *times);
 
 #endif

@@ -12,10 +12,10 @@
 #include <math.h>
 
 #define SECOND_NS 1e9
-/* How long before the encoder is expected to be free a frame is finished: it is hardly older for that, and an
- * encoder that is faster than last time need not wait. */
+/* Time by which a frame is finished before the encoder is expected to be free: the frame is hardly older for that,
+ * and an encoder that is faster than last time need not wait. */
 #define EARLY_NS UINT64_C(500000)
-/* No camera for so long: motion is about to end, and nobody waits while hidden layers are rendered. */
+/* Time without a new camera after which motion is about to end, so hidden layers delay nobody. */
 #define HIDDEN_IDLE_NS UINT64_C(100000000)
 
 void view_follow(struct job *job, const struct job *before)
@@ -27,17 +27,17 @@ void view_follow(struct job *job, const struct job *before)
     job->view.begun_ns = before->view.begun_ns;
 }
 
-/* One frame has all the samples that are wanted: it is rendered like one of a batch. */
+/* Whether frames accumulate samples; if one frame has all of them, it is rendered like a batch's. */
 static bool adds_up(const struct job *job)
 {
     return job->spec.frame.samples > job->spec.pass_samples;
 }
 
-/* Something was wished, or changed, that no frame shows. */
+/* Whether the wishes or the scene have changed since the last frame. */
 static bool has_news(const struct job *job, const struct view_wish *wish)
 {
     const struct view *view = &job->view;
-    /* A key frame that could not be finished is wished still. */
+    /* A key frame that could not be finished is still requested. */
     bool key_frame = wish->key_frame || view->wish.key_frame;
     return !view->shown || wish->camera.command != view->shown_command || key_frame ||
            job->scene->known.revision != view->shown_revision;
@@ -45,11 +45,11 @@ static bool has_news(const struct job *job, const struct view_wish *wish)
 
 bool view_has_news(const struct job *job)
 {
-    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    struct view_wish wish = view_wishes_latest(job->spec.wishes);
     return has_news(job, &wish);
 }
 
-/* Whether what is hidden in the last picture is to be shown before another one is. */
+/* Whether a hidden layer of the last picture comes before the next picture. */
 static bool has_hidden(const struct job *job, const struct view_wish *wish)
 {
     const struct view *view = &job->view;
@@ -57,7 +57,7 @@ static bool has_hidden(const struct job *job, const struct view_wish *wish)
            (view->hidden_is_paid || !has_news(job, wish));
 }
 
-/* Of the layers of a picture the second comes just behind the first. */
+/* Only a picture's first layer waits for a pause; the second follows it at once. */
 static uint64_t hidden_due_ns(const struct view *view)
 {
     return view->hidden_is_paid || view->hidden_layer > 1 ? 0 : view->rendered_ns + HIDDEN_IDLE_NS;
@@ -69,14 +69,14 @@ static bool may_refine(const struct job *job)
     return view->shown && !view->shown_moving && view->held_samples < job->spec.frame.samples;
 }
 
-/* When a frame may be begun so that it need not wait to be encoded: each is encoded while the next one is
- * rendered, but one that came early would only be older when it is seen. */
+/* Begin of a frame that need not wait to be encoded: each is encoded while the next one is rendered, and one that
+ * came early would only be older when it is shown. */
 static uint64_t encoder_due_ns(const struct job *job)
 {
     const struct view *view = &job->view;
     uint32_t unfinished = job_output_unfinished(job->output);
     if (unfinished != 1)
-        return unfinished ? UINT64_MAX : 0; /* the engine is told of each that is encoded */
+        return unfinished ? UINT64_MAX : 0; /* the pool notifies the engine of each encoded frame */
     uint64_t free_ns = view->rendered_ns + job_output_encode_ns(job->output);
     uint64_t before_ns = view->render_ns + EARLY_NS;
     return free_ns > before_ns ? free_ns - before_ns : 0;
@@ -84,8 +84,8 @@ static uint64_t encoder_due_ns(const struct job *job)
 
 uint64_t view_due_ns(const struct job *job)
 {
-    /* Seen in any case, or the engine would not be told of the next wish. */
-    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    /* Always read: the engine is notified of the next wish only after it has read the last. */
+    struct view_wish wish = view_wishes_latest(job->spec.wishes);
     const bool hidden = has_hidden(job, &wish);
     if (job->view.made >= job->view.credit || !(hidden || has_news(job, &wish) || may_refine(job)))
         return UINT64_MAX;
@@ -102,7 +102,7 @@ static void set_due(struct job *job)
     job->view.due_ns = due_ns > job->begin_ns ? due_ns : job->begin_ns + period_ns;
 }
 
-/* While it moves. */
+/* Whether frames follow the link or the rate, which they do while the camera moves. */
 static bool adapts(const struct job *job)
 {
     return (job->spec.adapt || job->spec.keeps_rate) && job->view.wish.camera.moving;
@@ -118,8 +118,8 @@ static uint32_t samples_of_next(const struct job *job)
     return limited ? view->wish.effort.samples : wanted;
 }
 
-/* A frame while it moves, and the first ones at rest, have what frames before them show of the same places; one
- * that has all its samples is that of any other way there. */
+/* Frames while the camera moves, and the first ones at rest, reuse earlier frames of the same places; a frame that
+ * has all its samples does not depend on how the camera came there. */
 static enum frame_history history_of(const struct job *job, uint32_t samples)
 {
     const struct view *view = &job->view;
@@ -129,14 +129,14 @@ static enum frame_history history_of(const struct job *job, uint32_t samples)
     return held < job->spec.frame.samples ? HISTORY_USED : HISTORY_KEPT;
 }
 
-/* That it goes without. */
+/* Bounces dropped so that the frame meets its deadline. */
 static uint32_t depth_less(const struct job *job)
 {
     const uint32_t less = adapts(job) ? job->view.wish.effort.depth_less : 0;
     return less < job->spec.frame.depth ? less : job->spec.frame.depth;
 }
 
-/* Smaller and with fewer bounces while it moves, if the rate requires it. */
+/* Reduces resolution and bounces while the camera moves, if the rate requires it. */
 static void apply_effort(const struct job *job, struct frame_request *request)
 {
     const struct view_wish *wish = &job->view.wish;
@@ -151,7 +151,7 @@ static void apply_effort(const struct job *job, struct frame_request *request)
     request->height = down * (height * scale >= 32 ? height * scale / 32 : 1);
 }
 
-/* The camera's view for a picture that is so many times as high, in pixels of the same size. */
+/* Widens the camera's view for a picture `growth` times as high; pixels keep their size. */
 static void widen(struct frame_camera *camera, float growth)
 {
     camera->fov_y = 2.0f * atanf(growth * tanf(camera->fov_y / 2.0f));
@@ -164,7 +164,8 @@ static float margin_share(const struct job *job)
     return halves_less < 2 ? job->spec.margin * (float)(2 - halves_less) / 2.0f : 0.0f;
 }
 
-/* While it moves a client that makes views of its own makes all eyes of the one in the middle. */
+/* While the camera moves, only the middle view is rendered for a client that makes views of its own: it makes the
+ * others from it. */
 static void choose_eyes(const struct job *job, struct frame_request *request)
 {
     if (!(job->spec.margin > 0.0f) || !frame_has_views(request))
@@ -180,7 +181,7 @@ static void choose_eyes(const struct job *job, struct frame_request *request)
     request->view_source = VIEW_SOURCE_RAYS;
 }
 
-/* While it moves: so that a client has something to show beside the edges of the picture. */
+/* Adds a margin while the camera moves, so that the client has something to show beyond the picture's edges. */
 static void add_margin(struct job *job, struct frame_request *request)
 {
     struct view *view = &job->view;
@@ -194,8 +195,8 @@ static void add_margin(struct job *job, struct frame_request *request)
     request->height += 2 * view->margin_y;
 }
 
-/* What is hidden is mostly seen in narrow strips: one pixel for two by two of the picture costs a fifth, and views
- * made from it are hardly worse. */
+/* Hidden layers have half the resolution: they are mostly seen in narrow strips, cost a fifth in this way, and
+ * views made from them are hardly worse. */
 static void halve(struct view *view, struct frame_request *request)
 {
     const uint32_t height = (request->height + 1) / 2;
@@ -206,12 +207,12 @@ static void halve(struct view *view, struct frame_request *request)
     view->margin_y /= 2;
 }
 
-/* By the camera of the last picture. */
-static bool take_up_hidden(struct job *job, struct shot *shot, struct error *error)
+/* Begins a hidden layer, with the camera of the last picture. */
+static bool begin_hidden_frame(struct job *job, struct shot *shot, struct error *error)
 {
     struct view *view = &job->view;
     struct frame_request *request = &shot->request;
-    if (!shot_look(shot, &job->spec, job->scene->scene, &view->wish.camera, &job->bounds, error))
+    if (!shot_make_at(shot, &job->spec, job->scene->scene, &view->wish.camera, &job->bounds, error))
         return false;
     view->refining = false;
     request->seed = job->spec.frame.seed;
@@ -227,27 +228,27 @@ static bool take_up_hidden(struct job *job, struct shot *shot, struct error *err
     return true;
 }
 
-bool view_take_up(struct job *job, struct shot *shot, struct error *error)
+bool view_begin_frame(struct job *job, struct shot *shot, struct error *error)
 {
     struct view *view = &job->view;
     const struct scene *scene = job->scene->scene;
-    const struct view_wish seen = view_wishes_see(job->spec.wishes);
-    if (has_hidden(job, &seen))
-        return take_up_hidden(job, shot, error);
+    const struct view_wish latest = view_wishes_latest(job->spec.wishes);
+    if (has_hidden(job, &latest))
+        return begin_hidden_frame(job, shot, error);
     view->hidden_layer = 0;
-    bool key_frame = view->wish.key_frame; /* of a frame that was not finished */
-    view->wish = view_wishes_take(job->spec.wishes);
+    bool key_frame = view->wish.key_frame; /* request of an unfinished frame */
+    view->wish = view_wishes_begin_frame(job->spec.wishes);
     view->wish.key_frame |= key_frame;
     view->refining = !has_news(job, &view->wish);
     bool made = view->wish.camera.command
-                    ? shot_look(shot, &job->spec, scene, &view->wish.camera, &job->bounds, error)
+                    ? shot_make_at(shot, &job->spec, scene, &view->wish.camera, &job->bounds, error)
                     : shot_make(shot, &job->spec, scene, job->spec.first_frame, &job->bounds, error);
     if (!made)
         return false;
-    shot->request.seed = job->spec.frame.seed; /* the same picture of the same place */
+    shot->request.seed = job->spec.frame.seed; /* a camera position gives the same picture each time */
     shot->request.accumulate = adds_up(job);
     shot->request.samples = samples_of_next(job);
-    shot->request.samples_max = job->spec.frame.samples; /* one that is complete may be wished again */
+    shot->request.samples_max = job->spec.frame.samples; /* a complete picture may be requested again */
     shot->request.history = history_of(job, shot->request.samples);
     choose_eyes(job, &shot->request);
     apply_effort(job, &shot->request);
@@ -255,14 +256,14 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     return true;
 }
 
-/* While it moves; at rest it is the job's. */
+/* Quality of a frame: the effort's while the camera moves, the job's at rest. */
 static unsigned quality_of(const struct job *job)
 {
     const unsigned quality = job->view.wish.effort.quality;
     return adapts(job) && quality ? quality : job->spec.quality;
 }
 
-/* A stream of pictures has none of what they hide. */
+/* Hidden layers are no part of a stream of pictures, so they are encoded one by one. */
 static enum encoding encoding_of_hidden(const struct job *job)
 {
     return job->spec.encoding == ENCODING_H264 ? ENCODING_JPEG : job->spec.encoding;
@@ -271,15 +272,15 @@ static enum encoding encoding_of_hidden(const struct job *job)
 enum ycbcr view_ycbcr(const struct job *job)
 {
     if (job->view.hidden_layer > 0)
-        return YCBCR_NONE; /* what is not there is filled first */
-    /* At rest the samples that are held decide how the frame is encoded, once it is there. */
+        return YCBCR_NONE; /* empty pixels must be filled first */
+    /* At rest the number of samples decides on the encoding, which is known only after rendering. */
     bool certain = job->view.wish.camera.moving || job->spec.still_encoding == job->spec.encoding;
     return certain ? encoder_takes(job->spec.encoding, quality_of(job)) : YCBCR_NONE;
 }
 
 bool view_is_stale(const struct job *job)
 {
-    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    struct view_wish wish = view_wishes_latest(job->spec.wishes);
     if (job->view.hidden_layer > 0)
         return !has_hidden(job, &wish);
     return job->view.refining && (has_news(job, &wish) || job->scene->waiting_count > 0);
@@ -310,7 +311,7 @@ static void hidden_done(struct job *job, struct engine_frame *frame)
         hidden_budget_spend(&view->hidden_budget, view->hidden_ns, !view->hidden_is_paid);
 }
 
-/* Behind a picture. */
+/* Decides after a picture whether hidden layers follow it. */
 static void plan_hidden(struct job *job, const struct engine_frame *frame)
 {
     struct view *view = &job->view;
@@ -325,7 +326,7 @@ static void plan_hidden(struct job *job, const struct engine_frame *frame)
     view->hidden_layer = 1;
 }
 
-bool view_goes_without(struct job *job, const struct error *error)
+bool view_drop_hidden_layers(struct job *job, const struct error *error)
 {
     if (job->view.hidden_layer == 0)
         return false;
@@ -355,8 +356,8 @@ void view_done(struct job *job, struct engine_frame *frame)
     view->shown_moving = camera->moving;
     view->held_samples = frame->result.samples;
     if (frame->result.noise <= job->spec.frame.noise && job->spec.frame.noise > 0.0f)
-        view->held_samples = job->spec.frame.samples; /* it has enough */
-    view->owes_key_frame |= view->wish.key_frame;
+        view->held_samples = job->spec.frame.samples; /* the noise is low enough */
+    view->needs_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
     if (adapts(job)) {
         const struct view_effort *effort = &view->wish.effort;
@@ -369,10 +370,10 @@ void view_done(struct job *job, struct engine_frame *frame)
     if (!camera->moving && !spares && job->spec.still_encoding != job->spec.encoding) {
         frame->encoding = job->spec.still_encoding;
         if (!encoder_loses(frame->encoding))
-            frame->quality = 0; /* the other one's: the fastest level */
+            frame->quality = 0; /* the quality was that of the lossy encoding; 0 is the fastest level */
     }
-    frame->wants_key = view->owes_key_frame;
+    frame->wants_key = view->needs_key_frame;
     /* A picture at rest may stand alone, but does not help a client that has lost the stream. */
     if (!view->lane || frame->encoding == ENCODING_H264)
-        view->owes_key_frame = false;
+        view->needs_key_frame = false;
 }

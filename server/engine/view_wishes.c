@@ -7,9 +7,9 @@
 
 struct view_wishes {
     atomic_uint references;
-    pthread_mutex_t lock; /* of what follows */
+    pthread_mutex_t lock; /* guards the members below */
     struct view_wish wish;
-    bool told; /* the engine has been told, and has not looked since */
+    bool notified; /* whether the engine was notified and has not read the wishes since */
 };
 
 struct view_wishes *view_wishes_create(void)
@@ -36,27 +36,27 @@ void view_wishes_unref(struct view_wishes *wishes)
     free(wishes);
 }
 
-/* Releases the lock that the caller took. */
-static bool tell(struct view_wishes *wishes)
+/* Whether the engine must be notified. Releases the lock that the caller took. */
+static bool notify_once(struct view_wishes *wishes)
 {
-    bool told = wishes->told;
-    wishes->told = true;
+    bool notified = wishes->notified;
+    wishes->notified = true;
     pthread_mutex_unlock(&wishes->lock);
-    return !told;
+    return !notified;
 }
 
-bool view_wishes_look(struct view_wishes *wishes, const struct view_camera *camera)
+bool view_wishes_set_camera(struct view_wishes *wishes, const struct view_camera *camera)
 {
     pthread_mutex_lock(&wishes->lock);
     wishes->wish.camera = *camera;
-    return tell(wishes);
+    return notify_once(wishes);
 }
 
-bool view_wishes_want_key_frame(struct view_wishes *wishes)
+bool view_wishes_request_key_frame(struct view_wishes *wishes)
 {
     pthread_mutex_lock(&wishes->lock);
     wishes->wish.key_frame = true;
-    return tell(wishes);
+    return notify_once(wishes);
 }
 
 void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort)
@@ -66,23 +66,23 @@ void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort
     pthread_mutex_unlock(&wishes->lock);
 }
 
-static struct view_wish see(struct view_wishes *wishes, bool take)
+static struct view_wish latest(struct view_wishes *wishes, bool begins_frame)
 {
     pthread_mutex_lock(&wishes->lock);
     struct view_wish wish = wishes->wish;
-    wishes->told = false;
-    if (take)
+    wishes->notified = false;
+    if (begins_frame)
         wishes->wish.key_frame = false;
     pthread_mutex_unlock(&wishes->lock);
     return wish;
 }
 
-struct view_wish view_wishes_see(struct view_wishes *wishes)
+struct view_wish view_wishes_latest(struct view_wishes *wishes)
 {
-    return see(wishes, false);
+    return latest(wishes, false);
 }
 
-struct view_wish view_wishes_take(struct view_wishes *wishes)
+struct view_wish view_wishes_begin_frame(struct view_wishes *wishes)
 {
-    return see(wishes, true);
+    return latest(wishes, true);
 }

@@ -158,7 +158,7 @@ static void on_view_camera(struct session *session, struct request *request, con
                            const struct message *message)
 {
     (void)request, (void)header;
-    views_look(session, &message->view_camera);
+    views_set_camera(session, &message->view_camera);
 }
 
 static void on_frame_ack(struct session *session, struct request *request, const struct framing_header *header,
@@ -216,7 +216,7 @@ const struct dispatch_row *dispatch_find(uint32_t type)
     return NULL;
 }
 
-/* The request in flight that a message continues; NULL: none, and that is handled. */
+/* Request in flight that a message continues; NULL: none, and the error was handled. */
 static struct request *continued(struct session *session, const struct dispatch_row *row, uint32_t id)
 {
     struct request *request = request_find(session, id);
@@ -239,7 +239,7 @@ static struct request *started(struct session *session, const struct dispatch_ro
     requests_forget_dead(session, id); /* the number is used anew */
     struct request *request = request_begin(session, id, row->kind);
     if (!request && row->kind == REQUEST_TRANSACTION)
-        requests_bury(session, id); /* its edits are under way */
+        requests_bury(session, id); /* its edits may be on their way */
     return request;
 }
 
@@ -262,7 +262,7 @@ static void refuse(struct session *session, const struct dispatch_row *row, uint
     }
 }
 
-/* Edits are nothing without their edit_begin. */
+/* Whether the message asks for a change; edits need no check, as their edit_begin is refused. */
 static bool changes_something(enum message_type type)
 {
     return type == MESSAGE_SCENE_OPEN || type == MESSAGE_BLOB_OFFER || type == MESSAGE_BLOB_DATA ||
@@ -302,7 +302,7 @@ void dispatch_message(void *context, const struct framing_header *header, const 
         row->handle(session, request, header, message);
 }
 
-/* The frame of the message is sound, one of its fields is not: only its request suffers. */
+/* Refuses a message with an invalid field; its framing is sound, so only its request fails. */
 void dispatch_invalid(void *context, const struct framing_header *header, const struct decode_error *decode_error)
 {
     struct session *session = context;

@@ -400,7 +400,7 @@ static struct job *find_view(const struct session *session, uint32_t channel)
 static void tell_engine(struct job *job)
 {
     struct session *session = job->session;
-    struct engine_command *command = hub_command(ENGINE_VIEW_LOOK, session->number, job->request);
+    struct engine_command *command = hub_command(ENGINE_VIEW_CHANGED, session->number, job->request);
     if (!command) {
         session_fail_for_memory(session);
         return;
@@ -409,7 +409,7 @@ static void tell_engine(struct job *job)
     hub_submit(session->hub, command);
 }
 
-void views_look(struct session *session, const struct message_view_camera *message)
+void views_set_camera(struct session *session, const struct message_view_camera *message)
 {
     struct job *job = find_view(session, message->channel);
     if (!job)
@@ -434,7 +434,7 @@ void views_look(struct session *session, const struct message_view_camera *messa
     memcpy(camera.key.eye_world, message->eye_world, sizeof(camera.key.eye_world));
     memcpy(camera.key.look_at_world, message->look_at_world, sizeof(camera.key.look_at_world));
     memcpy(camera.key.up_world, message->up_world, sizeof(camera.key.up_world));
-    if (view_wishes_look(job->view->wishes, &camera))
+    if (view_wishes_set_camera(job->view->wishes, &camera))
         tell_engine(job);
     frames_overtake(job);
     job_watch_for_blocks(job);
@@ -447,7 +447,7 @@ void views_acknowledge(struct session *session, const struct message_frame_ack *
         return;
     struct session_view *view = job->view;
     pacing_acknowledged(&view->pacing, message->frame, message->whole != 0, session->connection->last_received_ns);
-    if (message->want_key_frame && view_wishes_want_key_frame(view->wishes))
+    if (message->want_key_frame && view_wishes_request_key_frame(view->wishes))
         tell_engine(job);
     job_pace(job);
 }

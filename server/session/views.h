@@ -93,7 +93,7 @@ void view_frame_begun(struct job *job, const struct engine_frame *frame, size_t 
 void view_frame_sent(struct job *job);
 
 /* VIEW_CAMERA and FRAME_ACK */
-void views_look(struct session *session, const struct message_view_camera *message);
+void views_set_camera(struct session *session, const struct message_view_camera *message);
 void views_acknowledge(struct session *session, const struct message_frame_ack *message);
 
 #endif

@@ -263,11 +263,11 @@ static bool has_credit(const struct recorded_job *job)
 static void go_on_with_view(struct recorded_job *job)
 {
     uint64_t revision = job->reference->scene->scene->revision;
-    struct view_wish wish = view_wishes_see(job->wishes);
+    struct view_wish wish = view_wishes_latest(job->wishes);
     if (wish.camera.command != job->shown_command || revision != job->shown_revision)
         job->shown_samples = 0;
     while (has_credit(job) && job->shown_samples < job->samples) {
-        wish = view_wishes_take(job->wishes);
+        wish = view_wishes_begin_frame(job->wishes);
         job->shown_samples += job->pass_samples;
         if (job->shown_samples > job->samples || wish.camera.moving)
             job->shown_samples = job->samples;
@@ -419,7 +419,7 @@ static void carry_out_on(struct engine_command *command, struct recorded_referen
             go_on(job);
         }
         return;
-    case ENGINE_VIEW_LOOK:
+    case ENGINE_VIEW_CHANGED:
         job = find_job(command->client, command->request);
         if (job)
             go_on(job);
@@ -431,7 +431,7 @@ static void carry_out_on(struct engine_command *command, struct recorded_referen
 
 static bool has_answer(enum engine_command_kind kind)
 {
-    return kind != ENGINE_JOB_CREDIT && kind != ENGINE_VIEW_LOOK && kind != ENGINE_CLIENT_GONE &&
+    return kind != ENGINE_JOB_CREDIT && kind != ENGINE_VIEW_CHANGED && kind != ENGINE_CLIENT_GONE &&
            kind != ENGINE_SCENES_TRIM && kind != ENGINE_JOB_CANCEL;
 }
 

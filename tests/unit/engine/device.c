@@ -459,7 +459,7 @@ TEST(views_beside_each_other_come_to_the_pictures_of_single_frames)
         struct engine_command made = picture(20 + i, &keys[1 - i]); /* where it does not look from */
         struct view_wishes *wishes = view_wishes_create();
         assert_non_null(wishes);
-        view_wishes_look(wishes, &(struct view_camera){.command = 1, .key = keys[i]});
+        view_wishes_set_camera(wishes, &(struct view_camera){.command = 1, .key = keys[i]});
         made.job.kind = JOB_VIEW;
         made.job.last_frame = UINT32_MAX;
         made.job.pass_samples = 2;

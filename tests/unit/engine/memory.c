@@ -61,8 +61,8 @@ TEST(views_go_on_while_batches_wait_for_memory)
     submit(view);
     const struct view_camera camera = {.command = 7,
                                        .key = {.eye_world = {0, 0, 5}, .up_world = {0, 1, 0}, .fov_y = 1}};
-    assert_true(view_wishes_look(wishes, &camera));
-    submit(command(ENGINE_VIEW_LOOK, 3, 0));
+    assert_true(view_wishes_set_camera(wishes, &camera));
+    submit(command(ENGINE_VIEW_CHANGED, 3, 0));
     engine_event_destroy(expect_event(ENGINE_FRAME, 3, 30));
     submit_target(ENGINE_JOB_CANCEL, 3, 31, 30, 0);
     for (int i = 0; i < 2; i++)

@@ -450,7 +450,7 @@ TEST(a_given_camera_sees_the_scene_of_that_time)
     struct shot frame = shot_at(&job, scene, 5), look;
     struct view_camera from = {.command = 1, .key = home};
     from.key.time_s = 0.5f;
-    assert_true(shot_look(&look, &job, scene, &from, NULL, NULL));
+    assert_true(shot_make_at(&look, &job, scene, &from, NULL, NULL));
     assert_true(look.time_s == frame.time_s);
     assert_int_equal(look.motion.pose_count, frame.motion.pose_count);
     assert_memory_equal(look.motion.poses[0].nodes[0].parent_from_node,
@@ -465,7 +465,7 @@ TEST(a_given_camera_sees_the_scene_of_that_time)
     shot_finish(&look);
     struct error error = {0};
     memcpy(from.key.up_world, (float[]){0, 0, 2}, 12); /* along the view */
-    assert_false(shot_look(&look, &job, scene, &from, NULL, &error));
+    assert_false(shot_make_at(&look, &job, scene, &from, NULL, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "view_camera.up_world");
     scene_destroy(scene);
@@ -481,7 +481,7 @@ TEST(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does)
         struct shot expected = shot_at(&along, scene, frame), look;
         struct view_camera from = {.command = 1, .key = home, .node = 3};
         from.key.time_s = expected.time_s;
-        assert_true(shot_look(&look, &watched, scene, &from, NULL, NULL));
+        assert_true(shot_make_at(&look, &watched, scene, &from, NULL, NULL));
         assert_memory_equal(&look.request.camera, &expected.request.camera, sizeof(look.request.camera));
         assert_true(look.request.focus == expected.request.focus);
         shot_finish(&expected);
@@ -495,7 +495,7 @@ TEST(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does)
         struct error error = {0};
         struct shot look;
         struct view_camera from = {.command = 1, .key = home, .node = refused[i].node};
-        assert_false(shot_look(&look, &watched, scene, &from, NULL, &error));
+        assert_false(shot_make_at(&look, &watched, scene, &from, NULL, &error));
         assert_int_equal(error.kind, refused[i].kind);
         assert_string_equal(error.field, "view_camera.node");
     }

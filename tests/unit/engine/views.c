@@ -82,8 +82,8 @@ static struct view_camera camera(uint64_t number, bool moving)
 
 static void look_from(const struct view_camera *from)
 {
-    if (view_wishes_look(wishes, from))
-        submit(command(ENGINE_VIEW_LOOK, 1, 0));
+    if (view_wishes_set_camera(wishes, from))
+        submit(command(ENGINE_VIEW_CHANGED, 1, 0));
 }
 
 static void look(uint64_t number, bool moving)
@@ -326,8 +326,8 @@ TEST(a_complete_picture_comes_again_as_a_key_frame_and_not_with_more_samples)
     for (uint32_t number = 0; number < 3; number++)
         expect_key(take(expect_frame(1, 2, number)), false);
     for (uint32_t number = 3; number < 5; number++) {
-        assert_true(view_wishes_want_key_frame(wishes));
-        submit(command(ENGINE_VIEW_LOOK, 1, 0));
+        assert_true(view_wishes_request_key_frame(wishes));
+        submit(command(ENGINE_VIEW_CHANGED, 1, 0));
         struct engine_frame *frame = take(expect_frame(1, 2, number));
         assert_true(frame->wants_key);
         assert_int_equal(frame->result.samples, 7);
@@ -367,8 +367,8 @@ TEST(a_stream_continues_over_frames_at_rest_and_restarts_on_request)
     /* One of rest comes at once, and the stream begins again with the next motion. */
     look(5, false);
     expect_encoded(take(next_event()), ENCODING_RAW, true);
-    assert_true(view_wishes_want_key_frame(wishes));
-    submit(command(ENGINE_VIEW_LOOK, 1, 0));
+    assert_true(view_wishes_request_key_frame(wishes));
+    submit(command(ENGINE_VIEW_CHANGED, 1, 0));
     expect_encoded(take(next_event()), ENCODING_RAW, true);
     expect_encoded(take_next(6, true), ENCODING_H264, true);
     expect_encoded(take_next(7, true), ENCODING_H264, false);
@@ -647,8 +647,8 @@ TEST(a_camera_that_spans_no_view_ends_it)
     expect_picture(2, 0, 0, 1, ENCODING_RAW);
     struct view_camera nowhere = camera(1, true);
     memcpy(nowhere.key.look_at_world, nowhere.key.eye_world, sizeof(nowhere.key.eye_world));
-    assert_true(view_wishes_look(wishes, &nowhere));
-    submit(command(ENGINE_VIEW_LOOK, 1, 0));
+    assert_true(view_wishes_set_camera(wishes, &nowhere));
+    submit(command(ENGINE_VIEW_CHANGED, 1, 0));
     expect_failed(1, 2, ERROR_INVALID, "view_camera.up_world");
 }
 

@@ -106,7 +106,7 @@ static inline bool submit(void *context, struct engine_command *command, struct 
         event(ENGINE_FAILED, command, command->target_request);
         event(ENGINE_DONE, command, command->request);
         break;
-    case ENGINE_VIEW_LOOK:
+    case ENGINE_VIEW_CHANGED:
     case ENGINE_LIMITS:
         break;
     case ENGINE_STATS:

@@ -272,8 +272,8 @@ SESSION_TEST(a_frame_names_the_camera_that_it_shows)
     assert_int_equal(start->job.still_encoding, ENCODING_ZSTD);
     uint64_t before_ns = clock_now_ns();
     send_camera(7, true);
-    told(ENGINE_VIEW_LOOK);
-    struct view_camera camera = view_wishes_take(start->job.wishes).camera;
+    told(ENGINE_VIEW_CHANGED);
+    struct view_camera camera = view_wishes_begin_frame(start->job.wishes).camera;
     assert_int_equal(camera.command, 7);
     assert_true(camera.moving);
     assert_true(before_ns <= camera.received_ns && camera.received_ns <= clock_now_ns());
@@ -339,12 +339,12 @@ SESSION_TEST(a_flood_of_cameras_wakes_the_engine_once)
     for (uint64_t number = 1; number <= 1000; number++)
         send_camera(number, true);
     expect_alive(9);
-    told(ENGINE_VIEW_LOOK);
+    told(ENGINE_VIEW_CHANGED);
     told_nothing();
-    assert_int_equal(view_wishes_take(start->job.wishes).camera.command, 1000);
+    assert_int_equal(view_wishes_begin_frame(start->job.wishes).camera.command, 1000);
     send_camera(1001, false);
-    told(ENGINE_VIEW_LOOK);
-    assert_false(view_wishes_take(start->job.wishes).camera.moving);
+    told(ENGINE_VIEW_CHANGED);
+    assert_false(view_wishes_begin_frame(start->job.wishes).camera.moving);
 }
 
 SESSION_TEST(a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not)
@@ -354,7 +354,7 @@ SESSION_TEST(a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not)
     expect_alive(9);
     start_view(2, 1);
     send_camera(5, false);
-    told(ENGINE_VIEW_LOOK);
+    told(ENGINE_VIEW_CHANGED);
     send_camera(5, false);
     expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(client.message.error.field, "view_camera.command");
@@ -365,9 +365,9 @@ SESSION_TEST(a_request_for_a_key_frame_reaches_the_engine)
 {
     struct engine_command *start = start_acknowledged_view(2, 1);
     send_ack(0, true, true);
-    told(ENGINE_VIEW_LOOK);
-    assert_true(view_wishes_take(start->job.wishes).key_frame);
-    assert_false(view_wishes_take(start->job.wishes).key_frame);
+    told(ENGINE_VIEW_CHANGED);
+    assert_true(view_wishes_begin_frame(start->job.wishes).key_frame);
+    assert_false(view_wishes_begin_frame(start->job.wishes).key_frame);
 }
 
 /* Frame 1 is on its way and not acknowledged, and the link was slow before, so that frame 2 has waited for it when
@@ -393,7 +393,7 @@ static struct engine_command *let_a_frame_wait(enum encoding encoding)
     late->frame->encoding = encoding;
     port_say(late);
     send_camera(8, true);
-    told(ENGINE_VIEW_LOOK);
+    told(ENGINE_VIEW_CHANGED);
     usleep(20000);
     send_ack(1, true, false);
     return start;
@@ -463,7 +463,7 @@ SESSION_TEST(a_picture_at_rest_that_motion_overtakes_is_abandoned_and_uses_no_cr
     say_large_frame(2, 0);
     expect(MESSAGE_FRAME_BEGIN, 2);
     send_camera(7, true);
-    told(ENGINE_VIEW_LOOK);
+    told(ENGINE_VIEW_CHANGED);
     assert_true(take_rest_of_large_frame(2, 0));
     told_credit(2, 2);
     say_frame(2, 1, 7);
@@ -560,7 +560,7 @@ TEST_WITH(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come, 
     say_parts(2, 0, 0, 10000);
     expect_parts(2, 0);
     send_camera(7, true);
-    told(ENGINE_VIEW_LOOK);
+    told(ENGINE_VIEW_CHANGED);
     wait_until_read();
     assert_in_range(take_cut(0), 1200, LARGE_FRAME_BYTES - 1);
     told_nothing();
@@ -612,11 +612,11 @@ SESSION_TEST(frames_are_wished_in_parts_where_the_link_takes_long_for_them)
     clock_let_pass(100 * MS);
     send_ack(0, true, false); /* so long it took, as far as the daemon knows */
     told(ENGINE_JOB_CREDIT);
-    assert_false(view_wishes_see(start->job.wishes).effort.parts);
+    assert_false(view_wishes_latest(start->job.wishes).effort.parts);
     say_frame(2, 1, 3);
     take_frame(2, 1);
-    assert_true(view_wishes_see(start->job.wishes).effort.parts);
-    assert_false(view_wishes_see(start->job.wishes).effort.still_parts);
+    assert_true(view_wishes_latest(start->job.wishes).effort.parts);
+    assert_false(view_wishes_latest(start->job.wishes).effort.still_parts);
 }
 
 /* Who moves on each time just before the picture at rest is there sees one now and then. */
@@ -673,7 +673,7 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     told_credit(2, 2);
     say_frame(2, 1, 3);
     take_frame(2, 1);
-    const struct view_effort effort = view_wishes_see(start->job.wishes).effort;
+    const struct view_effort effort = view_wishes_latest(start->job.wishes).effort;
     assert_true(effort.scale_32nds < 32);
     assert_true(effort.quality < 90);
     assert_true(effort.bytes < FRAME_BYTES);
@@ -682,11 +682,11 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     clock_let_pass(100 * MS);
     send_ack(1, true, false);
     take_frame(2, 2);
-    assert_false(view_wishes_see(start->job.wishes).effort.sparing);
+    assert_false(view_wishes_latest(start->job.wishes).effort.sparing);
     say_large_frame(2, 3); /* more than a second */
-    for (unsigned i = 0; !view_wishes_see(start->job.wishes).effort.sparing && i < 2000; i++)
+    for (unsigned i = 0; !view_wishes_latest(start->job.wishes).effort.sparing && i < 2000; i++)
         usleep(10000);
-    assert_true(view_wishes_see(start->job.wishes).effort.sparing);
+    assert_true(view_wishes_latest(start->job.wishes).effort.sparing);
 }
 
 /* A frame of 100 ns is in time for no rate that can be asked for; this one took a second. */
@@ -705,7 +705,7 @@ SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
     slow->frame->encoded_ns = slow->frame->rendered_ns + 100;
     port_say(slow);
     take_frame(2, 0);
-    struct view_effort effort = view_wishes_see(start->job.wishes).effort;
+    struct view_effort effort = view_wishes_latest(start->job.wishes).effort;
     assert_int_equal(effort.scale_32nds, 5); /* 49 ms of 85 % of 50, so bounces go as well */
     assert_int_equal(effort.depth_less, 6);
     assert_int_equal(effort.quality, 0); /* the link is not followed */
@@ -720,7 +720,7 @@ SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
     told(ENGINE_JOB_CREDIT);
     say_frame(2, 1, 3);
     take_frame(2, 1);
-    const struct view_effort effort = view_wishes_see(start->job.wishes).effort;
+    const struct view_effort effort = view_wishes_latest(start->job.wishes).effort;
     assert_int_equal(effort.margin_halves_less, 2);
     assert_true(effort.bytes > FRAME_BYTES / 4); /* at twenty a second */
     assert_true(effort.quality < 90);
@@ -745,7 +745,7 @@ SESSION_TEST(a_view_takes_the_place_of_another_on_its_channel)
     struct engine_command *start = start_acknowledged_view(2, 100);
     told_credit(2, 4);
     send_camera(7, true);
-    told(ENGINE_VIEW_LOOK);
+    told(ENGINE_VIEW_CHANGED);
     struct engine_command *change = replace_view(3, 17);
     assert_ptr_equal(change->job.wishes, start->job.wishes);
     say_frame(2, 1, 7); /* the engine has not seen it yet */
