@@ -14,8 +14,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Libraries and drivers, what they are configured by, and what the kernel tells. Nobody's home is among them, nor
- * the rest of /etc, where keys lie. */
+/* Libraries and drivers, their configuration, and the kernel's files about the machine. Nobody's home is among
+ * them, nor the rest of /etc, where keys lie. */
 static const char *const read_paths[] = {"/usr",
                                          "/bin",
                                          "/lib",
@@ -107,12 +107,12 @@ static void allow_caches(struct confinement *confinement)
     }
 }
 
-/* The file is there before, so that nothing else can be made in its folder. */
+/* Creates the file beforehand, so that the sandbox need not allow new files in its folder. */
 static void allow_file(struct confinement *confinement, const char *path)
 {
     const int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
     if (fd < 0)
-        return; /* the one who opens it says so */
+        return; /* the code that opens the file reports this */
     close(fd);
     confinement_allow(confinement, CONFINED_WRITE, path);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sandbox of a process that serves: what of the machine it needs. */
+/* The sandbox of a process that serves. */
 #ifndef FARLIGHT_CONFINE_H
 #define FARLIGHT_CONFINE_H
 

@@ -7,15 +7,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What a list of processes shows behind --worker: "3: user 1000, device 0". Fills `title`, which has as many bytes
- * as it stays long, with it and blanks. */
+/* Sets the text that lists of processes show behind --worker: "3: user 1000, device 0". Fills `title` with it and
+ * blanks, up to the title's present length. */
 void devices_set_title(char *title, uint32_t worker, const char *owner, int32_t device);
-/* Reads such a title. False: it is none, as of a worker that has no owner yet. `owner` points into it, with
+/* Reads such a title. False: it is none, as with a worker that has no owner yet. `owner` points into it, with
  * *owner_bytes. */
 bool devices_read_title(const char *title, uint32_t *worker, const char **owner, size_t *owner_bytes,
                         int32_t *device);
 
-/* Prints all devices, each with its workers, of all daemons whose processes this one may see. Returns the exit
+/* Prints the devices, each with its workers of every daemon whose processes this one may see. Returns the exit
  * status. */
 int devices_print(void);
 

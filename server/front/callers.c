@@ -18,7 +18,7 @@
 
 struct source {
     uint64_t owner;
-    uint32_t callers; /* that no worker has */
+    uint32_t callers; /* callers that no worker has yet */
 };
 
 struct caller {
@@ -26,14 +26,15 @@ struct caller {
     struct caller *next;
     struct connection *connection;
     struct auth_identity identity;
-    bool is_owner;          /* the daemon ends with it */
-    struct auth_keys *keys; /* as they were when it came: others may be read while it proves that it has one */
+    bool is_owner; /* whether the daemon ends with it */
+    /* Keys at its arrival: the daemon may read new ones while the caller proves that it has a key. */
+    struct auth_keys *keys;
     struct address peer;
-    struct source *source; /* NULL: it was turned away */
-    struct worker *worker; /* that is to serve it; NULL: its hello has not come, or it is refused */
+    struct source *source; /* NULL: it was disconnected */
+    struct worker *worker; /* worker that will serve it; NULL: its hello has not arrived, or it is refused */
 };
 
-/* ---- how many say nothing ---- */
+/* ---- count of callers without a hello ---- */
 
 static struct source *source_of(struct front *front, uint64_t owner)
 {
@@ -76,8 +77,8 @@ static bool may_be_turned_away(const struct caller *caller, const struct source 
     return caller->source == source && (caller->connection->state == CONNECTION_WRONG_KEY || !has_wrong_key);
 }
 
-/* Closes one of the source's callers, by chance: who takes all places loses his own, and cannot tell which. Those
- * go first that are known to have a wrong key. */
+/* Closes a random caller of the source: a client that takes every place loses its own, and cannot tell which.
+ * Callers that are known to have a wrong key go first. */
 static void turn_one_away(struct front *front, const struct source *source)
 {
     uint32_t wrong = 0;
@@ -120,7 +121,7 @@ static uint64_t on_seal_wait_ns(void *context)
 {
     const struct caller *caller = context;
     struct front *front = caller->front;
-    /* Unix peers have no address that others could be kept apart from. */
+    /* Unix peers have no address by which they could be told apart. */
     return address_is_unix(&caller->peer)
                ? 0
                : attempts_wait_ns(&front->attempts, address_network(&caller->peer),

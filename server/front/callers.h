@@ -12,8 +12,9 @@ bool callers_add(struct front *front, int fd, const struct address *own, const s
                  struct error *error);
 /* The client at this connected socket, with which the daemon ends; takes over the descriptor when it succeeds. */
 bool callers_add_owner(struct front *front, int fd, struct error *error);
-/* Hands over all who wait for that worker, which is ready; or tells them why they are not served. */
+/* Hands over the callers that wait for the worker, which is ready. */
 void callers_hand_over(struct front *front, struct worker *worker);
+/* Refuses the callers that wait for the worker, with the reason. */
 void callers_refuse(struct front *front, const struct worker *worker, const char *why);
 void callers_close(struct front *front);
 

@@ -23,14 +23,14 @@
 #define ACCEPTS_A_TURN 4
 /* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
-/* In which workers may say goodbye to their clients and end. */
+/* Time in which workers may say goodbye to their clients and end. */
 #define STOP_NS UINT64_C(600000000)
 #define BLANKS " \t"
-/* Between two pings of a worker. */
+/* Time between two pings of a worker. */
 #define PING_NS UINT64_C(10000000000)
-/* Between two signs that the start goes on. */
+/* Time between two notices to the service manager that the start continues. */
 #define EXTEND_NS UINT64_C(5000000000)
-/* In the time in which the service manager wants to hear something. */
+/* Notices within the service manager's timeout. */
 #define WATCHDOG_LOOKS 4
 
 void front_init(struct front *front)
@@ -176,7 +176,7 @@ static void on_stop_timer(void *context)
     workers_kill(context);
 }
 
-/* systemd's notify-reload wants the time along, to tell this answer from one to a signal before. */
+/* systemd's notify-reload requires the time, to tell this answer from one to an earlier signal. */
 static void reload(struct front *front)
 {
     char state[64];
@@ -201,7 +201,7 @@ static void on_signal(void *context, uint32_t epoll_events)
     }
     log_write(LOG_INFO, "front", "stopping: %s", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
     if (front->stopping)
-        workers_kill(front); /* asked twice: without goodbye */
+        workers_kill(front); /* second signal: no goodbye */
     front_stop(front);
 }
 
@@ -236,7 +236,7 @@ static void on_extend_timer(void *context)
     loop_timer_start(front->loop, &front->extend_timer, EXTEND_NS);
 }
 
-/* ---- what workers do --------------------------------------------------------------------------------- */
+/* ---- events of workers -------------------------------------------------------------------------------- */
 
 void front_configured(struct front *front)
 {
@@ -324,8 +324,8 @@ static bool watch_all_listeners(struct front *front, struct error *error)
     return true;
 }
 
-/* Those of the owners who have kept something; with none, one that belongs to nobody yet, so that the device is
- * tried and the first user need not wait. */
+/* Starts the workers of owners who have kept scenes; with none, a worker that belongs to nobody yet, so that the
+ * device is tried and the first user need not wait. */
 static bool start_workers(struct front *front, struct error *error)
 {
     const struct front_options *options = &front->options;
@@ -370,7 +370,7 @@ static void print_ready(const struct front *front, FILE *stream)
 
 bool front_run(struct front *front, const struct front_options *options, FILE *stream, struct error *error)
 {
-    /* The loop is run first until the first workers are ready, or have failed. */
+    /* This first run of the loop ends when the first workers are ready, or have failed. */
     if (!start(front, options, error) || !loop_run(front->loop, error))
         return false;
     if (!front->ready && !front->stopping) {

@@ -23,7 +23,7 @@ struct shares {
         uint32_t weight;
     } users[SHARES_MAX];
     size_t count;
-    uint32_t of_keys, of_networks; /* weights of those who come by a key, and of clients that nobody knows */
+    uint32_t of_keys, of_networks; /* weights of clients with a key, and of unidentified clients */
 };
 
 /* Reads NAME=WEIGHT separated by blanks; a name is a user, a user's number, "keys" or "networks". False with

@@ -17,17 +17,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* Processes at once: an attacker may come from many networks, each of which has one. */
+/* Maximum of processes: an attacker may connect from many networks, each of which has a worker. */
 #define WORKERS_MAX 128u
-/* A worker's number goes with so many bytes of blanks, into which the worker writes who it is for, as a list of
- * processes shows it. */
+/* Blanks behind a worker's number, which the worker overwrites with its owner for lists of processes. */
 #define TITLE_BYTES 128
-/* Pings without an answer, after which a worker hangs. */
+/* Pings without an answer after which a worker counts as hanging. */
 #define PINGS_MAX 3u
 
 /* ---- starting ---- */
 
-/* The service manager speaks with the front alone. */
+/* Whether a variable concerns the front alone, which is the service manager's only partner. */
 static bool is_for_front(const char *variable)
 {
     static const char *const names[] = {"NOTIFY_SOCKET=", "WATCHDOG_USEC=", "WATCHDOG_PID=", "LISTEN_"};
@@ -115,7 +114,7 @@ static void replace(struct front *front)
         log_write(LOG_ERROR, "front", "%s", error.text);
 }
 
-/* Its clients see their connections end, and come again. */
+/* Ends a worker whose process has ended; its clients see their connections end, and reconnect. */
 static void on_exit_of(void *context, uint32_t epoll_events)
 {
     (void)epoll_events;
@@ -125,15 +124,15 @@ static void on_exit_of(void *context, uint32_t epoll_events)
     if (waitpid(worker->pid, &status, WNOHANG) != worker->pid)
         return;
     const bool is_asked = worker->is_stopping;
-    worker->is_stopping = true;      /* nobody is handed to it any more */
-    channel_drain(&worker->channel); /* it may have said why */
+    worker->is_stopping = true;      /* no more clients are handed to it */
+    channel_drain(&worker->channel); /* reads why it ended, if it said so */
     log_end(worker, status, is_asked);
     struct error failure = worker->failure;
     worker->is_ready = false;
     error_set(&failure, ERROR_INTERNAL, NULL, "the worker of this client has ended");
     callers_refuse(front, worker, failure.text);
     const bool ends_daemon = worker->has_daemon_owner;
-    /* The next user need not wait for a device, where there is one. */
+    /* A successor keeps the device ready for the next user. */
     const bool is_replaced = worker->was_ready && front->workers == worker && !worker->next;
     remove_worker(worker);
     front_settled(front, &failure);
@@ -147,7 +146,7 @@ static void on_exit_of(void *context, uint32_t epoll_events)
         replace(front);
 }
 
-/* ---- what it says ---- */
+/* ---- its packets ---- */
 
 static void close_fds(const int fds[CHANNEL_FDS])
 {
@@ -163,7 +162,7 @@ static void stop_one(struct worker *worker)
     kill(worker->pid, SIGTERM);
 }
 
-/* A word that was sent before the worker had its owner says nothing any more. */
+/* Notes that a worker is ready; a packet from before it had its owner is outdated. */
 static void take_ready(struct worker *worker, const void *payload, size_t bytes)
 {
     struct channel_ready ready;
@@ -191,7 +190,7 @@ static void take_counts(struct worker *worker, const void *payload, size_t bytes
         return;
     memcpy(&worker->counts, payload, bytes);
     front_counted(worker->front);
-    /* A client may be on its way to it. */
+    /* The worker may not know of a client that was just handed over. */
     if (worker->counts.unused_s && worker->counts.handed == worker->handed && !worker->is_stopping) {
         log_write(LOG_INFO, "front", "worker %" PRIu32 " (%s) ends: it had no client for %" PRIu32 " s",
                   worker->number, worker->owner.name, worker->counts.unused_s);
@@ -238,7 +237,8 @@ static void forward_answer(const struct worker *worker, const void *payload, siz
     free(packet);
 }
 
-/* A worker speaks for its own user alone, whose rights are as the front knows them. */
+/* Whether a worker may hand the client over: it acts for its own user alone, whose rights are those that the front
+ * knows. */
 static bool may_hand_over(const struct worker *from, struct handover *handover)
 {
     struct auth_identity *identity = &handover->identity;
@@ -251,8 +251,8 @@ static bool may_hand_over(const struct worker *from, struct handover *handover)
            (!identity->has_key || auth_numbers_have(&keys, identity));
 }
 
-/* A client whose first request names a scene of another worker's. Where that has gone, the client sees its
- * connection end, and comes again. */
+/* Forwards a client whose first request names a scene of another worker. If that worker has ended, the client sees
+ * its connection end, and reconnects. */
 static void forward_client(const struct worker *from, const void *payload, size_t bytes,
                            const int fds[CHANNEL_FDS])
 {
@@ -330,7 +330,7 @@ static void apply_share(const struct worker *worker)
     share_groups_apply(&front->groups, worker->number, worker->pid, weight);
 }
 
-/* False: nothing of it is left. */
+/* Watches the worker's channel and process. False: everything is released. */
 static bool watch(struct worker *worker, int fd, struct error *error)
 {
     struct loop *loop = worker->front->loop;
@@ -410,7 +410,7 @@ struct worker *workers_start_ahead(struct front *front, struct error *error)
 static void assign(struct worker *worker, const struct channel_owner *owner)
 {
     worker->has_owner = true;
-    worker->is_ready = false; /* until it says that it knows */
+    worker->is_ready = false; /* until it acknowledges its owner */
     worker->owner = *owner;
     apply_share(worker);
     channel_send(&worker->channel, CHANNEL_OWNER, owner, sizeof(*owner), NULL);
@@ -422,10 +422,10 @@ struct worker *workers_of(struct front *front, uint64_t owner, const char *name,
     uint32_t count = 0;
     for (struct worker *worker = front->workers; worker; worker = worker->next) {
         count++;
-        if (worker->is_stopping || !worker->channel.watch) /* it ends, which may take it a while */
+        if (worker->is_stopping || !worker->channel.watch) /* an ending worker may take a while */
             continue;
         if (worker->has_owner && worker->owner.number == owner) {
-            /* One whose scenes were restored has no name yet. */
+            /* A worker that restored scenes knows its owner's number only. */
             snprintf(worker->owner.name, sizeof(worker->owner.name), "%s", name);
             return worker;
         }
@@ -483,7 +483,7 @@ void workers_ping(struct front *front)
 {
     for (struct worker *worker = front->workers; worker; worker = worker->next) {
         if (!worker->is_ready || worker->is_stopping)
-            worker->pings_due = 0; /* it may restore scenes */
+            worker->pings_due = 0; /* a worker may still restore scenes */
         else if (worker->pings_due++ < PINGS_MAX)
             channel_send(&worker->channel, CHANNEL_PING, NULL, 0, NULL);
         else

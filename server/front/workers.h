@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The processes that serve: one for each user, key or network of clients that nobody knows. */
+/* The processes that serve: one for each user, each key, and each network of unidentified clients. */
 #ifndef FARLIGHT_FRONT_WORKERS_H
 #define FARLIGHT_FRONT_WORKERS_H
 
@@ -20,30 +20,30 @@ struct worker {
     struct loop_watch *pid_watch;
     struct channel channel;
     bool is_ready, is_stopping;
-    bool was_ready;        /* its device could be used */
-    bool has_daemon_owner; /* it serves the client with which the daemon ends */
+    bool was_ready;        /* whether its device could be used */
+    bool has_daemon_owner; /* whether it serves the client with which the daemon ends */
     uint32_t handed;
-    uint32_t pings_due;   /* that it has not answered */
-    uint32_t configs_due; /* that it has not taken yet, of those after its first */
+    uint32_t pings_due;   /* pings without an answer */
+    uint32_t configs_due; /* configurations after its first that it has not acknowledged */
     struct channel_counts counts;
     struct error failure; /* why it ends, in its own words */
 };
 
-/* Starts a process of that owner, or (NULL) of nobody yet. NULL and *error: it cannot be started. */
+/* Starts a process of that owner; NULL: one without an owner yet. NULL and *error: it cannot be started. */
 struct worker *workers_start(struct front *front, const struct channel_owner *owner, struct error *error);
-/* Starts the one that waits for the next user: of nobody yet, or of the daemon's own user where workers must know
- * their owner from the start. */
+/* Starts the process that waits for the next user: without an owner, or the daemon's own user's where workers must
+ * know their owner from the start. */
 struct worker *workers_start_ahead(struct front *front, struct error *error);
-/* The owner's, started if there is none. */
+/* Worker of the owner, started if there is none. */
 struct worker *workers_of(struct front *front, uint64_t owner, const char *name, struct error *error);
 uint32_t workers_clients(const struct front *front);
 uint32_t workers_clients_of(const struct front *front, uint64_t owner);
-void workers_stop(struct front *front); /* asks them to end */
+void workers_stop(struct front *front); /* asks the workers to end */
 void workers_kill(struct front *front);
-/* Asks each that is ready for a sign, and kills those that have given none several times. */
+/* Pings each ready worker, and kills those that have not answered several times. */
 void workers_ping(struct front *front);
 void workers_send_setup(struct front *front);
-bool workers_have_setup(const struct front *front); /* what was sent is in force */
-void workers_finish(struct front *front);           /* kills those that are left */
+bool workers_have_setup(const struct front *front); /* whether every worker has acknowledged the setup */
+void workers_finish(struct front *front);           /* kills the workers that are left */
 
 #endif
