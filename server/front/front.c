@@ -31,7 +31,7 @@
 /* Time between two notices to the service manager that the start continues. */
 #define EXTEND_NS UINT64_C(5000000000)
 /* Notices within the service manager's timeout. */
-#define WATCHDOG_LOOKS 4
+#define WATCHDOG_CHECKS 4
 
 void front_init(struct front *front)
 {
@@ -219,7 +219,7 @@ static void on_watchdog_timer(void *context)
 {
     struct front *front = context;
     notify_manager("WATCHDOG=1");
-    loop_timer_start(front->loop, &front->watchdog_timer, front->watchdog_ns / WATCHDOG_LOOKS);
+    loop_timer_start(front->loop, &front->watchdog_timer, front->watchdog_ns / WATCHDOG_CHECKS);
 }
 
 static void on_ping_timer(void *context)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What pictures cost, and which the next one is to be: one deadline for rendering and bytes together. */
+/* Cost of pictures, and the advice for the next one: a single deadline for rendering and bytes together. */
 #include "session/pacing.h"
 
 #include <math.h>
@@ -13,28 +13,28 @@
 /* Frames have shown how much of rendering depends on their size when their areas deviate by this part of the mean.
  */
 #define AREA_DEVIATION 0.25
-/* Factor by which a frame may take longer than the time that no size can reduce. */
+/* A frame may always take this many times the part of its time that no size can reduce. */
 #define OF_FIXED 1.5
-/* With as many bounces light goes into glass and out again. */
+/* Bounces that are never dropped: light goes into glass and out again. */
 #define DEPTH_MIN 2u
-/* How many times in a row the next better step must fit, with this room: less than a step of a deadline's sizes
- * is, or what it leaves unused would stay so. */
+/* Number of times in a row that the next better step must fit, and the room that it must leave: less than a step
+ * of a deadline's sizes, or unused time would stay unused. */
 #define BETTER_TIMES 8
 #define BETTER_ROOM 1.25
 #define BETTER_ROOM_OF_DEADLINE 1.1
-/* A client that makes its own views asks for a picture that often at least while it moves: one that is there by
- * then is better large than early. */
+/* Maximum time between two pictures of a client that makes its own views while it moves: a picture that is there
+ * by then is better large than early. */
 #define LATE_NS 250e6
 
-/* Of a deadline: the rest is for the picture's way to its client, which is not rendering. */
+/* Share of a deadline for rendering; the rest is the picture's way to its client. */
 #define DEADLINE_SHARE 0.85
-/* Of two frames in a row that take that many times as long as expected, or as short, the scene is another one; a
- * single one was disturbed. */
+/* Factor between a frame's time and the expected one. After two such frames in a row the scene counts as another
+ * one; a single frame was disturbed. */
 #define SURPRISE 2.0
 
-/* Steps of about a half of the area: each costs a stream of pictures a key frame. */
+/* Steps of about half the area: each costs a stream of pictures a key frame. */
 static const unsigned scales_32nds[] = {32, 24, 16, 12, 8, 0};
-/* Steps of at most a fifth of it: what a deadline leaves is used. */
+/* Finer steps, of at most a fifth of the area, so that a deadline's time is used. */
 static const unsigned scales_of_deadline_32nds[] = {32, 30, 28, 26, 24, 22, 20, 18, 16, 15, 14,
                                                     13, 12, 11, 10, 9,  8,  7,  6,  5,  0};
 
@@ -47,7 +47,7 @@ static double bytes_of_quality(unsigned quality)
     return pow(1.35, ((double)quality - PACING_QUALITY_REFERENCE) / 12.0);
 }
 
-/* Beside that of a full picture without a margin. */
+/* Area, relative to a full picture without a margin. */
 static double area_of(const struct pacing *pacing, const struct pacing_advice *advice)
 {
     const double side = (double)advice->scale_32nds / PACING_SCALE_FULL;
@@ -60,7 +60,7 @@ static unsigned samples_of(const struct pacing *pacing)
     return pacing->terms.samples > 1 ? pacing->terms.samples : 1;
 }
 
-/* Beside that of a full picture with all samples. */
+/* Work, relative to a full picture with all samples. */
 static double work_of(const struct pacing *pacing, const struct pacing_advice *advice)
 {
     const unsigned samples = samples_of(pacing);
@@ -73,7 +73,7 @@ static void learn(double *known, double seen)
     *known = *known > 0.0 ? *known + LEARN_SHARE * (seen - *known) : seen;
 }
 
-/* A straight line through the times by area, as soon as there are times of different areas. */
+/* Fits a straight line through times by area, as soon as there are times of different areas. */
 static void learn_render(struct pacing *pacing, double area, double render_ns)
 {
     pacing->render_frames = pacing->render_frames * RENDER_FADES + 1.0;
@@ -98,7 +98,7 @@ static unsigned depth_of(const struct pacing *pacing, const struct pacing_advice
     return depth - (advice->depth_less < depth ? advice->depth_less : depth);
 }
 
-/* Of a full picture with all samples. */
+/* Time of the bounces of a full picture with all samples. */
 static double bounces_ns(const struct pacing *pacing, const struct pacing_advice *advice)
 {
     double sum_ns = 0.0;
@@ -126,7 +126,7 @@ static void forget_render(struct pacing *pacing)
     memset(pacing->bounce_ns, 0, sizeof(pacing->bounce_ns));
 }
 
-/* Forgets what no longer holds. */
+/* Whether a frame was disturbed. Forgets estimates that no longer hold. */
 static bool is_disturbed(struct pacing *pacing, const struct pacing_advice *made, double render_ns)
 {
     const double expected_ns = render_ns_of(pacing, made);
@@ -162,7 +162,7 @@ void pacing_guess_waves(struct pacing *pacing, const struct pacing_advice *made,
 {
     if (render_ns == 0 || pacing->render_frames > 0.0)
         return;
-    /* The layers of pictures that views are made of take as long again. */
+    /* Hidden layers, of which views are made, take as long again. */
     const unsigned times = pacing_makes_views(&pacing->terms) ? 2 : 1;
     uint64_t guessed_ns[PACING_WAVES];
     for (unsigned wave = 0; wave < PACING_WAVES; wave++)
@@ -190,15 +190,15 @@ void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes)
     learn(&pacing->hidden_bytes, (double)bytes);
 }
 
-/* With the layers that follow it. */
+/* Bytes of a picture and of the hidden layers that follow it. */
 static double bytes_of(const struct pacing *pacing, const struct pacing_advice *advice)
 {
     const double hidden = advice->no_hidden ? 0.0 : pacing->hidden_bytes * pacing->terms.hidden_layers;
     return pacing->bytes_full * area_of(pacing, advice) * bytes_of_quality(advice->quality) + hidden;
 }
 
-/* So that the sending rule passes one frame in each frame time: earlier frames that are not acknowledged yet must
- * fit too. */
+/* Bytes with which the sending rule passes one frame in each frame time: earlier frames that are not acknowledged
+ * yet must fit too. */
 static double bytes_a_frame(const struct pacing *pacing)
 {
     if (!(pacing->carried_ns > 0.0) || pacing->terms.ignores_link)
@@ -209,14 +209,14 @@ static double bytes_a_frame(const struct pacing *pacing)
     return fmin(of_link, of_room);
 }
 
-/* ---- what is given up, and in which order ------------------------------------------------------------ */
+/* ---- reductions, in their order ---------------------------------------------------------------------- */
 
-/* What a picture has to fit. */
+/* Limits that a picture must fit. */
 struct limits {
     double bytes;
     double render_ns;
-    double samples_ns;    /* of one with more than one sample */
-    double smaller_bytes; /* beyond which it is made smaller */
+    double samples_ns;    /* limit for a picture with more than one sample */
+    double smaller_bytes; /* size in bytes above which the picture is made smaller */
 };
 
 static struct limits limits_of(const struct pacing *pacing, double room)
@@ -241,23 +241,23 @@ static void lower_quality(const struct pacing *pacing, const struct limits *limi
         advice->quality--;
 }
 
-static void give_up_samples(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
+static void drop_samples(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
 {
     while (advice->samples > 1 && render_ns_of(pacing, advice) > limits->samples_ns)
         advice->samples--;
 }
 
-static void give_up_bounces(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
+static void drop_bounces(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
 {
     while (depth_of(pacing, advice) > DEPTH_MIN && render_ns_of(pacing, advice) > limits->render_ns)
         advice->depth_less++;
 }
 
-/* Samples, layers of what is hidden, and the margin, until the rest fits; some fits nothing. */
-static void give_up_extras(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
+/* Drops samples, hidden layers and the margin until the rest fits; not every picture can fit. */
+static void drop_extras(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
 {
     const bool has_margin = pacing->terms.margin > 0.0f;
-    give_up_samples(pacing, limits, advice);
+    drop_samples(pacing, limits, advice);
     advice->no_hidden = pacing->terms.hidden_layers > 0 && bytes_of(pacing, advice) > limits->bytes;
     while (has_margin && advice->margin_halves_less < 2 &&
            (bytes_of(pacing, advice) > limits->bytes || render_ns_of(pacing, advice) > limits->render_ns))
@@ -270,7 +270,7 @@ static struct pacing_advice full_advice(const struct pacing *pacing, unsigned qu
         .scale_32nds = PACING_SCALE_FULL, .quality = quality_wanted, .samples = samples_of(pacing)};
 }
 
-/* With the least quality. */
+/* Whether the picture fits at minimum quality. */
 static bool fits(const struct pacing *pacing, const struct limits *limits, unsigned minimum,
                  struct pacing_advice advice)
 {
@@ -279,7 +279,7 @@ static bool fits(const struct pacing *pacing, const struct limits *limits, unsig
            bytes_of(pacing, &advice) <= limits->smaller_bytes;
 }
 
-/* The best step that fits `room` times; else the smallest. */
+/* Best step that fits `room` times; if none fits, the smallest. */
 static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
 {
     const struct limits limits = limits_of(pacing, room);
@@ -290,21 +290,21 @@ static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned
         advice = full_advice(pacing, quality_wanted);
         advice.scale_32nds = *scale;
         if (pacing_makes_views(&pacing->terms))
-            give_up_extras(pacing, &limits, &advice); /* a smaller picture may have what a larger one did not */
+            drop_extras(pacing, &limits, &advice); /* a smaller picture may have what a larger one did not */
         if (pacing->terms.deadline_ns)
-            give_up_samples(pacing, &limits, &advice);
+            drop_samples(pacing, &limits, &advice);
         if (fits(pacing, &limits, minimum, advice))
             break;
     }
     if (pacing->terms.deadline_ns)
-        give_up_bounces(pacing, &limits, &advice);
+        drop_bounces(pacing, &limits, &advice);
     lower_quality(pacing, &limits, minimum, &advice);
     return advice;
 }
 
 /* ---- steadily ---------------------------------------------------------------------------------------- */
 
-/* What is given up last counts first. */
+/* Compares reductions, the last resort first. */
 static bool is_better(const struct pacing_advice *a, const struct pacing_advice *b)
 {
     if (a->depth_less != b->depth_less)

@@ -113,7 +113,7 @@ struct blob *blob_store_add(struct blob_store *store, blob_principal principal, 
     return blob_ref(blob);
 }
 
-/* Only the store has a reference. Uses end in other threads and begin only here. */
+/* Whether only the store has a reference. Uses end in other threads, and begin only here. */
 static bool is_idle(const struct entry *entry)
 {
     return atomic_load_explicit(&entry->blob->references, memory_order_acquire) == 1;

@@ -35,12 +35,14 @@ struct blob *blob_store_add(struct blob_store *store, blob_principal principal, 
 bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct error *error);
 /* Bytes that must be released before that many can be reserved; 0: none, or they can never be reserved. */
 uint64_t blob_store_lacking(const struct blob_store *store, uint64_t size_bytes);
-void blob_store_release(struct blob_store *store, uint64_t size_bytes); /* it is added now, or will not come */
+/* Releases reserved bytes: the blob is added now, or was abandoned. */
+void blob_store_release(struct blob_store *store, uint64_t size_bytes);
 
-void blob_store_trim(struct blob_store *store); /* to be called when uses may have ended */
+/* Drops unused blobs beyond the cache; to be called when uses may have ended. */
+void blob_store_trim(struct blob_store *store);
 /* The principal will not return: its blobs that scenes still use are kept, and counted, until their uses end. */
 void blob_store_forget(struct blob_store *store, blob_principal principal);
-uint64_t blob_store_bytes(const struct blob_store *store); /* of content, held and reserved */
+uint64_t blob_store_bytes(const struct blob_store *store); /* bytes of content, held and reserved */
 size_t blob_store_count(const struct blob_store *store);
 
 #endif

@@ -16,10 +16,10 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-/* In which clients may take their goodbye when the daemon stops. */
+/* Time in which clients may receive their goodbye when the daemon stops. */
 #define STOP_NS UINT64_C(400000000)
-/* In the time after which a device that makes no progress counts as lost. */
-#define WATCHDOG_LOOKS 4
+/* Checks within the time after which a device without progress counts as lost. */
+#define WATCHDOG_CHECKS 4
 
 static void own_signals(sigset_t *set)
 {
@@ -47,7 +47,7 @@ void daemon_init(struct daemon *daemon)
 static void stop(struct daemon *daemon)
 {
     if (daemon->hub.stopping) {
-        loop_stop(daemon->loop); /* asked twice: without goodbye */
+        loop_stop(daemon->loop); /* second signal: no goodbye */
         return;
     }
     channel_send(&daemon->front, CHANNEL_ENDING, NULL, 0, NULL);
@@ -62,7 +62,7 @@ static void on_signal(void *context, uint32_t epoll_events)
     struct signalfd_siginfo info;
     if (read(daemon->signal_fd, &info, sizeof(info)) != (ssize_t)sizeof(info))
         return;
-    /* Who manages services tells the front too, which then tells its workers. */
+    /* A service manager signals the front too, which then stops its workers. */
     if (daemon->front.watch && daemon->hub.stopping)
         return;
     log_write(daemon->front.watch ? LOG_DEBUG : LOG_INFO, "session", "stopping: %s",
@@ -122,7 +122,7 @@ static void on_emptied(void *context)
         start_unused_timer(daemon);
 }
 
-/* A client that has come since then starts the timer again when it goes. */
+/* Reports that no client is left; a client that has arrived since then restarts the timer when it goes. */
 static void on_unused_timer(void *context)
 {
     struct daemon *daemon = context;
@@ -162,8 +162,8 @@ static void take_owner(struct daemon *daemon, const struct channel_owner *owner)
     send_ready(daemon, true);
 }
 
-/* A driver that hangs cannot be healed from within. One long slice is no sign of it: a look that finds no progress
- * is followed by others before the time is over. */
+/* Reports a hanging driver, which cannot be healed from within. One long slice is no sign of it: several checks
+ * must find no progress. */
 static void on_watchdog_timer(void *context)
 {
     struct daemon *daemon = context;
@@ -173,7 +173,7 @@ static void on_watchdog_timer(void *context)
         daemon->alive_ns = now_ns;
     else if (now_ns - daemon->alive_ns >= daemon->watchdog_ns)
         channel_send(&daemon->front, CHANNEL_HANGS, NULL, 0, NULL);
-    loop_timer_start(daemon->loop, &daemon->watchdog_timer, daemon->watchdog_ns / WATCHDOG_LOOKS);
+    loop_timer_start(daemon->loop, &daemon->watchdog_timer, daemon->watchdog_ns / WATCHDOG_CHECKS);
 }
 
 static void on_received(void *context, enum channel_kind kind, const void *payload, size_t bytes,
@@ -215,7 +215,7 @@ static void on_received(void *context, enum channel_kind kind, const void *paylo
     }
 }
 
-/* The front was killed, or has crashed: clients are to see just that. */
+/* Ends without goodbye, since the front was killed or has crashed: clients must see just that. */
 static void on_front_gone(void *context)
 {
     struct daemon *daemon = context;

@@ -11,9 +11,9 @@
 
 /* The requirement on the header's request number. */
 enum dispatch_request {
-    DISPATCH_ANY,       /* the handler sees to it */
+    DISPATCH_ANY,       /* the handler checks it */
     DISPATCH_STARTS,    /* a new one; the handler gets it */
-    DISPATCH_CONTINUES, /* one in flight of the row's kind; the handler gets it */
+    DISPATCH_CONTINUES, /* a request in flight of the row's kind; the handler gets it */
 };
 
 struct dispatch_row {

@@ -91,7 +91,7 @@ static bool make_room(struct session *session, struct transaction *transaction, 
     return true;
 }
 
-/* Of an edit, besides itself. Blobs are counted where they are held. */
+/* Bytes of an edit's arrays. Blobs are counted where they are held. */
 static uint64_t bytes_beside(const struct scene_edit *edit)
 {
     if (edit->kind != EDIT_SET)
@@ -144,7 +144,7 @@ void edits_commit(struct session *session, struct request *request)
         command->base_revision = transaction->base_revision;
         command->edits = transaction->edits;
         command->edit_count = transaction->count;
-        /* They are counted until the engine has answered: it may keep them for as long as a frame takes. */
+        /* Edits are counted until the engine has answered: it may keep them for as long as a frame takes. */
         request->edits = transaction->count;
         request->edit_bytes = transaction->bytes;
         transaction->edits = NULL;

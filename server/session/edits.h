@@ -9,26 +9,26 @@
 
 struct transaction {
     uint32_t scene;
-    uint64_t base_revision; /* as of edit_begin */
+    uint64_t base_revision; /* the client's, from edit_begin */
     struct scene_edit *edits;
     size_t count, capacity;
-    uint64_t bytes; /* of the edits and their memory, without blobs */
+    uint64_t bytes; /* memory of the edits, without blobs */
 };
 
 void edits_begin(struct session *session, struct request *request, const struct message_edit_begin *begin);
-/* One edit, or EDIT_COMMIT, of an open transaction. */
+/* Adds an edit to an open transaction. */
 void edits_add(struct session *session, struct request *request, const struct message *message);
 void edits_commit(struct session *session, struct request *request);
 /* Answers the request with the error; later messages of the transaction are skipped. */
 void edits_fail(struct session *session, struct request *request, const struct error *error);
-/* Edits, and their bytes, that wait from now on (or no more, if negative). */
+/* Adds to the numbers of waiting edits and their bytes; negative: subtracts. */
 void edits_count(struct session *session, int64_t edits, int64_t bytes);
 void transaction_destroy(struct session *session, struct transaction *transaction); /* accepts NULL */
 
-/* What edits refer to beyond their messages. */
+/* Source of blobs to which edits refer, and the limit of textures. */
 struct edit_source {
-    /* The blob of a reference, or NULL where none is meant. False and *error, whose field is `field`: it is not
-     * there. */
+    /* Gets the blob of a reference, NULL for an empty one. False and *error, whose field is `field`: there is no
+     * such blob. */
     bool (*resolve)(void *context, const struct record_blob_ref *reference, const char *field, struct blob **blob,
                     struct error *error);
     void *context;

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#define MEASURE_MAX 3e38f /* the message's */
+#define MEASURE_MAX 3e38f /* the protocol's maximum */
 
 static void put_u32(uint8_t *out, uint32_t value)
 {
@@ -13,8 +13,8 @@ static void put_u32(uint8_t *out, uint32_t value)
         out[i] = (uint8_t)(value >> (8 * i));
 }
 
-/* The same bytes as message_write() makes of a frame_data message, up to the frame's own (a test compares the
- * two): writing them here avoids a copy of every frame. */
+/* Writes the bytes that message_write() makes of a frame_data message before the frame's own (a test compares the
+ * two), without a copy of every frame. */
 void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,
                      uint64_t offset_bytes, uint32_t data_bytes)
 {

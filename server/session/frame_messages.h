@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The messages of a frame, as an engine's frame says them. */
+/* The messages of a frame, filled from the engine's frame. */
 #ifndef FARLIGHT_SESSION_FRAME_MESSAGES_H
 #define FARLIGHT_SESSION_FRAME_MESSAGES_H
 
@@ -11,7 +11,7 @@
 /* Header and fixed part of a frame_data message, up to the bytes themselves. */
 #define FRAME_DATA_HEAD_BYTES 32u
 
-/* What a FRAME_END refers to. */
+/* Records to which a FRAME_END refers. */
 struct frame_end_records {
     struct record_stage_time stages[STAGE_SPANS_MAX];
     struct record_wave_comparison comparisons[COMPARISONS_MAX];

@@ -11,19 +11,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Lives until the last message that refers to its bytes is gone. */
+/* A frame from the engine, kept until the last message that refers to its bytes is gone. */
 struct pending_frame {
     struct out_chunk chunk; /* first: release() gets its address */
     struct pending_frame *next;
     struct job *job;  /* NULL: dropped */
-    uint32_t request; /* the job's, or that of a view that it has replaced */
+    uint32_t request; /* the job's request, or that of a view that the job has replaced */
     struct engine_frame *frame;
-    struct hub *counted_by; /* its bytes, counted apart from those of jobs; NULL: they count as the job's */
+    struct hub *counted_by; /* counts its bytes apart from the job's; NULL: they count as the job's */
     bool begun;
-    bool queued;                     /* all that is to go is with the connection */
-    size_t end_bytes;                /* that are to go: all, or less where it is cut */
-    size_t queued_bytes, sent_bytes; /* with the connection; with the kernel, in complete chunks */
-    uint64_t begun_ns;               /* FRAME_BEGIN was handed to the kernel */
+    bool queued;      /* whether the connection has all bytes up to end_bytes */
+    size_t end_bytes; /* bytes to send: all, or fewer where the frame is cut */
+    /* Bytes given to the connection; bytes accepted by the kernel, in complete chunks. */
+    size_t queued_bytes, sent_bytes;
+    uint64_t begun_ns; /* time at which FRAME_BEGIN was handed to the kernel; 0: not yet */
 };
 
 static void engine_frame_destroy(struct engine_frame *frame)
@@ -87,12 +88,12 @@ uint32_t frames_drop(struct session *session, struct job *job)
     return before;
 }
 
-unsigned frames_of_before(const struct job *job)
+unsigned frames_of_replaced(const struct job *job)
 {
     return job->first && job->first->request != job->request;
 }
 
-uint64_t frames_bytes_of_before(const struct job *job)
+uint64_t frames_bytes_of_replaced(const struct job *job)
 {
     return job->first && job->first->counted_by ? job->first->chunk.size_bytes : 0;
 }
@@ -150,7 +151,7 @@ static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now
 
 /* ---- on the way -------------------------------------------------------------------------------------- */
 
-/* From there on, within one part: its chunks never change. */
+/* Bytes of the chunk from there on, within a part; chunks never change. */
 static size_t chunk_bytes(const struct pending_frame *pending, size_t from_bytes, bool is_view)
 {
     const struct engine_frame *frame = pending->frame;
@@ -204,9 +205,9 @@ static void abandon(struct job *job, struct pending_frame *pending)
     if (!view_is_long(job, pending->frame->size_bytes - with_kernel_bytes(job, pending)))
         return;
     if (!out_queue_drop_unbegun(&job->session->connection->out, request, 0) && pending->queued)
-        return; /* the last of it is under way */
+        return; /* its last bytes are under way */
     uint64_t now_ns = clock_now_ns();
-    bool announced = pending->begun_ns || pending->chunk.references > 1; /* or a part of that is under way */
+    bool announced = pending->begun_ns || pending->chunk.references > 1; /* or FRAME_BEGIN is partly sent */
     if (!pending->begun_ns)
         pending->begun_ns = now_ns;
     if (announced)
@@ -216,7 +217,7 @@ static void abandon(struct job *job, struct pending_frame *pending)
     job_frame_abandoned(job, request);
 }
 
-/* A picture that came later and waits. */
+/* Whether a later picture waits behind it. */
 static bool has_newer(const struct pending_frame *pending)
 {
     const struct pending_frame *newer = pending->next;
@@ -225,9 +226,9 @@ static bool has_newer(const struct pending_frame *pending)
     return newer;
 }
 
-/* Where the frame ends if it goes no farther than it must; 0: not with an answer. What gives way to motion waits
- * for no long rest of a part; what moves shows something in any case. */
-static size_t early_end(const struct job *job, const struct pending_frame *pending, bool gives_way)
+/* Earliest end of the frame; 0: it cannot end with an answer. A frame that yields to motion does not wait for a
+ * long rest of a part; a moving frame shows something in any case. */
+static size_t early_end(const struct job *job, const struct pending_frame *pending, bool yields)
 {
     const struct part_list *parts = &pending->frame->parts;
     if (!parts->count)
@@ -236,19 +237,19 @@ static size_t early_end(const struct job *job, const struct pending_frame *pendi
     begun = begun > pending->sent_bytes ? begun : pending->sent_bytes;
     const size_t needed = parts_needed_bytes(parts), part_end = parts_end(parts, begun);
     const size_t wanted = part_end > needed ? part_end : needed;
-    if (!gives_way || !view_is_long(job, wanted - begun))
+    if (!yields || !view_is_long(job, wanted - begun))
         return wanted;
     return begun >= needed ? begun : 0;
 }
 
-static void cut(struct job *job, struct pending_frame *pending, size_t end_bytes, bool gives_way)
+static void cut(struct job *job, struct pending_frame *pending, size_t end_bytes, bool yields)
 {
     out_queue_drop_unbegun(&job->session->connection->out, pending->request, end_bytes);
     pending->end_bytes = end_bytes;
     if (pending->queued_bytes > end_bytes)
         pending->queued_bytes = end_bytes;
     pending->queued = pending->queued_bytes == end_bytes;
-    view_frame_cut(job, pending->frame, end_bytes, gives_way);
+    view_frame_cut(job, pending->frame, end_bytes, yields);
     if (pending->sent_bytes == end_bytes)
         end(job, pending, clock_now_ns());
 }
@@ -258,18 +259,18 @@ void frames_overtake(struct job *job)
     struct pending_frame *pending = job->first;
     if (!pending || !pending->begun || pending->end_bytes < pending->frame->size_bytes)
         return;
-    const bool gives_way = view_is_overtaken(job, pending->frame);
+    const bool yields = view_is_overtaken(job, pending->frame);
     const bool is_behind = pending->frame->moving && has_newer(pending);
-    const size_t end_bytes = gives_way || is_behind ? early_end(job, pending, gives_way) : 0;
+    const size_t end_bytes = yields || is_behind ? early_end(job, pending, yields) : 0;
     if (end_bytes && end_bytes < pending->end_bytes)
-        cut(job, pending, end_bytes, gives_way);
-    else if (!end_bytes && gives_way && job->session->can_abandon)
+        cut(job, pending, end_bytes, yields);
+    else if (!end_bytes && yields && job->session->can_abandon)
         abandon(job, pending);
 }
 
 /* ---- on the way -------------------------------------------------------------------------------------- */
 
-/* Takes the records that the message refers to, too: none of it is read later. */
+/* Queues a message and copies the records to which it refers. */
 static bool queue_message(struct pending_frame *pending, const struct message *message, out_sent_fn *sent)
 {
     struct out_message *out = out_message_create(message_write_bytes(message));
@@ -285,7 +286,7 @@ static bool queue_message(struct pending_frame *pending, const struct message *m
     out->request = pending->request;
     out->sent = sent;
     out->context = pending;
-    out->body = &pending->chunk; /* no bytes of it: it keeps the frame alive */
+    out->body = &pending->chunk; /* a reference without bytes, which keeps the frame alive */
     out_chunk_ref(&pending->chunk);
     connection_send_raw(job->session->connection, out, true);
     return true;
@@ -357,7 +358,7 @@ static struct job *next_job(struct session *session)
     return job;
 }
 
-/* Frames that waited for the link until they were not worth it any more. */
+/* Drops frames that have waited for the link until a newer one is better. */
 static void drop_outdated(struct session *session)
 {
     for (struct job *job = session->jobs; job; job = job->next) {
@@ -382,7 +383,7 @@ void frames_pump(struct session *session)
         bool begins = !pending->begun;
         if ((!begins || queue_begin(pending)) && queue_piece(pending)) {
             if (begins && job->view)
-                frames_overtake(job); /* while it waited */
+                frames_overtake(job); /* a frame may have been overtaken while it waited */
             continue;
         }
         struct error error = {0};

@@ -18,22 +18,22 @@ struct session;
 /* The chunk size of a picture at rest: a moving frame that overtakes it waits for one chunk. */
 #define FRAME_PIECE_AT_REST_BYTES ((size_t)32 << 10)
 
-/* Takes the frame over, in any case. */
+/* Adds a frame from the engine; takes it over in any case. */
 void frames_add(struct job *job, struct engine_frame *frame);
 /* Drops the job's frames that have not begun on the wire, and detaches the rest. Returns the request of a replaced
  * view, if one of those frames was that view's; 0: none was. */
 uint32_t frames_drop(struct session *session, struct job *job);
-/* Drops frames that have not begun, as another view replaces the job's. True: one frame of the request has begun
- * and will be finished; until its bytes are released it counts in addition to the job's share. */
+/* Drops frames that have not begun, as another view replaces the job's. True: a frame of the request has begun and
+ * will be finished; until its bytes are released it counts in addition to the job's share. */
 bool frames_keep_begun(struct job *job);
 /* The number of its frames under way that belong to a replaced view: 0 or 1. */
-unsigned frames_of_before(const struct job *job);
-uint64_t frames_bytes_of_before(const struct job *job);
-/* Its frames whose first byte has gone, but not the last: 0 or 1. */
+unsigned frames_of_replaced(const struct job *job);
+uint64_t frames_bytes_of_replaced(const struct job *job);
+/* Number of its frames that are partly sent: 0 or 1. */
 unsigned frames_on_the_wire(const struct job *job);
-/* Ends the view's frame on the wire early if it has been overtaken: one at rest, or of what is hidden, by motion;
- * one of motion by a newer picture that waits. In parts it ends after the one under way, else it is abandoned if
- * the client understands that, and if it is not of motion. */
+/* Ends the view's partly sent frame early if it is overtaken: a frame at rest, or a hidden layer, by motion; a
+ * moving frame by a newer picture that waits. A frame in parts ends after its current part. Another frame is
+ * abandoned if the client understands that, unless it shows motion. */
 void frames_overtake(struct job *job);
 /* Queues chunks while the connection wants bulk; jobs take turns. */
 void frames_pump(struct session *session);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/guess.h"
 
-/* Of one pass of one wave. */
+/* Times of a pass in one wave. */
 struct repeated {
     uint64_t sum_ns, longest_ns, count;
 };

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-/* If so many wait, the network thread is the faster one, and hashes the next itself. */
+/* Maximum of waiting chunks; when they are reached, the network thread hashes the next chunk itself. */
 #define WAITING_MAX 16u
 
 struct chunk {
@@ -19,7 +19,7 @@ struct chunk {
 };
 
 struct hasher {
-    pthread_mutex_t lock; /* of all that follows but the thread, and of the counters */
+    pthread_mutex_t lock; /* guards the members below except the thread, and the counters */
     pthread_cond_t added, hashed;
     struct chunk waiting[WAITING_MAX]; /* a ring */
     uint32_t first, count;
@@ -27,7 +27,7 @@ struct hasher {
     pthread_t thread;
 };
 
-/* Locked, and there is one. It is hashed without the lock. */
+/* Hashes the next chunk. The caller holds the lock, which is released while the chunk is hashed. */
 static void hash_next(struct hasher *hasher)
 {
     const struct chunk chunk = hasher->waiting[hasher->first];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Hashes chunks of blobs that arrive on a thread of its own, while the network thread receives the next ones: to
- * hash takes longer than to receive. All calls are the network thread's. */
+/* Hashes chunks of arriving blobs on a thread of its own while the network thread receives the next ones, as
+ * hashing takes longer than receiving. Only the network thread calls these functions. */
 #ifndef FARLIGHT_SESSION_HASHER_H
 #define FARLIGHT_SESSION_HASHER_H
 
@@ -9,13 +9,13 @@
 
 struct hasher;
 
-/* NULL: there is one processor, or no thread or memory to be had; the calls below accept it and hash at once. */
+/* NULL: there is only one processor, or no thread or memory; the functions below accept NULL and hash at once. */
 struct hasher *hasher_create(void);
 void hasher_destroy(struct hasher *hasher);
-/* Sets `hash` to that of the chunk by the time that hasher_await() of the same counter has returned. Until then
- * *left counts it, and neither the bytes nor the place of the hash may move. */
+/* Queues a chunk, whose hash is set when hasher_await() of the same counter returns. Until then *left counts the
+ * chunk, and neither its bytes nor `hash` may move. */
 void hasher_add(struct hasher *hasher, uint8_t *hash, const uint8_t *data, size_t size_bytes, uint32_t *left);
-/* Helps until what *left counts is hashed. */
+/* Helps until every chunk that *left counts is hashed. */
 void hasher_await(struct hasher *hasher, const uint32_t *left);
 
 #endif

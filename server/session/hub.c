@@ -12,7 +12,8 @@
 #define RETRY_NS UINT64_C(2000000)
 /* Maximum of engine events that are handled before clients get their turn again. */
 #define EVENTS_A_TURN 64
-/* With so many commands that wait for the engine, no client is read from until half of them are gone. */
+/* Number of commands waiting for the engine at which clients are no longer read from; reading resumes at half of
+ * it. */
 #define COMMANDS_MAX 64
 
 /* ---- commands ---------------------------------------------------------------------------------------- */
@@ -140,7 +141,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct handover *handover, st
     if (!session)
         return false;
     if (!hashmap_put(&hub->sessions, ++hub->last_number, session)) {
-        /* The descriptor is the connection's by now. */
+        /* The connection already owns the descriptor. */
         session_close(session);
         return true;
     }
@@ -168,7 +169,7 @@ static void set_connection_limits(struct hub *hub, const struct connection_limit
         hub->owner_limits.idle_ms = hub->owner_limits.lost_ms = 0;
 }
 
-/* A key is replaced because somebody has it that should not: its holders go at once. */
+/* Disconnects clients whose key was replaced: a key is replaced because the wrong person has it. */
 static void end_those_without_key(struct hub *hub)
 {
     size_t cursor = 0;

@@ -11,14 +11,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* More frames than this need not wait here: the engine renders the next ones meanwhile. */
+/* Maximum of frames that wait here: the engine renders the next ones meanwhile. */
 #define WINDOW_FRAMES_MAX 4
 #define ZSTD_LEVEL_MAX 19
-/* Of the 4 GiB that a frame_begin may announce; the rest is left to what zstd adds to noise. */
+/* Maximum of a frame, below the 4 GiB that a frame_begin may announce: zstd may enlarge noise. */
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20)
 #define BEAUTY_ALONE (1u << PROTOCOL_LAYER_BEAUTY)
 #define ATTACHMENT_PIXEL_BYTES 4
-#define WEIGHT_OF_VIEW 4 /* somebody waits for each of its frames */
+#define WEIGHT_OF_VIEW 4 /* a person waits for each of its frames */
 #define WEIGHT_OF_BATCH 1
 #define QUALITY_OF_JPEG 90
 #define QUALITY_OF_H264 80
@@ -27,7 +27,7 @@
 
 /* ---- checks ------------------------------------------------------------------------------------------ */
 
-/* Of a view's frame while it moves. */
+/* Pixels of a view's frame while the camera moves. */
 static uint32_t with_margin(const struct message_render *render, uint32_t pixels)
 {
     return pixels + 2 * margin_pixels(render->margin, pixels);
@@ -74,7 +74,7 @@ static bool has_views(const struct message_render *render)
     return render->views_across > 1 || render->views_down > 1;
 }
 
-/* Several views in a picture. */
+/* Checks several views in a picture. */
 static bool check_eyes(const struct message_render *render, struct error *error)
 {
     if (render->eyes_over && (render->views_across != 1 || render->views_down < 2)) {
@@ -90,7 +90,7 @@ static bool check_eyes(const struct message_render *render, struct error *error)
     return error_remedy(error, "give the distance of neighbouring eyes in metres");
 }
 
-/* Frames between those that are rendered. */
+/* Checks frames that are made from rendered ones. */
 static bool check_upsample(const struct message_render *render, struct error *error)
 {
     if (render->upsample == 1)
@@ -138,7 +138,7 @@ static bool is_made_of_layers(const struct message_render *render)
            (has_views(render) || render->aperture > 0.0f || render->upsample > 1);
 }
 
-/* Tiles of their own numbers of samples. */
+/* Checks sampling to a noise, in which tiles differ in their number of samples. */
 static bool check_noise(const struct message_render *render, struct error *error)
 {
     if (!(render->noise > 0.0f))
@@ -154,7 +154,7 @@ static bool check_noise(const struct message_render *render, struct error *error
     return error_remedy(error, "set view_source to rays, or noise to 0");
 }
 
-/* Neighbours of its pixels are not there. */
+/* Checks the ground, which pictures made of layers do not show: its pixels would lack their neighbours. */
 static bool check_ground(const struct message_render *render, struct error *error)
 {
     const double up =
@@ -208,7 +208,7 @@ static bool check_views(const struct message_render *render, struct error *error
     return error_remedy(error, "set view_source to rays, or shutter to 0");
 }
 
-/* The width and height of all views together. */
+/* Checks the width and height of the views together. */
 static bool check_size(const struct session_limits *limits, const struct message_render *render,
                        struct error *error)
 {
@@ -270,14 +270,15 @@ uint64_t job_bytes(const struct session *session, const struct message_render *r
     return frame_bytes * (in_engine + job_window(session, render));
 }
 
-/* A job that has begun is never short of room for its next frame: there is room for it, or it does not begin. */
+/* Checks memory for frames: a job starts only if there is memory for its frames, so a started job never lacks it.
+ */
 static bool check_room(const struct session *session, const struct message_render *render, struct error *error)
 {
     const struct hub *hub = session->hub;
     const struct job *before = job_replaced_by(session, render);
     const struct session_limits *limits = &hub->options.limits;
     uint64_t bytes = job_bytes(session, render), limit_bytes = limits->frame_bytes;
-    uint64_t before_bytes = before ? before->frame_bytes + frames_bytes_of_before(before) : 0;
+    uint64_t before_bytes = before ? before->frame_bytes + frames_bytes_of_replaced(before) : 0;
     uint64_t used_bytes = hub->frame_bytes - before_bytes;
     if (!used_bytes || (bytes <= limit_bytes && used_bytes <= limit_bytes - bytes))
         return true;
@@ -335,7 +336,7 @@ static bool check_tracers(const struct message_render *render, struct error *err
     return error_remedy(error, "%s", fault.remedy);
 }
 
-/* What is different with views. */
+/* Checks options that differ between views and batches. */
 static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
     if (render->margin > 0.0f && render->kind == PROTOCOL_JOB_BATCH) {
@@ -381,7 +382,7 @@ bool job_check(const struct session *session, const struct message_render *rende
            check_room(session, render, error);
 }
 
-/* Where the client leaves it to us. */
+/* Quality of the encoding, a default where the client sets none. */
 static uint32_t job_quality(const struct message_render *render)
 {
     if (render->quality)
@@ -438,7 +439,7 @@ static struct tracer_options options_of(const struct session *session, const str
     return options;
 }
 
-/* All but keys and clips, which are there already. */
+/* Fills the job except keys and clips, which are set already. */
 static void fill_rest(struct engine_job *job, const struct session *session, const struct message_render *render)
 {
     bool is_view = render->kind == PROTOCOL_JOB_VIEW;

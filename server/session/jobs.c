@@ -9,7 +9,7 @@
 
 #include <stdlib.h>
 
-/* Time without a frame after which the client is told why. */
+/* Time without a frame after which the client is notified of the reason. */
 #define BLOCKED_NS UINT64_C(100000000)
 
 struct job *jobs_find(const struct session *session, uint32_t channel)
@@ -31,7 +31,7 @@ static uint64_t allowed_credit(struct job *job)
     return job->frames_gone + (left < job->window ? left : job->window);
 }
 
-/* A job of its own. NULL: out of memory. */
+/* Creates a job that replaces none. NULL: out of memory. */
 static struct job *job_create(struct session *session, uint32_t request, const struct message_render *render)
 {
     bool is_view = render->kind == PROTOCOL_JOB_VIEW;
@@ -67,8 +67,8 @@ static struct job *job_create(struct session *session, uint32_t request, const s
     return job;
 }
 
-/* In the place of the view `job`. Its frames may be begun as far as the client's credit goes beyond those on their
- * way. */
+/* Adds a view that will replace the view `job`. A frame of it may begin if the client's credit exceeds the frames
+ * sent. */
 static bool add_change(struct job *job, uint32_t request, const struct message_render *render)
 {
     struct view_change *change = calloc(1, sizeof(*change));
@@ -118,7 +118,7 @@ void jobs_start(struct session *session, struct request *request, const struct m
 
 /* ---- pace -------------------------------------------------------------------------------------------- */
 
-/* Why nothing comes, if it is for the client to change that; NULL: it is not. */
+/* Reason why no frame is sent, if the client can change it; NULL: there is none. */
 static const char *blocked_by(const struct job *job)
 {
     if (job->rendered || job->cancelled || (job->view && !view_wants_more(job)))
@@ -134,7 +134,7 @@ static void on_blocked_timer(void *context)
     const char *why = blocked_by(job);
     if (!why)
         return;
-    job->blocked_told = job->frames_sent + 1;
+    job->blocked_noticed = job->frames_sent + 1;
     struct message message;
     message_init(&message, MESSAGE_BLOCKED);
     message.blocked.channel = job->channel;
@@ -145,14 +145,14 @@ static void on_blocked_timer(void *context)
 
 void job_watch_for_blocks(struct job *job)
 {
-    if (job->blocked_timer.running || job->blocked_told == job->frames_sent + 1 || !blocked_by(job))
+    if (job->blocked_timer.running || job->blocked_noticed == job->frames_sent + 1 || !blocked_by(job))
         return;
     job->blocked_timer.call = on_blocked_timer;
     job->blocked_timer.context = job;
     loop_timer_start(job->session->hub->loop, &job->blocked_timer, BLOCKED_NS);
 }
 
-static void tell_engine_credit(struct job *job)
+static void submit_credit(struct job *job)
 {
     struct session *session = job->session;
     uint64_t allowed = allowed_credit(job);
@@ -161,7 +161,7 @@ static void tell_engine_credit(struct job *job)
         return;
     struct engine_command *command = hub_command(ENGINE_JOB_CREDIT, session->number, job->request);
     if (!command) {
-        session_fail_for_memory(session); /* the job might wait for ever */
+        session_fail_for_memory(session); /* the job might wait forever */
         return;
     }
     command->target_request = job->request;
@@ -173,7 +173,7 @@ static void tell_engine_credit(struct job *job)
 
 void job_pace(struct job *job)
 {
-    tell_engine_credit(job);
+    submit_credit(job);
     connection_wake(job->session->connection);
 }
 
@@ -193,7 +193,7 @@ bool job_is_owed(const struct job *job)
 
 /* ---- end --------------------------------------------------------------------------------------------- */
 
-/* Frames that the kernel has not accepted yet. A replaced view waits for one of them. */
+/* Drops the frames that the kernel has not accepted yet. A replaced view may wait for one of them. */
 static void drop_frames(struct session *session, struct job *job)
 {
     uint32_t before = frames_drop(session, job);
@@ -216,7 +216,7 @@ static void destroy(struct session *session, struct job *job)
     free(job);
 }
 
-/* The engine has ended the job's request: a view that was to replace it is the current one now. */
+/* Ends the job after the engine has ended its request; if a view was to replace it, that view becomes current. */
 static void end(struct session *session, struct job *job)
 {
     if (!job->view || !job->view->changes) {
@@ -226,7 +226,7 @@ static void end(struct session *session, struct job *job)
     drop_frames(session, job);
     view_switch(job);
     view_forget_frames(job);
-    tell_engine_credit(job);
+    submit_credit(job);
 }
 
 void job_failed(struct session *session, struct request *request, const struct error *error)
@@ -256,12 +256,12 @@ static void finish_if_complete(struct session *session, struct job *job)
     request_answer_ok(session, request, 0);
 }
 
-/* Another view is in its place. A frame that is under way is finished before the answer. */
+/* Replaces the view by the next one. A frame under way is finished before the request is answered. */
 static void view_replaced(struct session *session, struct job *job, struct request *request)
 {
     bool under_way = frames_keep_begun(job);
     view_switch(job);
-    tell_engine_credit(job);
+    submit_credit(job);
     if (!under_way)
         request_answer_ok(session, request, 0);
 }
@@ -275,21 +275,22 @@ void job_done(struct session *session, struct request *request)
     }
     job->rendered = true;
     if (job->cancelled)
-        fail_cancelled(session, request); /* it ended before the engine heard of it, but its frames are dropped */
+        /* The job ended before the engine got the cancel, but its frames are dropped. */
+        fail_cancelled(session, request);
     else
         finish_if_complete(session, job);
 }
 
-/* Of the frame under way nothing more will go. */
+/* Ends the frame under way, of which no more bytes will be sent. */
 static void frame_over(struct job *job, uint32_t request_id)
 {
     if (request_id != job->request) {
         request_answer_ok(job->session, request_find(job->session, request_id), 0);
-        tell_engine_credit(job);
+        submit_credit(job);
         return;
     }
     job->frames_gone++;
-    tell_engine_credit(job);
+    submit_credit(job);
     finish_if_complete(job->session, job);
 }
 
@@ -319,7 +320,7 @@ void job_cancel(struct session *session, struct request *target, struct request 
     struct view_change *change = view_find_change(job, target->id);
     bool current = target->id == job->request;
     if (!current && !change) {
-        target->cancelled_by = cancel->id; /* another view is in its place, and its last frame under way */
+        target->cancelled_by = cancel->id; /* replaced, and its last frame is under way */
         return;
     }
     if (current && job->rendered) {
@@ -328,8 +329,8 @@ void job_cancel(struct session *session, struct request *target, struct request 
         return;
     }
     struct engine_command *command = hub_command(ENGINE_JOB_CANCEL, session->number, cancel->id);
-    if (command) { /* else the job goes on, and another cancel may end it */
-        /* A view that another one is about to take the place of ends by that, if it does. */
+    if (command) { /* without memory the job continues, and another cancel may end it */
+        /* A view that is about to be replaced ends by that. */
         if (change) {
             change->cancelled = true;
         } else if (!job->view || !job->view->changes) {

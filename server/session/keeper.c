@@ -14,7 +14,7 @@
 
 #define SCENE 1u /* its number while it is restored */
 
-#define LOOK_MS 50 /* between two looks at whether the daemon is to stop */
+#define CHECK_MS 50 /* interval of checks whether the daemon must stop */
 
 static void name_record(uint8_t record_name[STORE_NAME_BYTES], uint64_t principal, const char *name)
 {
@@ -92,7 +92,7 @@ static bool is_asked_to_stop(void)
            (sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1);
 }
 
-/* From the store into memory, where its next client finds it, too. */
+/* Loads a blob from the store into memory, where its next client finds it too. */
 static struct blob *load_blob(struct restoring *restoring, const struct record_blob_ref *reference,
                               struct error *error)
 {
@@ -125,7 +125,8 @@ static bool resolve(void *context, const struct record_blob_ref *reference, cons
     return *blob != NULL;
 }
 
-/* Waits for that answer. False and *error: the daemon is to stop, or a command of that client has failed. */
+/* Waits for an answer of the engine. False and *error: the daemon must stop, or a command of that client has
+ * failed. */
 static bool wait_for_answer(struct restoring *restoring, uint64_t client, uint32_t request, struct error *error)
 {
     const struct engine_port *engine = &restoring->hub->options.engine;
@@ -141,13 +142,13 @@ static bool wait_for_answer(struct restoring *restoring, uint64_t client, uint32
             continue;
         }
         struct pollfd events = {.fd = engine->event_fd(engine->context), .events = POLLIN};
-        poll(&events, 1, LOOK_MS);
+        poll(&events, 1, CHECK_MS);
         if (is_asked_to_stop())
             return error_set(error, ERROR_CANCELLED, "", "the daemon stops");
     }
 }
 
-/* Takes what the command holds over. */
+/* Submits a command and waits for its answer; takes over the contents of the command. */
 static bool carry_out(struct restoring *restoring, struct engine_command *command, struct error *error)
 {
     const struct engine_port *engine = &restoring->hub->options.engine;
@@ -161,7 +162,7 @@ static bool carry_out(struct restoring *restoring, struct engine_command *comman
     return false;
 }
 
-/* As a client would that comes, makes the scene, and leaves it. Takes the edits over. */
+/* Makes the scene with the commands of a client that opens, edits and closes it. Takes over the edits. */
 static bool make_scene(struct restoring *restoring, struct scene_record *scene, struct error *error)
 {
     uint64_t client = ++restoring->hub->last_number;
@@ -224,7 +225,7 @@ void keeper_restore(struct store *store, struct hub *hub)
         store_tried(store, names[i]);
         if (restored || error.kind == ERROR_CANCELLED)
             continue;
-        /* What there is no place for now may have one after another start. */
+        /* A scene that does not fit now may fit after another start. */
         bool stays = error.kind == ERROR_LIMIT || error.kind == ERROR_OUT_OF_MEMORY;
         log_write(LOG_WARNING, "store", "a scene cannot be restored, and %s: %s%s%s",
                   stays ? "stays on the disk" : "is removed", error.field, error.field[0] ? ": " : "", error.text);
@@ -232,5 +233,5 @@ void keeper_restore(struct store *store, struct hub *hub)
             store_remove(store, names[i]);
     }
     free(names);
-    blob_store_forget(hub->blobs, PRINCIPAL_NOBODY); /* none of them is offered by its client again */
+    blob_store_forget(hub->blobs, PRINCIPAL_NOBODY); /* their clients will not offer these blobs again */
 }

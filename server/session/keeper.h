@@ -6,10 +6,10 @@
 #include "session/hub.h"
 #include "store/store.h"
 
-/* For the engine's thread of that kind. *store outlives the engine; while it is NULL nothing is kept. */
+/* Keeper for the engine. *store outlives the engine; while it is NULL nothing is kept. */
 struct engine_keeper keeper_port(struct store **store);
 
-/* Makes the scenes of the store again, as their users' and keys' lingering ones, before any client is served. What
+/* Restores the scenes of the store as lingering scenes of their owners, before any client is served. A scene that
  * cannot be restored is removed, or stays on the disk where memory or a limit is the reason, and the log says so.
  * Ends early where SIGTERM or SIGINT waits; the rest stays on the disk. */
 void keeper_restore(struct store *store, struct hub *hub);

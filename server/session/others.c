@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NOBODY UINT64_MAX /* a principal that has no scene: it may attach to shared ones alone */
+#define NOBODY UINT64_MAX /* a principal without scenes, which may attach to shared ones only */
 
 struct waiter {
     struct waiter *next;
@@ -18,7 +18,7 @@ struct waiter {
     void *context;
 };
 
-/* A question of clients here to the other workers. */
+/* A question from clients of this worker to the other workers. */
 struct question {
     struct others *others;
     uint32_t number;
@@ -26,13 +26,13 @@ struct question {
     uint32_t is_read_only;
     struct waiter *waiters;
     struct others_answer *answers, **end;
-    uint32_t count, awaited; /* answers that came; that come, UINT32_MAX: not known yet */
+    uint32_t count, awaited; /* answers so far, and answers expected; UINT32_MAX: not known yet */
     struct loop_timer timer;
 };
 
 struct others {
     struct hub *hub;
-    struct channel *front;    /* NULL: there are no others */
+    struct channel *front;    /* NULL: there are no other workers */
     struct hashmap questions; /* struct question *, by number */
     uint32_t last_question;
     struct hashmap asked; /* struct channel_question *, of other workers, by the number of the engine's request */
@@ -70,8 +70,8 @@ static void on_timer(void *context)
     finish(context);
 }
 
-/* Questions for figures join one that is under way, so that many of them are no more work for other users.
- * Questions for scenes do not: one may have been opened since. */
+/* Pending question that answers this one too. Questions for statistics are shared, so that many of them cost other
+ * users no more than one. Questions for scenes are not: a scene may have been opened since. */
 static struct question *find_alike(const struct others *others, enum channel_what what, uint32_t is_read_only)
 {
     size_t cursor = 0;
@@ -84,7 +84,7 @@ static struct question *find_alike(const struct others *others, enum channel_wha
     return NULL;
 }
 
-/* NULL: there is nobody to ask, or no memory to do so. */
+/* Asks the other workers. NULL: there are none, or no memory. */
 static struct question *ask(struct others *others, enum channel_what what, uint32_t is_read_only,
                             uint64_t timeout_ns)
 {
@@ -102,7 +102,7 @@ static struct question *ask(struct others *others, enum channel_what what, uint3
                                   .end = &question->answers,
                                   .awaited = UINT32_MAX,
                                   .timer = {.call = on_timer, .context = question}};
-    /* Where it cannot be sent, time passes without an answer. */
+    /* A packet that cannot be sent is like one without an answer: the timeout ends the question. */
     channel_send(others->front, CHANNEL_ASK, &packet, sizeof(packet), NULL);
     loop_timer_start(others->hub->loop, &question->timer, timeout_ns);
     return question;
@@ -133,7 +133,7 @@ static void take_asked(struct others *others, const void *payload, size_t bytes)
     memcpy(&asked, payload, bytes);
     struct question *question = hashmap_get(&others->questions, asked.number);
     if (!question)
-        return; /* nobody waits for it any more */
+        return; /* the question has ended */
     question->awaited = asked.count;
     if (question->count == question->awaited)
         finish(question);
@@ -162,7 +162,7 @@ static void take_answer(struct others *others, const uint8_t *payload, size_t by
         *question->end = answer;
         question->end = &answer->next;
     } else {
-        free(answer); /* it had none to give */
+        free(answer); /* the worker had no answer */
     }
     if (++question->count == question->awaited)
         finish(question);
@@ -175,7 +175,7 @@ static void send_answer(struct others *others, const struct channel_question *qu
 {
     uint8_t *packet = malloc(sizeof(struct channel_answer) + CODEC_CONTROL_PAYLOAD_MAX_BYTES);
     if (!packet)
-        return; /* the other end has a time after which it goes on */
+        return; /* the timeout of the asking worker handles this */
     const struct channel_answer head = {.asker = question->asker, .number = question->number};
     struct writer writer;
     memcpy(packet, &head, sizeof(head));

@@ -7,8 +7,8 @@
 #define WINDOW_NS UINT64_C(10000000000)
 /* Share of the link's estimate that stays with each frame: the last eight frames count most. */
 #define CARRIED_FADES 0.875
-/* A client says when frames have come, however late; this long is for ever, and still a time that can be added to
- * one. */
+/* Maximum wait: practically forever, since a client acknowledges frames however late, and still safe to add to a
+ * time. */
 #define WAIT_MAX_NS 0x1p61
 /* A local socket takes no time that could be measured; this keeps the rate finite. */
 #define CARRIED_MIN_NS 1000.0
@@ -61,7 +61,7 @@ uint64_t pacing_wait_ns(const struct pacing *pacing, unsigned coming)
     double over_bytes = before_bytes + (double)pacing->last_bytes - pacing_room_bytes(pacing);
     if (!(over_bytes > 0.0))
         return 0;
-    /* However large it is, it may go when nothing else is under way. */
+    /* A frame of any size may go when nothing else is under way. */
     double wait_ns = ceil(fmin(over_bytes, before_bytes) / pacing->carried_bytes * pacing->carried_ns);
     return (uint64_t)fmin(wait_ns, WAIT_MAX_NS);
 }
@@ -138,12 +138,12 @@ void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint
         learn_round_trip(pacing, now_ns - acknowledged->sent_ns, now_ns);
     learn_rate(pacing, acknowledged, now_ns);
     pacing->last_whole_ns = now_ns;
-    remove_oldest(pacing, place + 1); /* bytes come in order: those before it have come too */
+    remove_oldest(pacing, place + 1); /* bytes arrive in order: earlier frames have arrived too */
 }
 
 bool pacing_is_long(const struct pacing *pacing, uint64_t bytes)
 {
-    /* Of a link that is not known yet: it is. */
+    /* Always true while nothing is known of the link. */
     return (double)bytes * pacing->carried_ns >= (double)pacing->frame_ns * pacing->carried_bytes;
 }
 
@@ -162,7 +162,7 @@ void pacing_abandoned(struct pacing *pacing, uint32_t frame)
             pacing->in_flight[kept++] = pacing->in_flight[i];
     }
     pacing->in_flight_count = kept;
-    /* The next one is not like it. */
+    /* The next frame is not expected to be like it. */
     pacing->last_bytes = kept ? pacing->in_flight[kept - 1].bytes : 0;
 }
 

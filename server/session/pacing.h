@@ -14,132 +14,128 @@
 #include <stdint.h>
 
 #define PACING_IN_FLIGHT_MAX 64
-#define PACING_SCALE_FULL 32 /* of pacing_advice.scale_32nds */
-#define PACING_WAVES 33      /* of a picture: first hits, and one for each bounce */
+#define PACING_SCALE_FULL 32 /* full size in pacing_advice.scale_32nds */
+#define PACING_WAVES 33      /* waves of a picture: first hits, and one for each bounce */
 
 struct pacing_frame {
     uint32_t frame;
     uint64_t bytes;
-    uint64_t sent_ns;  /* when its first byte was about to go */
+    uint64_t sent_ns;  /* time at which its first byte was about to go */
     uint64_t begun_ns; /* acknowledgement of its first message; 0: none yet */
 };
 
-/* What a view's client has asked for, of frames while it moves. All-zero: nothing but pictures of one sample. */
+/* Terms of a view's frames while the camera moves. All-zero: only pictures of one sample. */
 struct pacing_terms {
-    float margin;           /* share on each side */
-    uint32_t hidden_layers; /* that follow each picture */
+    float margin;           /* share of width and height on each side */
+    uint32_t hidden_layers; /* hidden layers that follow each picture */
     uint32_t samples;
     uint32_t depth;       /* bounces */
-    uint64_t deadline_ns; /* that rendering a frame may take; 0: size alone follows frame_ns */
-    bool ignores_link;    /* it is the renderer alone that frames follow */
+    uint64_t deadline_ns; /* maximum time of rendering a frame; 0: only the size follows frame_ns */
+    bool ignores_link;    /* frames follow the renderer only */
 };
 
-/* What the next frame is to be. */
+/* Advice for the next frame. */
 struct pacing_advice {
-    unsigned scale_32nds; /* of width and height: 32, 24, 16, 12, 8; for a deadline finer, down to 5 */
-    unsigned quality;     /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
-    uint64_t bytes;       /* that a frame may have, for an encoder that can be told */
+    unsigned scale_32nds; /* share of width and height: 32, 24, 16, 12, 8; for a deadline finer, down to 5 */
+    unsigned quality;     /* JPEG quality, PACING_QUALITY_MIN .. the wanted one */
+    uint64_t bytes;       /* target size, for an encoder with rate control */
     unsigned margin_halves_less, samples, depth_less;
     bool no_hidden;
 };
 
 struct pacing {
-    uint64_t frame_ns;                                   /* between frames, as the client asked for */
+    uint64_t frame_ns;                                   /* interval of frames that the client requested */
     struct pacing_frame in_flight[PACING_IN_FLIGHT_MAX]; /* oldest first */
     size_t in_flight_count;
     uint64_t in_flight_bytes;
-    bool acknowledges; /* the client has acknowledged a frame */
-    bool silent;       /* it has not, and frames do not wait for it */
+    bool acknowledges; /* whether the client has ever acknowledged a frame */
+    bool silent;       /* has acknowledged none, so frames do not wait for it */
     uint64_t last_whole_ns;
     /* Minimum round trip of this time window and of the one before it; 0: none. */
     uint64_t round_trip_ns, round_trip_before_ns, window_begun_ns;
-    /* Bytes that came and the time that the link took for them, older ones fading. */
+    /* Bytes that arrived and the link's time for them, with fading weights. */
     double carried_bytes, carried_ns;
-    uint64_t last_bytes; /* of the frame that was sent last */
+    uint64_t last_bytes; /* size of the frame that was sent last */
     /* The cost of a full-size picture, estimated from pictures of any size. */
     double bytes_full; /* at PACING_QUALITY_REFERENCE; 0: not known */
-    /* Rendering takes a part that does not depend on the picture's size, and one that grows with its area, of
-     * which the full picture has 1. Sums over the frames so far, older ones fading. */
+    /* Rendering time has a part that does not depend on the picture's size, and one that grows with its area, of
+     * which the full picture has 1. Sums over the frames so far, with fading weights. */
     double render_frames, render_areas, render_ns, render_areas_areas, render_areas_ns;
-    double render_fixed_ns; /* as far as frames of several sizes have shown it */
-    /* Of a full picture with all samples, what each bounce takes; not known: 0. With a deadline the sums above are
-     * of the rest. */
+    double render_fixed_ns; /* estimate of the fixed part, from frames of several sizes */
+    /* Time of each bounce in a full picture with all samples; 0: not known. With a deadline the sums above leave
+     * out bounces. */
     double bounce_ns[PACING_WAVES];
-    bool guessed;        /* what is known of rendering is a guess, until a frame tells */
+    bool guessed; /* whether the rendering estimates are a guess, to be replaced by the first measured frame */
     unsigned surprises;  /* frames in a row that took far more or less than expected */
-    double hidden_bytes; /* of a layer of what a picture hides; 0: not known */
+    double hidden_bytes; /* size of a hidden layer; 0: not known */
     struct pacing_terms terms;
-    struct pacing_advice advised; /* last */
-    unsigned better_count;        /* times in a row that a better one would have been possible */
+    struct pacing_advice advised; /* the last advice */
+    unsigned better_count;        /* times in a row that a better advice was possible */
 };
 
 #define PACING_QUALITY_MIN 40
 #define PACING_QUALITY_REFERENCE 75
 
 void pacing_init(struct pacing *pacing, uint64_t frame_ns);
-/* What is known of link and renderer stays. */
+/* Sets the terms; keeps the estimates of link and renderer. */
 void pacing_set_terms(struct pacing *pacing, uint64_t frame_ns, const struct pacing_terms *terms);
-/* Its client makes views of its own. */
+/* Whether the client makes its own views. */
 bool pacing_makes_views(const struct pacing_terms *terms);
 
 /* Whether the next frame may begin. False: an acknowledgement will change that. A client that has never
- * acknowledged a frame gets one, and those behind it once it is called silent. */
+ * acknowledged a frame gets one, and further ones once it counts as silent. */
 bool pacing_may_send(const struct pacing *pacing);
-/* How long until the next frame may go if `coming` others of its size go before it, as far as can be told: 0: it
- * may now; UINT64_MAX: only an acknowledgement will tell. */
+/* Expected time until the next frame may go if `coming` others of its size go before it. 0: now; UINT64_MAX: not
+ * before an acknowledgement. */
 uint64_t pacing_wait_ns(const struct pacing *pacing, unsigned coming);
-/* A frame's first byte is about to go; `bytes` is all that it takes. */
+/* Notes that a frame's first byte is about to go; `bytes`: its whole size. */
 void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t now_ns);
-/* FRAME_ACK; of a frame that is not in flight: ignored. */
+/* Handles a FRAME_ACK; ignores one of a frame that is not in flight. */
 void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint64_t now_ns);
 /* Whether the rest of a frame keeps the link for longer than the next frame should wait. */
 bool pacing_is_long(const struct pacing *pacing, uint64_t bytes);
-/* Whether the link would take so long for the bytes. One that is not known yet would not. */
+/* Whether the link takes longer than `than_ns` for the bytes. False while nothing is known of the link. */
 bool pacing_takes_longer(const struct pacing *pacing, uint64_t bytes, uint64_t than_ns);
-/* Of the frame only so many bytes will go. The next one is expected to be like all of it. */
+/* Cuts a frame to that many bytes. The next one is expected to have the size of the whole frame. */
 void pacing_cut(struct pacing *pacing, uint32_t frame, uint64_t bytes);
-/* The rest of the frame is abandoned. Its sent bytes are ahead of the next frame at any time, so the next need not
- * wait. */
+/* Abandons the rest of a frame. Its sent bytes are ahead of the next frame anyway, so the next need not wait. */
 void pacing_abandoned(struct pacing *pacing, uint32_t frame);
-/* The client has had its time to acknowledge its first frame. If it has not, its credit alone releases frames,
- * until an acknowledgement comes after all, which tells of the link as any other does: a slow one may take longer
- * for that frame. */
+/* Called when the time for acknowledging the first frame is over. If the client has not, only its credit releases
+ * frames until an acknowledgement arrives after all, which informs of the link like any other: a slow link may
+ * take longer for that frame. */
 void pacing_note_silence(struct pacing *pacing);
 
 /* 0: not known yet. */
 uint64_t pacing_bytes_per_second(const struct pacing *pacing);
 uint64_t pacing_round_trip_ns(const struct pacing *pacing);
-/* Bytes that the link drains in one frame time and the minimum round trip; of a link that is known. */
+/* Bytes that the link drains in one frame time and the minimum round trip; requires a known link. */
 double pacing_room_bytes(const struct pacing *pacing);
 
-/* What a frame of that size took to render, and what came of it at that quality (0: lossless, not learned from).
- */
+/* Learns from a frame's size, rendering time and bytes at that quality (0: lossless, from which bytes are not
+ * learned). */
 void pacing_learn(struct pacing *pacing, unsigned scale_32nds, unsigned quality, uint64_t render_ns,
                   uint64_t bytes);
-/* The same of a frame as it was advised, and of a layer that followed one. */
+/* Learns from a frame made by the advice `made`. */
 void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
                           uint64_t bytes);
-/* The same, of a frame of which the waves took so long; they are what a deadline needs to know. `bytes` 0: nothing
- * is learned of them. */
+/* Learns from a frame with the times of its waves, which a deadline needs. `bytes` 0: bytes are not learned from.
+ */
 void pacing_learn_waves(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
                         const uint64_t wave_ns[PACING_WAVES], uint64_t bytes);
-/* The same, where that is a guess: it counts until something is learned. */
+/* Sets the rendering estimates to a guess, which counts until something is learned. */
 void pacing_guess_waves(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
                         const uint64_t wave_ns[PACING_WAVES]);
 void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes);
-/* Size and quality of the next frame while things move, so that frame_ns is met by the renderer and by the link;
- * at most `quality_wanted`. Worse at once, better step by step, so that it does not flicker between two.
- *
- * For a client that makes its own views (it has asked for a margin or hidden layers) a late picture is better than
- * a tiny one. What it does not need first goes first: samples beyond one, what is hidden, half of the margin, all
- * of it, quality; and size only where a picture would take longer than a quarter of a second.
- *
- * With a deadline rendering meets that: samples beyond one go first, then size, and bounces only where the
- * smallest picture is late. Bounces that take time are those that are seen: of the bundled teapot, which is of
- * glass, two bounces in full size are farther from the picture than all eight in a quarter of the width; of the
- * carousel two are as good as eight, and take nearly as long. Without any bounce either looks wrong. The denoiser
- * stays (server/render/passes/denoise/README.md); what it takes counts as the rest of a picture does, by the area.
- */
+/* Size and quality of the next frame while the camera or the scene moves, so that renderer and link meet frame_ns;
+ * at most `quality_wanted`. It gets worse at once and better step by step, so that it does not flicker between
+ * two. For a client that makes its own views (it has asked for a margin or hidden layers) a late picture is better
+ * than a tiny one. Reductions go in this order: samples beyond one, hidden layers, half of the margin, all of it,
+ * quality; and size only where a picture would take longer than a quarter of a second. With a deadline rendering
+ * meets that: samples beyond one go first, then size, and bounces only where the smallest picture is late. Bounces
+ * that take time are visible: for the bundled teapot, which is of glass, two bounces in full size are farther from
+ * the picture than all eight in a quarter of the width; for the carousel two are as good as eight, and take nearly
+ * as long. Without any bounce both look wrong. The denoiser stays (server/render/passes/denoise/README.md); its
+ * time counts as the rest of a picture does, by area. */
 struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wanted);
 
 #endif

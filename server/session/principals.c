@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/principals.h"
 
-/* Behind the numbers of users, as of auth_owner_number(): clients that nobody knows. */
+/* Bit of unidentified clients, above the numbers of auth_owner_number(). */
 #define SESSION_BIT (UINT64_C(1) << 32)
 
 blob_principal principal_number(const struct auth_identity *identity, uint64_t session)

@@ -60,7 +60,7 @@ static void send_ok(struct session *session, const struct request *request, uint
     session_send(session, request->id, 0, &message);
 }
 
-/* The cancel that is to be answered now; NULL: none. */
+/* Ends a request and returns the cancel that must be answered now; NULL: none. */
 static struct request *end(struct session *session, struct request *request)
 {
     uint32_t cancelled_by = request->cancelled_by;
@@ -73,7 +73,7 @@ static struct request *end(struct session *session, struct request *request)
 
 void request_answered(struct session *session, struct request *request)
 {
-    /* A cancel may be cancelled in its turn: as long a chain as there are requests. */
+    /* A cancel may itself be cancelled, in a chain as long as there are requests. */
     for (struct request *cancel; (cancel = end(session, request)); request = cancel)
         send_ok(session, cancel, 0);
 }
@@ -156,7 +156,7 @@ void request_cancel(struct session *session, struct request *cancel, uint32_t ta
     case REQUEST_COMMIT:
     case REQUEST_CANCEL:
     case REQUEST_STATS:
-        /* Short ones: their real answer comes, then the cancel's. */
+        /* Short requests end by their own answer, which the cancel's follows. */
         target->cancelled_by = cancel->id;
         return;
     }

@@ -23,7 +23,7 @@ enum request_kind {
     REQUEST_OFFER,
     REQUEST_UPLOAD,      /* object: struct offer */
     REQUEST_TRANSACTION, /* object: struct transaction; the client still adds to it */
-    REQUEST_COMMIT,      /* the engine has it */
+    REQUEST_COMMIT,      /* submitted to the engine */
     REQUEST_JOB,         /* object: struct job */
     REQUEST_CANCEL,
     REQUEST_STATS,
@@ -32,10 +32,10 @@ enum request_kind {
 struct request {
     uint32_t id;
     enum request_kind kind;
-    uint32_t scene; /* of scene open, attach and close */
+    uint32_t scene; /* scene_open, scene_attach and scene_close only */
     void *object;
     uint32_t cancelled_by; /* the cancel that is answered once this one is; 0: none */
-    size_t edits;          /* of a commit: memory that the engine holds for it until the answer */
+    size_t edits;          /* commit only: edits, and their memory, that the engine holds until the answer */
     uint64_t edit_bytes;
 };
 
@@ -58,7 +58,7 @@ struct request *request_find(const struct session *session, uint32_t id); /* NUL
 /* The one answer; the request is gone afterwards. */
 void request_answer_ok(struct session *session, struct request *request, uint64_t revision);
 void request_answer_error(struct session *session, struct request *request, const struct error *error);
-/* It was answered by another message. */
+/* Ends a request that another message has answered. */
 void request_answered(struct session *session, struct request *request);
 
 void requests_bury(struct session *session, uint32_t id); /* more messages of it may come */

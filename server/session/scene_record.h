@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene as bytes: the messages that a client would send to make it, with names and sharing before them. Blobs
- * are named by their hashes and lie beside. */
+/* A scene as bytes: the messages by which a client would make it, preceded by its name and sharing. Blobs are
+ * named by their hashes and stored separately. */
 #ifndef FARLIGHT_SESSION_SCENE_RECORD_H
 #define FARLIGHT_SESSION_SCENE_RECORD_H
 
@@ -15,12 +15,12 @@
 bool scene_record_write(struct store_record *record, const struct scene *scene, enum sharing sharing,
                         const atomic_bool *abandoned);
 
-/* Hands the message that would make the object of an edit (of kind set, without blobs) to take(). False: out of
+/* Passes the message that would make the object of an edit (of kind set, without blobs) to take(). False: out of
  * memory. */
 bool scene_record_object(const struct scene_edit *object,
                          void (*take)(void *context, const struct message *message), void *context);
 
-/* What scene_record_read() finds. */
+/* A scene read by scene_record_read(). */
 struct scene_record {
     uint64_t revision;
     enum sharing sharing; /* kept or shared */
@@ -28,8 +28,7 @@ struct scene_record {
     struct scene_edit *edits; /* owned */
     size_t edit_count;
 };
-/* Any bytes may be given: they are checked as a client's messages are. False and *error: they are not what was
- * written. */
+/* Reads any bytes, with the checks of a client's messages. False and *error: they are not a valid record. */
 bool scene_record_read(struct scene_record *record, const uint8_t *content, size_t content_bytes,
                        const struct edit_source *source, struct error *error);
 void scene_record_finish(struct scene_record *record);

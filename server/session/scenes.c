@@ -10,14 +10,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Times after which a worker that does not answer is left out: a list can do without it, an attach may need it. */
+/* Timeouts of questions to other workers: a list can do without an answer, an attach may need it. */
 #define LIST_NS UINT64_C(500000000)
 #define ATTACH_NS UINT64_C(10000000000)
 
 struct session_scene {
     enum session_scene_state state;
     char name[SCENE_NAME_MAX + 1];
-    uint64_t changed_revision; /* to be told; 0: nothing is */
+    uint64_t changed_revision; /* revision that the client must be notified of; 0: none */
 };
 
 static struct session_scene *find(const struct session *session, uint32_t scene)
@@ -90,7 +90,7 @@ void scenes_open(struct session *session, struct request *request, const struct 
 {
     struct error error = {0};
     enum sharing sharing = (enum sharing)open->sharing;
-    /* No other client is ever the same user. */
+    /* An unidentified client shares its user with no other client. */
     if (sharing == SHARING_KEPT && !session->identity.known)
         sharing = SHARING_PRIVATE;
     if (!add(session, open->scene, open->name, "scene_open.scene", &error)) {
@@ -256,7 +256,7 @@ static void on_listed(void *context, struct session *session, struct request *re
     for (const struct others_answer *other = answers; other; other = other->next) {
         const struct message_scene_list_reply *more = &other->message.scene_list_reply;
         for (uint32_t i = 0; i < more->scenes_count && reply->scenes_count < SCENES_LIST_MAX; i++) {
-            /* Who attaches to such a name gets the scene that is nearest. */
+            /* The first entry of a name counts: an attach finds this worker's scene first. */
             if (!find_entry(reply, more->scenes[i].name))
                 entries[reply->scenes_count++] = more->scenes[i];
         }
@@ -324,7 +324,7 @@ void scenes_find_elsewhere(struct session *session, struct request *request, con
     }
     search->error = *error;
     snprintf(search->name, sizeof(search->name), "%s", session_scene_name(session, request->scene));
-    session_hold(session, true); /* its next messages are for who has the scene */
+    session_hold(session, true); /* the worker with the scene must get its next messages */
     others_ask(session->hub->others, CHANNEL_SCENES, session, request, ATTACH_NS, on_searched, search);
 }
 
@@ -357,7 +357,7 @@ void scenes_described(struct session *session, struct request *request,
     told->cameras_count = from->camera_count;
     told->clips = clips;
     told->clips_count = from->clip_count;
-    /* Long names of many things are more than one message holds. */
+    /* Many long names may exceed a message. */
     while (message_payload_bytes(&message) > CODEC_CONTROL_PAYLOAD_MAX_BYTES) {
         if (told->clips_count >= told->cameras_count)
             told->clips_count--;
@@ -424,7 +424,7 @@ void scenes_changed(struct session *session, uint32_t scene, uint64_t revision)
     connection_wake(session->connection);
 }
 
-void scenes_tell_changes(struct session *session)
+void scenes_send_changes(struct session *session)
 {
     if (!session->scenes_changed)
         return;

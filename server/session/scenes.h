@@ -7,7 +7,7 @@
 #include "protocol/framing.h"
 #include "session/requests.h"
 
-#define SCENES_LIST_MAX 256 /* of the message */
+#define SCENES_LIST_MAX 256 /* maximum of entries in the message */
 
 /* A SCENE_LIST_REPLY of this worker, which refers to `entries` and the list. */
 void scenes_fill_list(struct message *message, struct record_scene_entry entries[SCENES_LIST_MAX],
@@ -28,29 +28,30 @@ void scenes_get_object(struct session *session, struct request *request, const s
 
 /* State of a scene, 0: it does not exist. */
 enum session_scene_state session_scene(const struct session *session, uint32_t scene);
-/* As it was opened or attached to; empty: there is none. */
+/* Name by which the scene was opened or attached to; empty: none. */
 const char *session_scene_name(const struct session *session, uint32_t scene);
 
-/* The engine's answers: to an open or an attach, to a close, to the others. */
+/* The engine's answers. */
 void scenes_opened(struct session *session, struct request *request, uint64_t revision);
 void scenes_closed(struct session *session, struct request *request);
-/* With the shared scenes of other workers; takes over the list. */
+/* Answers with the list and the shared scenes of other workers; takes over the list. */
 void scenes_listed(struct session *session, struct request *request, struct engine_scene_list *list);
-/* An attach that the engine refused with `error`: the client goes to the worker that has the scene, if one has. */
+/* Handles an attach that the engine refused with `error`: moves the client to the worker that has the scene, if
+ * there is one. */
 void scenes_find_elsewhere(struct session *session, struct request *request, const struct error *error);
 void scenes_described(struct session *session, struct request *request,
                       const struct engine_scene_description *description);
 void scenes_objects_listed(struct session *session, struct request *request,
                            const struct engine_object_list *list);
 void scenes_object_is(struct session *session, struct request *request, const struct engine_event *event);
-/* A request of this kind failed: its scene is removed. `submitted`: the engine refused it; otherwise the engine
- * was not asked, and an open scene stays open. Sends no answer. */
+/* Removes the scene of a failed request. `submitted`: the engine refused the request; otherwise the engine was not
+ * asked, and an open scene stays open. Sends no answer. */
 void scenes_failed(struct session *session, const struct request *request, bool submitted);
 
-/* Another client has changed a scene. The notice is sent as soon as the queue has space, with the last revision
+/* Notes a change by another client. The notice is sent as soon as the queue has space, with the last revision
  * only. */
 void scenes_changed(struct session *session, uint32_t scene, uint64_t revision);
-void scenes_tell_changes(struct session *session);
+void scenes_send_changes(struct session *session);
 void scenes_finish(struct session *session);
 
 #endif

@@ -28,7 +28,7 @@ bool session_send(struct session *session, uint32_t request, uint32_t channel, c
     return connection_send(session->connection, request, channel, message);
 }
 
-/* A text that was cut at its buffer's end may end within a character, which is no UTF-8. */
+/* Removes an incomplete character from the end of a text that was cut at its buffer's end. */
 static const char *whole_characters(char *text)
 {
     size_t bytes = strlen(text), start = bytes;
@@ -58,7 +58,7 @@ void session_send_error(struct session *session, uint32_t request, const struct 
               protocol_error_code_text(message.error.code), copy.field, copy.text);
     if (session_send(session, request, 0, &message))
         return;
-    /* The answer must come, whatever is in the texts. */
+    /* The answer must be sent, whatever the texts contain. */
     message.error.field = message.error.remedy = "";
     message.error.text = "the text of this error cannot be sent";
     session_send(session, request, 0, &message);
@@ -89,7 +89,7 @@ void session_submit(struct session *session, struct request *request, struct eng
     }
     struct error error = {0};
     error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
-    /* The engine has not seen it: nothing has changed. */
+    /* The engine never got the request, so nothing has changed. */
     scenes_failed(session, request, false);
     if (request->kind == REQUEST_JOB && request->object)
         job_failed(session, request, &error);
@@ -331,7 +331,7 @@ static void on_opened(void *context)
 
 static void on_room(void *context)
 {
-    scenes_tell_changes(context);
+    scenes_send_changes(context);
     frames_pump(context);
 }
 
@@ -343,7 +343,7 @@ static bool on_owed(const void *context)
     while (hashmap_next(&session->requests.in_flight, &cursor, NULL, &value)) {
         const struct request *request = value;
         if (request->kind == REQUEST_UPLOAD || request->kind == REQUEST_TRANSACTION)
-            continue; /* the client is to go on */
+            continue; /* the client must continue it */
         if (request->kind != REQUEST_JOB || job_is_owed(request->object))
             return true;
     }
@@ -430,7 +430,7 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
     }
     if (handover->is_open) {
         introduce(session);
-        upload_begin(session); /* which says again what its client knows */
+        upload_begin(session); /* repeats the credit that its client knows */
     }
     return session;
 }
@@ -468,7 +468,7 @@ bool session_move(struct session *session, uint32_t worker, uint32_t request, co
 void session_check_key(struct session *session)
 {
     if (!session->introduced || is_key_valid(session))
-        return; /* who has not introduced itself is refused when it does */
+        return; /* a client without a hello is refused when it sends one */
     log_write(LOG_INFO, "session", "client %" PRIu64 " (%s, %s) is disconnected: its key was replaced",
               session->number, session->name, session->identity.name);
     connection_finish(session->connection, PROTOCOL_ERROR_DENIED, "key", replaced_key);

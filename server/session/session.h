@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One client, from its hello to its goodbye: its resources and its requests. */
+/* A session: one client with its resources and requests, from its hello to its goodbye. */
 #ifndef FARLIGHT_SESSION_SESSION_H
 #define FARLIGHT_SESSION_SESSION_H
 
@@ -15,13 +15,13 @@ struct job;
 
 #define SESSION_OFFERS_KEY_BYTES 16
 
-/* Blobs that the client named; see upload.h. */
+/* Blobs that the client has offered; see upload.h. */
 struct session_blobs {
     struct hashmap offers; /* struct offer, by a keyed hash of its hash */
     uint8_t offers_key[SESSION_OFFERS_KEY_BYTES];
     size_t offer_count;
-    uint64_t received_bytes; /* of blob data, on channel 1 */
-    uint64_t credit_bytes;   /* told to the client, absolute */
+    uint64_t received_bytes; /* blob data received on channel 1 */
+    uint64_t credit_bytes;   /* credit given to the client, absolute */
 };
 
 struct session {
@@ -33,33 +33,34 @@ struct session {
     blob_principal principal;
     uint64_t owner; /* auth_owner_number() */
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
-    bool introduced;                 /* the hello is done: the engine may know it */
-    bool can_h264;                   /* the client decodes it, and an encoder is here */
-    bool can_abandon;                /* frames of views may end unfinished */
-    struct engine_command *farewell; /* for when it is gone, which must not fail for lack of memory */
+    bool introduced;  /* whether the hello is complete: the engine may know the client */
+    bool can_h264;    /* whether the client can decode it and the daemon can encode it */
+    bool can_abandon; /* whether frames of views may end unfinished */
+    /* Command for its end, allocated early so that the end cannot fail for lack of memory. */
+    struct engine_command *farewell;
 
     struct requests requests;
     struct hashmap scenes; /* struct session_scene *, by id; see scenes.h */
-    bool scenes_changed;   /* there may be changes to tell */
+    bool scenes_changed;   /* whether there may be changes to notify of */
     struct session_blobs blobs;
-    size_t transaction_edits;   /* in all transactions that are not answered */
-    uint64_t transaction_bytes; /* of them: memory, also of those that the engine has */
-    struct job *jobs;           /* whose frame goes next is first */
+    size_t transaction_edits;   /* edits in unanswered transactions */
+    uint64_t transaction_bytes; /* their memory, including edits that the engine holds */
+    struct job *jobs;           /* the first one sends the next frame */
     uint32_t job_count;
 };
 
-/* As hub_add_client(). */
+/* Creates the session of a client; see hub_add_client(). */
 struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct handover *handover,
                                struct error *error);
-/* Another worker is to serve it, which is to read `message` first. False: it cannot go, as it has more than this
- * one request, or does not read what it is told; nothing is changed. */
+/* Moves the client to another worker, which reads `message` first. False: it cannot move, as it has more than this
+ * one request, or does not read what it is sent; nothing is changed. */
 bool session_move(struct session *session, uint32_t worker, uint32_t request, const struct message *message);
-/* After the daemon's keys were replaced: goodbye to one whose key is none of them. */
+/* Disconnects the client if its key is no longer one of the daemon's. */
 void session_check_key(struct session *session);
 void session_stop(struct session *session); /* the daemon stops: goodbye */
 void session_close(struct session *session);
-void session_hold(struct session *session, bool held);                          /* reads no further */
-void session_engine_event(struct session *session, struct engine_event *event); /* may take its parts */
+void session_hold(struct session *session, bool held); /* whether to stop reading from the client */
+void session_engine_event(struct session *session, struct engine_event *event); /* may take parts of the event */
 
 /* ---- for the files of this folder ---- */
 bool session_send(struct session *session, uint32_t request, uint32_t channel, const struct message *message);

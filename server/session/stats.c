@@ -51,7 +51,7 @@ static void fill_client(struct record_client_stat *stat, char name[NAME_BYTES], 
     };
 }
 
-/* A read-only client is told of itself alone. */
+/* Whether the asker may know of the session; a read-only client knows of itself alone. */
 static bool may_hear_of(const struct stats_asker *asker, const struct session *session)
 {
     return !asker->read_only || session == asker->session;
@@ -99,7 +99,8 @@ static uint32_t fill_scenes(struct stats_storage *storage, const struct stats_as
     return count;
 }
 
-/* A client of the same user or key has the scene, or a scene of that name is listed for this client anyway. */
+/* Whether the asker may know the scene's name: a client of the same user or key has the scene, or a scene of that
+ * name is listed for this client anyway. */
 static bool may_know_scene(const struct stats_asker *asker, const struct session *owner, const char *name,
                            const struct engine_stats *stats)
 {
@@ -183,8 +184,8 @@ static void fill(struct message_stats_reply *reply, const struct hub *hub, const
     reply->driver = stats->device.version;
 }
 
-/* A very busy daemon has more to tell than one message holds: the totals matter more than the last scenes and
- * jobs. */
+/* Drops rows until the message fits: the totals of a very busy daemon matter more than its last scenes and jobs.
+ */
 static void make_fit(struct message *message)
 {
     struct message_stats_reply *reply = &message->stats_reply;

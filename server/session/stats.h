@@ -9,17 +9,18 @@
 
 struct message;
 
-/* For whom the figures are. */
+/* The asker, which determines the figures that it may know. */
 struct stats_asker {
     const struct hub *hub;
     const struct session *session; /* NULL: a client of another worker */
     blob_principal principal;
-    bool read_only; /* it hears of itself alone, and of scenes that it may attach to */
+    bool read_only; /* whether it may know only of itself and of scenes that it may attach to */
 };
 
 /* Answers with the figures of all workers; takes over the stats. */
 void stats_answer(struct session *session, struct request *request, struct engine_stats *stats);
-/* A STATS_REPLY of this worker, which refers to what is returned; for free(). NULL: out of memory. */
+/* Fills a STATS_REPLY of this worker, which refers to the returned storage; the caller frees that. NULL: out of
+ * memory. */
 struct stats_storage *stats_fill(struct message *message, const struct stats_asker *asker,
                                  const struct engine_stats *stats);
 

@@ -14,7 +14,8 @@
 _Static_assert(SESSION_OFFERS_KEY_BYTES == crypto_shorthash_KEYBYTES, "the key is libsodium's");
 _Static_assert(crypto_shorthash_BYTES == sizeof(uint64_t), "a hash of a hash is a key of the map");
 
-/* An offered hash is only a claim: hashes may be invented so that any fixed part of them is equal for all. */
+/* Key of an offered hash in the map. Hashes are only claims: a client may invent many whose fixed part is equal,
+ * so a secret key hashes them again. */
 static uint64_t key_of(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES])
 {
     uint8_t bytes[crypto_shorthash_BYTES];
@@ -54,13 +55,13 @@ struct offer *upload_add(struct session *session, const struct record_blob_ref *
     return offer;
 }
 
-/* One offered blob; *needed: it is to be sent. */
-static bool take_offer(struct session *session, const struct record_blob_ref *reference, bool *needed,
-                       struct error *error)
+/* Adds an offered blob; *needed: whether the client must send it. */
+static bool add_offer(struct session *session, const struct record_blob_ref *reference, bool *needed,
+                      struct error *error)
 {
     *needed = false;
     if (!reference->size_bytes)
-        return true; /* none is meant */
+        return true; /* an empty reference */
     struct offer *offer = upload_find(session, reference->hash);
     if (!offer && !(offer = upload_add(session, reference, error)))
         return false;
@@ -85,7 +86,7 @@ void upload_offer(struct session *session, struct request *request, const struct
     answer.blob_need.needed = needed;
     for (uint32_t i = 0; needed && i < message->blobs_count; i++) {
         bool is_needed;
-        if (!take_offer(session, &message->blobs[i], &is_needed, &error))
+        if (!add_offer(session, &message->blobs[i], &is_needed, &error))
             break;
         if (is_needed)
             needed[answer.blob_need.needed_count++].index = i;
@@ -139,8 +140,9 @@ void upload_abandon(struct session *session, struct offer *offer)
     offer->arrived_bytes = 0;
 }
 
-/* Absolute, so it cannot drift; told when half the window is used up, so that it costs few messages. */
-static void tell_credit(struct session *session)
+/* Sends new credit when half the window is used up, so that it costs few messages; absolute, so that it cannot
+ * drift. */
+static void send_credit(struct session *session)
 {
     struct session_blobs *blobs = &session->blobs;
     uint64_t window_bytes = session->hub->options.limits.upload_window_bytes;
@@ -157,7 +159,7 @@ static void tell_credit(struct session *session)
 void upload_begin(struct session *session)
 {
     randombytes_buf(session->blobs.offers_key, sizeof(session->blobs.offers_key));
-    tell_credit(session);
+    send_credit(session);
 }
 
 /* A blob that cannot fit is refused before it arrives; memory is reserved chunk by chunk, so that a declared size
@@ -210,7 +212,7 @@ static bool hash_arrived(const struct session *session, struct offer *offer, uin
     return true;
 }
 
-/* Room for so many bytes. Where what has arrived must move, its hashes are awaited. */
+/* Reserves memory for that many bytes. If arrived bytes must move, waits for their hashes. */
 static bool reserve_bytes(const struct session *session, struct offer *offer, size_t needed_bytes)
 {
     if (needed_bytes > offer->arriving->capacity_bytes)
@@ -242,7 +244,7 @@ static bool add_piece(struct session *session, struct offer *offer, const struct
     return hash_arrived(session, offer, before_bytes, error);
 }
 
-/* All chunks have arrived: verifies the hash. */
+/* Verifies the hash after the last chunk has arrived, and adds the blob to the store. */
 static bool complete(struct session *session, struct offer *offer, struct error *error)
 {
     if (memcmp(offer->arriving->hash, offer->hash, BLOB_HASH_BYTES) != 0) {
@@ -304,7 +306,7 @@ void upload_data(struct session *session, const struct framing_header *header,
         return;
     }
     blobs->received_bytes += data->data_bytes;
-    tell_credit(session);
+    send_credit(session);
     struct request *request = request_of(session, header, data);
     if (!request)
         return;

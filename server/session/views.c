@@ -11,26 +11,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Frames of a view that are rendered, encoded or sent at once: while one is sent, the next one is encoded and the
- * one after it rendered. */
+/* Maximum of a view's frames in flight: while one is sent, the next one is encoded and the one after it rendered.
+ */
 #define IN_HAND_MAX 3
-/* For a client that moves again right after coming to rest, this many pictures in a row may be abandoned. */
-#define GIVEN_UP_MAX IN_HAND_MAX
+/* Maximum of pictures in a row that are abandoned for a client that moves again right after a rest. */
+#define DROPPED_MAX IN_HAND_MAX
 /* Expected times may be too long: a frame that is this much early is hardly older.
  */
 #define EARLY_NS UINT64_C(500000)
-/* A client that has not acknowledged its first frame by then may acknowledge none. */
+/* Time after which a client that has not acknowledged its first frame may acknowledge none. */
 #define SILENCE_NS UINT64_C(250000000)
-/* A frame that a link takes longer for than that is not sent again and again while a picture is refined. */
+/* Time on the link above which a picture's refinements are not sent, except the last. */
 #define SPARING_NS 250000000.0
-/* Between pictures with a margin at least: who has them makes views in between, which a better picture helps more
- * than a newer one. */
+/* Minimum time between pictures with a margin: their client makes views in between, which a better picture helps
+ * more than a newer one. */
 #define KEY_NS UINT64_C(50000000)
-/* Of a frame that a link carries within that, a first part would come hardly sooner: it is spared what parts cost,
- * some 7 ms of processors for 1280x720. */
+/* Time on the link below which a frame is not divided: its first part would hardly arrive sooner, and parts cost
+ * some 7 ms of processor time at 1280x720. */
 #define PARTS_NS UINT64_C(30000000)
 #define SECOND_NS 1e9
-/* Of frames that are asked for so rarely: more would not fit the number. */
+/* Maximum deadline, so that those of very low rates fit the number. */
 #define DEADLINE_MAX_NS 1e15
 
 /* ---- life -------------------------------------------------------------------------------------------- */
@@ -38,7 +38,7 @@
 static void on_pace_timer(void *context);
 static void on_silence_timer(void *context);
 
-/* 0: frames have none. */
+/* Deadline of rendering a frame; 0: none. */
 static uint64_t deadline_ns_of(float moving_rate)
 {
     return moving_rate > 0.0f ? (uint64_t)fmin(SECOND_NS / (double)moving_rate, DEADLINE_MAX_NS) : 0;
@@ -118,7 +118,7 @@ struct view_change *view_find_change(const struct job *job, uint32_t request)
     return change;
 }
 
-/* Takes it out of the list; its frames still count. */
+/* Removes a change from the list; its frames still count. */
 static void take_out(struct session_view *view, struct view_change *change)
 {
     struct view_change **place = &view->changes;
@@ -181,13 +181,13 @@ uint64_t view_allowed_credit(struct job *job)
 {
     struct session_view *view = job->view;
     uint64_t allowed = job->engine_credit;
-    uint64_t before = frames_of_before(job);
+    uint64_t before = frames_of_replaced(job);
     loop_timer_stop(job->session->hub->loop, &view->pace_timer);
     for (;;) {
         uint64_t in_hand = allowed - job->frames_gone + before;
         if (in_hand >= IN_HAND_MAX || job->frames_sent + in_hand >= job->client_credit)
             break;
-        /* It is begun so early that it comes just before it may go. */
+        /* A frame begins so early that it is ready just before it may go. */
         uint64_t wait_ns = pacing_wait_ns(&view->pacing, (unsigned)(in_hand - frames_on_the_wire(job)));
         uint64_t lead_ns = view->made_ns + EARLY_NS;
         if (wait_ns > lead_ns && !view->due) {
@@ -209,7 +209,7 @@ static void on_pace_timer(void *context)
     job_pace(job);
 }
 
-/* The client has had its time to acknowledge the first frame. */
+/* Ends the time in which the client may acknowledge the first frame. */
 static void on_silence_timer(void *context)
 {
     struct job *job = context;
@@ -222,7 +222,7 @@ bool view_may_send(const struct job *job)
     return pacing_may_send(&job->view->pacing);
 }
 
-/* By what is known of link and renderer. */
+/* Sets the effort by the estimates of link and renderer. */
 static void choose_effort(struct session_view *view)
 {
     unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
@@ -252,7 +252,7 @@ static void choose_parts(struct session_view *view, const struct engine_frame *f
         view->effort.still_parts = parts;
 }
 
-/* By the device's clock where it was asked. */
+/* Sums the times of each wave, by the device's clock where it was read. */
 static void waves_of(const struct stage_times *times, uint64_t wave_ns[PACING_WAVES])
 {
     bool has_gpu = false;
@@ -266,7 +266,7 @@ static void waves_of(const struct stage_times *times, uint64_t wave_ns[PACING_WA
     }
 }
 
-/* As it was advised, which may be some frames ago. */
+/* The advice by which the frame was made, which may be some frames old. */
 static struct pacing_advice advice_of(const struct engine_frame *frame)
 {
     return (struct pacing_advice){
@@ -295,7 +295,8 @@ static void guess(struct session_view *view, const struct engine_frame *frame)
     pacing_guess_waves(&view->pacing, &made, guess_render_ns(&frame->result.times, wave_ns), wave_ns);
 }
 
-/* Of a picture at rest the first frames may have built and compiled; those that refine it say what one takes. */
+/* Whether the frame's times are representative. The first frames of a picture at rest may include builds and
+ * compilation; frames that refine it do not. */
 static bool is_learned_from(const struct session_view *view, const struct engine_frame *frame)
 {
     return frame->moving || (view->terms.moving.deadline_ns > 0 && frame->result.samples > frame->request.samples);
@@ -304,7 +305,7 @@ static bool is_learned_from(const struct session_view *view, const struct engine
 void view_frame_made(struct job *job, const struct engine_frame *frame)
 {
     struct session_view *view = job->view;
-    if (frame->request.hidden_layer > 0) { /* says nothing of what a picture costs */
+    if (frame->request.hidden_layer > 0) { /* a layer's cost is not a picture's */
         pacing_learn_hidden(&view->pacing, frame->size_bytes);
         return;
     }
@@ -312,9 +313,9 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
     if (is_learned_from(view, frame)) {
         learn(view, frame);
         if (view->terms.adapt || view->terms.moving.deadline_ns)
-            choose_effort(view); /* also at rest: for the first frame that moves */
+            choose_effort(view); /* at rest too, for the first frame of the next motion */
     } else if (view->terms.moving.deadline_ns) {
-        guess(view, frame); /* it may be the only one */
+        guess(view, frame); /* no other frame may follow */
         if (view->pacing.guessed)
             choose_effort(view);
     }
@@ -325,9 +326,9 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
     view_wishes_set_effort(view->wishes, &view->effort);
 }
 
-/* Its client wishes something else, and no other frame needs it: those of a stream are needed for the ones behind
- * them. */
-static bool may_be_given_up(const struct session_view *view, const struct engine_frame *frame)
+/* Whether the frame may be dropped: its client wants another camera, and no other frame needs it, unlike one of a
+ * stream. */
+static bool may_be_dropped(const struct session_view *view, const struct engine_frame *frame)
 {
     return frame->encoding != ENCODING_H264 && view->last_command > frame->command;
 }
@@ -336,13 +337,13 @@ bool view_is_overtaken(const struct job *job, const struct engine_frame *frame)
 {
     const struct session_view *view = job->view;
     const bool may_wait = frame->request.hidden_layer > 0 || (!frame->moving && view->last_moving);
-    return may_wait && view->given_up < GIVEN_UP_MAX && may_be_given_up(view, frame);
+    return may_wait && view->dropped < DROPPED_MAX && may_be_dropped(view, frame);
 }
 
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame)
 {
     const struct session_view *view = job->view;
-    return may_be_given_up(view, frame) &&
+    return may_be_dropped(view, frame) &&
            (view_is_overtaken(job, frame) ||
             clock_now_ns() - frame->encoded_ns > view->terms.frame_ns + view->made_ns);
 }
@@ -354,18 +355,18 @@ bool view_is_long(const struct job *job, uint64_t left_bytes)
 
 void view_frame_dropped(struct job *job)
 {
-    job->view->given_up++;
+    job->view->dropped++;
 }
 
 void view_frame_abandoned(struct job *job, const struct engine_frame *frame)
 {
-    job->view->given_up++;
+    job->view->dropped++;
     pacing_abandoned(&job->view->pacing, frame->frame);
 }
 
-void view_frame_cut(struct job *job, const struct engine_frame *frame, size_t end_bytes, bool gives_way)
+void view_frame_cut(struct job *job, const struct engine_frame *frame, size_t end_bytes, bool yields)
 {
-    if (gives_way)
+    if (yields)
         pacing_abandoned(&job->view->pacing, frame->frame);
     else
         pacing_cut(&job->view->pacing, frame->frame, end_bytes);
@@ -383,7 +384,7 @@ void view_frame_begun(struct job *job, const struct engine_frame *frame, size_t 
 void view_frame_sent(struct job *job)
 {
     struct session_view *view = job->view;
-    view->given_up = 0;
+    view->dropped = 0;
     if (!view->pacing.acknowledges && !view->pacing.silent && !view->silence_timer.running)
         start_timer(job, &view->silence_timer, on_silence_timer, SILENCE_NS);
 }
@@ -397,7 +398,7 @@ static struct job *find_view(const struct session *session, uint32_t channel)
     return job && job->view ? job : NULL;
 }
 
-static void tell_engine(struct job *job)
+static void notify_engine(struct job *job)
 {
     struct session *session = job->session;
     struct engine_command *command = hub_command(ENGINE_VIEW_CHANGED, session->number, job->request);
@@ -435,7 +436,7 @@ void views_set_camera(struct session *session, const struct message_view_camera 
     memcpy(camera.key.look_at_world, message->look_at_world, sizeof(camera.key.look_at_world));
     memcpy(camera.key.up_world, message->up_world, sizeof(camera.key.up_world));
     if (view_wishes_set_camera(job->view->wishes, &camera))
-        tell_engine(job);
+        notify_engine(job);
     frames_overtake(job);
     job_watch_for_blocks(job);
 }
@@ -448,6 +449,6 @@ void views_acknowledge(struct session *session, const struct message_frame_ack *
     struct session_view *view = job->view;
     pacing_acknowledged(&view->pacing, message->frame, message->whole != 0, session->connection->last_received_ns);
     if (message->want_key_frame && view_wishes_request_key_frame(view->wishes))
-        tell_engine(job);
+        notify_engine(job);
     job_pace(job);
 }
