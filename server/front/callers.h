@@ -7,7 +7,7 @@
 
 struct worker;
 
-/* A new client, which came to our address `own`; takes over the descriptor when it succeeds. */
+/* Adds a client that connected to our address `own`; takes over the descriptor when it succeeds. */
 bool callers_add(struct front *front, int fd, const struct address *own, const struct address *peer,
                  struct error *error);
 /* The client at this connected socket, with which the daemon ends; takes over the descriptor when it succeeds. */

@@ -19,9 +19,10 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-/* Few at once, so that the first clients can finish their handshake before the next are counted. */
+/* Maximum of clients accepted at once, so that the first can finish their handshake before the next are counted.
+ */
 #define ACCEPTS_A_TURN 4
-/* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
+/* Pause when descriptors have run out: a listener stays readable then, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
 /* Time in which workers may say goodbye to their clients and end. */
 #define STOP_NS UINT64_C(600000000)

@@ -226,8 +226,8 @@ static bool has_newer(const struct pending_frame *pending)
     return newer;
 }
 
-/* Earliest end of the frame; 0: it cannot end with an answer. A frame that yields to motion does not wait for a
- * long rest of a part; a moving frame shows something in any case. */
+/* Earliest end of the frame that leaves its client a picture; 0: there is none. A frame that yields to motion does
+ * not wait for a long rest of a part; a moving frame shows something in any case. */
 static size_t early_end(const struct job *job, const struct pending_frame *pending, bool yields)
 {
     const struct part_list *parts = &pending->frame->parts;

@@ -55,7 +55,7 @@ void requests_finish(struct requests *requests); /* frees them; objects are thei
 struct request *request_begin(struct session *session, uint32_t id, enum request_kind kind);
 struct request *request_find(const struct session *session, uint32_t id); /* NULL: not in flight */
 
-/* The one answer; the request is gone afterwards. */
+/* Send the answer and free the request. */
 void request_answer_ok(struct session *session, struct request *request, uint64_t revision);
 void request_answer_error(struct session *session, struct request *request, const struct error *error);
 /* Ends a request that another message has answered. */

@@ -21,7 +21,7 @@
 #define EARLY_NS UINT64_C(500000)
 /* Time after which a client that has not acknowledged its first frame may acknowledge none. */
 #define SILENCE_NS UINT64_C(250000000)
-/* Time on the link above which a picture's refinements are not sent, except the last. */
+/* Time on the link above which only a picture's last refinement has the encoding of rest. */
 #define SPARING_NS 250000000.0
 /* Minimum time between pictures with a margin: their client makes views in between, which a better picture helps
  * more than a newer one. */

@@ -2,10 +2,9 @@
 /* The state of a view beyond that of any job: the wishes that the engine reads, the pace of its link, and the
  * views that are to replace it.
  *
- * The views that follow each other on a channel are one struct job: its
- * credit, frame count and wishes continue. A view replaces the one before when the engine says so, in the order of
- * the client's requests; frames of the old view that have not begun on the wire are dropped then, one that has is
- * finished, and then the old request is answered. */
+ * Successive views of a channel are one struct job: its credit, frame count and wishes continue. A view replaces
+ * the one before when the engine says so, in the order of the client's requests. Frames of the old view that have
+ * not begun on the wire are dropped then, one that has begun is finished, and then the old request is answered. */
 #ifndef FARLIGHT_SESSION_VIEWS_H
 #define FARLIGHT_SESSION_VIEWS_H
 
