@@ -256,7 +256,7 @@ bool frame_check_groups(const struct frame_renderer *renderer, struct error *err
 /* A display's values are no light that adds up. */
 bool frame_check_light(const struct scene *scene, const struct frame_request *request, struct error *error)
 {
-    if (!(request->layers & LAYER_BITS_LIGHT) || !scene->environment.display_values)
+    if (!(request->layers & LAYER_BITS_LIGHT) || !scene->environment.value.display_values)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "layers",
               "the light of this scene is a display's values, which do not add up");

@@ -191,7 +191,7 @@ static bool set_up(struct frame_renderer *renderer, struct error *error)
     camera_fill_uniforms(&work->frame.uniforms, request, &renderer->shared->copy);
     frame_key_limit_rows(renderer, &work->frame.request); /* the camera is that of all of them */
     environment_fill_uniforms(work->frame.environment, &work->frame.uniforms, &renderer->shared->copy);
-    work->frame.display_values = renderer->shared->copy.scene->environment.display_values;
+    work->frame.display_values = renderer->shared->copy.scene->environment.value.display_values;
     work->frame.uniforms.depth = request->depth;
     work->frame.uniforms.far_width[2] = frame_request_hides_environment(request) ? 1.0f : 0.0f;
     /* Samples of a layer's texel all pass through its middle. */

@@ -91,8 +91,8 @@ static const struct gpu_program *use_ycbcr(const struct render_frame *frame, uin
 static void set_background(const struct gpu_program *program, const struct render_frame *frame, enum layer layer)
 {
     const struct frame_request *request = &frame->request;
-    const bool is_behind =
-        layer == LAYER_BACKGROUND || layer == LAYER_LIGHT_REST + frame->scene->scene->environment.light_group;
+    const bool is_behind = layer == LAYER_BACKGROUND ||
+                           layer == LAYER_LIGHT_REST + frame->scene->scene->environment.value.light_group;
     const bool has_colour = (layer == LAYER_BEAUTY || is_behind) && request->background == BACKGROUND_COLOUR;
     const float *colour = request->background_colour;
     const float background[4] = {colour[0], colour[1], colour[2], 1.0f}, none[4] = {0};

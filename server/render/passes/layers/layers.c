@@ -38,7 +38,7 @@ void layers_begin(struct layers *layers, const struct render_frame *frame, bool 
 {
     const struct frame_request *request = &frame->request;
     layers->notes.layers = frame_request_planes(request) & ~LAYER_BIT_BEAUTY;
-    layers->notes.environment_group = frame->scene->scene->environment.light_group;
+    layers->notes.environment_group = frame->scene->scene->environment.value.light_group;
     layers->notes.covers_by_shading = layers->notes.layers & LAYER_BITS_CRYPTO && is_shaded &&
                                       (frame->features.blend || request->integrator == INTEGRATOR_RAYCAST);
 }
