@@ -11,7 +11,7 @@
 
 /* Rays of a slice at most, whose hits all look at every one of `lights`. */
 uint32_t choices_slice_rays(const struct gpu_device *device, bool compared, uint32_t lights);
-/* Whether first hits are rasterised, once the scene and the tracer of the context are those of its request. */
+/* Whether first hits are rasterised, once the scene and the tracer of the frame are those of its request. */
 bool choices_rasterise(const struct render_frame *frame);
 
 #endif

@@ -264,7 +264,7 @@ static bool has_band(const struct denoise_filter *filter)
     return filter->pass == PASS_TAKE || filter->pass == PASS_GIVE;
 }
 
-/* From the row in hand on, no farther than the end of its band where bands are bound. */
+/* Rows from the current one on, no farther than the end of its band where bands are bound. */
 static uint32_t rows_of_step(const struct denoise_filter *filter, const struct render_frame *frame, uint32_t left)
 {
     const uint32_t pixels = STEP_PIXELS * frame->device->gpu->facts.step_scale;

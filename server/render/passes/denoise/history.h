@@ -20,11 +20,11 @@ struct denoise_kept {
 
 struct denoise_history {
     struct denoise_kept kept[2];
-    uint32_t now;    /* which of them the frame in hand is written to; the other one is of the picture before */
+    uint32_t now;    /* the one that the current frame is written to; the other one is of the picture before */
     bool is_written; /* the frame that is rendered writes it */
     bool is_used;    /* the frame that is rendered uses it */
     uint32_t moving; /* frames so far: each has noise of its own */
-    bool is_moving;  /* the frame in hand, or the last one, is one of them */
+    bool is_moving;  /* the current frame, or the last one, moves */
     /* DENOISE_MOVED_TEXELS an instance, where some have moved since the picture before. */
     struct gpu_buffer moved;
     bool things_moved; /* `moved` has something */
@@ -43,7 +43,7 @@ bool denoise_history_reserve(struct denoise_history *history, const struct rende
 /* For the pass that reprojects, of a picture of so many samples. */
 void denoise_history_bind(struct denoise_history *history, const struct render_frame *frame,
                           const struct gpu_program *program, uint32_t samples);
-/* The picture in hand, behind that pass. */
+/* The current picture, behind that pass. */
 struct gpu_buffer *denoise_history_pixels(struct denoise_history *history);
 void denoise_history_end(struct denoise_history *history);
 uint64_t denoise_history_device_bytes(const struct denoise_history *history);

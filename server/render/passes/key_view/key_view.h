@@ -14,7 +14,7 @@
 struct key_view {
     struct picture sums;                      /* sums of the layer that is rendered */
     struct gpu_buffer layers[KEY_LAYERS_MAX]; /* shared/key_view.h */
-    struct gpu_buffer counts;                 /* uint: samples of eyes that no layer shows, of the frame in hand */
+    struct gpu_buffer counts;                 /* uint: samples of eyes that no layer shows, of the current frame */
     struct gpu_buffer marks, tiles;           /* shared/key_view.h: texels that eyes look at, of all layers */
     struct gpu_readback copy;                 /* a copy of the counts */
     /* Made layers are of this view, request and scene: */
@@ -24,7 +24,7 @@ struct key_view {
     struct frame_request request;   /* the frame's that they were rendered for */
     uint64_t showing;               /* the scene's, see frame/state.h */
     uint32_t layer_count;
-    bool is_marked; /* only what the eyes of the frame in hand look at is rendered: of no use to others */
+    bool is_marked; /* only what the eyes of the current frame look at is rendered: of no use to others */
     uint32_t first_tile[KEY_LAYERS_MAX]; /* then, of each layer, in `tiles` */
     uint32_t tile_rows[KEY_LAYERS_MAX];
 };
