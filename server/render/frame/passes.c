@@ -22,26 +22,26 @@ struct entry {
 #define OF_WORK(member) .is_of_work = true, .state = offsetof(struct frame_work, member)
 
 static const struct entry frame_passes[PHASE_COUNT] = {
-    [PHASE_UPDATE] = {&update_pass},   /* brings the scene to the device */
-    [PHASE_BUILD] = {&build_pass},     /* brings the tracers' structures to the scene, and reserves buffers */
-    [PHASE_SAMPLES] = {&samples_pass}, /* adds samples to the picture, slice by slice */
-    [PHASE_KEEP] = {&keep_pass},       /* keeps the picture as a layer of the key view; then build follows again */
-    [PHASE_DENOISE] = {&denoise_pass, OF_WORK(denoise)},
-    [PHASE_OUTPUT] = {&output_pass}, /* turns sums into pixels, on the host, band by band */
+    [PHASE_UPDATE] = {.pass = &update_pass}, /* brings the scene to the device */
+    [PHASE_BUILD] = {.pass = &build_pass}, /* brings the tracers' structures to the scene, and reserves buffers */
+    [PHASE_SAMPLES] = {.pass = &samples_pass}, /* adds samples to the picture, slice by slice */
+    [PHASE_KEEP] = {.pass = &keep_pass},       /* keeps a layer of the key view; then build follows again */
+    [PHASE_DENOISE] = {.pass = &denoise_pass, OF_WORK(denoise)},
+    [PHASE_OUTPUT] = {.pass = &output_pass}, /* turns sums into pixels, on the host, band by band */
 };
 
 static const struct entry slice_passes[] = {
-    {&primary_pass, OF_WORK(primary)}, /* makes rays of the camera and finds their hits */
-    {&eyes_pass, OF_WORK(eyes)},       /* or finds what eyes see of a key view */
+    {.pass = &primary_pass, OF_WORK(primary)}, /* makes rays of the camera and finds their hits */
+    {.pass = &eyes_pass, OF_WORK(eyes)},       /* or finds what eyes see of a key view */
     /* Each wave of the slice, the first hits included: */
-    {&ground_pass, .is_brief = true},
-    {&wireframe_pass, .is_brief = true},
-    {&guides_pass, OF_WORK(denoise), .is_brief = true},
-    {&layers_pass, OF_WORK(layers)},
-    {&shading_pass, OF_WORK(shading)},
-    {&bounce_pass, OF_WORK(shading)}, /* traces the children; then the next wave begins */
+    {.pass = &ground_pass, .is_brief = true},
+    {.pass = &wireframe_pass, .is_brief = true},
+    {.pass = &guides_pass, OF_WORK(denoise), .is_brief = true},
+    {.pass = &layers_pass, OF_WORK(layers)},
+    {.pass = &shading_pass, OF_WORK(shading)},
+    {.pass = &bounce_pass, OF_WORK(shading)}, /* traces the children; then the next wave begins */
     /* Once there is no wave left: */
-    {&sums_pass, .is_brief = true}, /* adds the slice to the picture */
+    {.pass = &sums_pass, .is_brief = true}, /* adds the slice to the picture */
 };
 
 #define SLICE_PASSES (sizeof(slice_passes) / sizeof(slice_passes[0]))
