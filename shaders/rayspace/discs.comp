@@ -12,7 +12,7 @@
 
 void main()
 {
-    uint ray = item_index();
+    uint ray = first_ray + item_index();
     if (ray >= ray_end)
         return;
     trace_ray r = trace_ray_of(ray);

@@ -24,6 +24,8 @@
 /* Maximum of nodes that a descent begins with; a small wave begins with its rays. A pass of few pairs takes as
  * long as one of hundreds, and so does a level of few nodes. */
 #define SEEDS_MAX 256u
+/* Minimum of rays that a dispatch tests with all discs. */
+#define RANGE_RAYS_MIN TRACE_RAYS_MULTIPLE
 #define ITEMS_MAX (1u << 20) /* per batch */
 /* Passes queued where the host does not wait: for the joint descent, whose two hierarchies have some forty
  * levels together; for a batch of the flat one, beyond the levels of the rays; and the number of passes whose
@@ -194,9 +196,19 @@ static bool reserve(const struct rayspace *rayspace, struct rayspace_state *stat
     }
 }
 
-/* Tests all discs. A ray ends at the first one that it hits. */
+/* The end of the range of rays from `first` on that a dispatch tests with all discs. */
+static uint32_t end_of_range(const struct gpu_scene *scene, const struct rayspace_state *state, uint32_t first)
+{
+    const uint32_t left = state->base.wave.ray_count - first;
+    const uint64_t fitting = scene->device->facts.list_tests_max / (scene->disc_count + (uint64_t)1);
+    const uint64_t count = fitting > RANGE_RAYS_MIN ? fitting : RANGE_RAYS_MIN;
+    return first + (count < left ? (uint32_t)count : left);
+}
+
+/* Tests some rays with all discs. A ray ends at the first one that it hits. */
 static bool test_discs(struct gpu_scene *scene, struct rayspace_state *state, struct error *error)
 {
+    const uint32_t first = state->disc_rays, end = end_of_range(scene, state, first);
     struct gpu_define defines[TRACE_WAVE_DEFINES + 1] = {0};
     trace_wave_defines(scene, &state->base.wave, defines);
     const struct gpu_program_source source = {.compute = "rayspace/discs.comp", .defines = defines};
@@ -206,7 +218,10 @@ static bool test_discs(struct gpu_scene *scene, struct rayspace_state *state, st
     rayspace_bind_wave(scene, state, program);
     bind_times(scene, &state->base.wave);
     gpu_uniform_uint(program, "disc_count", scene->disc_count);
-    gpu_dispatch(scene->device, program, state->base.wave.ray_count);
+    gpu_uniform_uint(program, "first_ray", first);
+    gpu_uniform_uint(program, "ray_count", end);
+    gpu_dispatch(scene->device, program, end - first);
+    state->disc_rays = end;
     return true;
 }
 
@@ -244,12 +259,21 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
                     wave->kind == WAVE_ANY ? no_light_lost : no_hit);
     const struct rayspace_control control = {.limit = pass_max(state, device)};
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
-    if (scene->disc_count > 0 && !test_discs(scene, state, error))
-        return false;
+    state->disc_rays = scene->disc_count > 0 ? 0 : wave->ray_count;
+    state->finished_rays = 0;
+    state->has_nodes = state->has_descended = false;
+    return true;
+}
+
+/* Makes the nodes of the rays, which end at discs by now. */
+static bool make_nodes(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
+                       struct error *error)
+{
     state->next_rank = state->seeds = 0;
     state->turn = false;
+    state->has_nodes = true;
     if (!is_flat(state))
-        put_seeds(state, device, rayspace->tree.top.element_count > 0);
+        put_seeds(state, scene->device, rayspace->tree.top.element_count > 0);
     return rayspace_order_rays(state, scene, error) && rayspace_nodes_build(state, scene, error);
 }
 
@@ -522,25 +546,40 @@ static bool descend_ahead(struct rayspace *rayspace, struct gpu_scene *scene, st
 enum tracer_progress rayspace_descent_step(struct rayspace *rayspace, struct gpu_scene *scene,
                                            struct rayspace_state *state, uint64_t step_end_ns, struct error *error)
 {
+    const uint32_t ray_count = state->base.wave.ray_count;
+    while (state->disc_rays < ray_count) {
+        if (!test_discs(scene, state, error))
+            return TRACER_FAILED;
+        if (!rayspace_is_ahead(state) && state->disc_rays < ray_count)
+            return TRACER_MORE;
+    }
+    if (state->has_descended)
+        return TRACER_DONE;
+    if (!state->has_nodes && !make_nodes(rayspace, scene, state, error))
+        return TRACER_FAILED;
     if (rayspace_is_ahead(state))
         return tracer_progress_of(descend_ahead(rayspace, scene, state, error));
     const enum tracer_progress progress = descend_waiting(rayspace, scene, state, step_end_ns, error);
-    if (progress == TRACER_DONE)
+    state->has_descended = progress == TRACER_DONE;
+    if (state->has_descended)
         learn(state);
     return progress;
 }
 
-bool rayspace_descent_finish(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
-                             struct error *error)
+enum tracer_progress rayspace_descent_finish(struct rayspace *rayspace, struct gpu_scene *scene,
+                                             struct rayspace_state *state, struct error *error)
 {
     const struct wave *wave = &state->base.wave;
     const struct trace_program_source source = {.traverse = "rayspace/traverse.glsl"};
-    const struct ray_range all = {.wave = wave, .end = wave->ray_count};
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
-        return false;
+        return TRACER_FAILED;
+    struct ray_range rays = {.wave = wave, .first = state->finished_rays, .end = wave->ray_count};
+    if (!rayspace_is_ahead(state))
+        rays.end = end_of_range(scene, state, rays.first);
     gpu_buffer_bind_texels(scene->device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
     gpu_buffer_bind_storage(&state->answers, BIND_RAYSPACE_ANSWERS);
-    trace_program_run(program, scene, &all, &source);
-    return true;
+    trace_program_run(program, scene, &rays, &source);
+    state->finished_rays = rays.end;
+    return rays.end < wave->ray_count ? TRACER_MORE : TRACER_DONE;
 }

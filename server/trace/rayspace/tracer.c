@@ -145,11 +145,10 @@ static enum tracer_progress rayspace_trace_step(struct tracer *tracer, struct gp
 {
     struct rayspace *rayspace = (struct rayspace *)tracer;
     struct rayspace_state *own = (struct rayspace_state *)state;
-    const enum tracer_progress progress = rayspace_descent_step(rayspace, scene, own, step_end_ns, error);
-    if (progress != TRACER_DONE)
-        return progress;
-    return tracer_progress_of(rayspace_descent_finish(rayspace, scene, own, error) &&
-                              rayspace_counts_add(own, scene, error));
+    enum tracer_progress progress = rayspace_descent_step(rayspace, scene, own, step_end_ns, error);
+    if (progress == TRACER_DONE)
+        progress = rayspace_descent_finish(rayspace, scene, own, error);
+    return progress == TRACER_DONE ? tracer_progress_of(rayspace_counts_add(own, scene, error)) : progress;
 }
 
 const struct tracer_impl tracer_rayspace_impl = {

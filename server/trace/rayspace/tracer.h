@@ -39,9 +39,12 @@ struct rayspace_state {
     uint32_t capacity;                 /* pairs in each stack, and leaves */
     uint32_t capacity_fits;            /* maximum that memory allows; 0: no limit met yet */
     struct rayspace_reduction reduction;
-    uint32_t batch_max;   /* items in a batch */
-    uint32_t next_rank;   /* the first primitive of the next batch */
-    uint32_t seeds;       /* pairs pushed for the next pass */
+    uint32_t disc_rays,
+        finished_rays; /* rays of the wave that were tested with all discs, before and after the descent */
+    bool has_nodes, has_descended; /* the wave's rays */
+    uint32_t batch_max;            /* items in a batch */
+    uint32_t next_rank;            /* the first primitive of the next batch */
+    uint32_t seeds;                /* pairs pushed for the next pass */
     bool turn, last_turn; /* direction of the next pass (from the second stack to the first), and of the last
                              one */
     enum rayspace_chance sorts, turns;
@@ -84,7 +87,7 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
 enum tracer_progress rayspace_descent_step(struct rayspace *rayspace, struct gpu_scene *scene,
                                            struct rayspace_state *state, uint64_t step_end_ns,
                                            struct error *error);
-bool rayspace_descent_finish(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
-                             struct error *error);
+enum tracer_progress rayspace_descent_finish(struct rayspace *rayspace, struct gpu_scene *scene,
+                                             struct rayspace_state *state, struct error *error);
 
 #endif
