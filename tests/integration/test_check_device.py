@@ -61,8 +61,14 @@ class CheckDevice(Case):
         self.assertIn("1000", rows[0]["text"])
         self.assertIn("--list-devices", rows[0]["remedy"])
 
-    def test_a_device_is_listed_with_its_way_to_first_hits(self):
-        lines = self.expect(farlight_test.run("farlightd", "--list-devices"), 0).stdout.splitlines()
+    def test_a_device_is_listed_with_its_way_to_first_hits_and_its_workers(self):
+        with farlight_test.Daemon() as daemon:
+            self.expect(farlight_test.run("farlight", "ping", "--server", daemon.address, "--count", "1"), 0)
+            lines = self.expect(farlight_test.run("farlightd", "--list-devices"), 0).stdout.splitlines()
+            workers = [f"   worker 1: user {os.geteuid()} (process {worker})" for worker in daemon.workers()]
+        self.assertEqual(len(workers), 1)
+        self.assertIn(workers[0], lines)
+        lines = [line for line in lines if not line.startswith("   worker ")]  # there may be other daemons
         self.assertGreaterEqual(len(lines), 2)
         for device, way in zip(lines[::2], lines[1::2]):
             self.assertRegex(device, r"^[0-9]+  ")

@@ -316,7 +316,7 @@ class OnTheWay(Case):
     def peer(self):
         peer = Peer(self.daemon, (self.keys / "key").read_bytes())
         self.addCleanup(peer.socket.close)
-        self.assertEqual(peer.read_reply(), 1)
+        self.assertEqual(peer.read_reply(), 2)
         return peer
 
     def test_a_client_written_from_the_document_gets_its_answer(self):
