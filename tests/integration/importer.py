@@ -44,6 +44,10 @@ class Fields:
         self.at += struct.calcsize("<" + form)
         return values if len(values) > 1 else values[0]
 
+    def head(self):
+        """An object's number, which its record follows behind a size."""
+        return self.take("IH")[0]
+
     def string(self):
         size = self.take("I")
         self.at += size
@@ -61,21 +65,25 @@ def decode(kind, payload):
     """The edits as dictionaries; what no test looks at is left out."""
     f = Fields(payload)
     if kind == SET_NODE:
-        node, parent, node_kind, thing, hidden = f.take("5I")
+        node = f.head()
+        parent, node_kind, thing, hidden = f.take("4I")
         return dict(id=node, parent=parent, kind=node_kind, object=thing, hidden=hidden, matrix=f.take("12f"),
                     skin=f.take("I"), light_group=f.take("I"), weights=f.array("f"), name=f.string())
     if kind == SET_MESH:
-        mesh, vertices, triangles, influences, targets, closed = f.take("6I")
+        mesh = f.head()
+        vertices, triangles, influences, targets, closed = f.take("5I")
         return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets, closed=closed,
                     arrays=blob_refs(f), ranges=f.array("3I"), weights=f.array("f"), name=f.string())
     if kind == SET_SPHERES:
-        spheres, count = f.take("2I")
+        spheres, count = f.head(), f.take("I")
         return dict(id=spheres, count=count, arrays=blob_refs(f), ranges=f.array("3I"), name=f.string())
     if kind == SET_MATERIAL:
-        material, alpha_mode, double_sided, unlit = f.take("4I")
-        base, emission = f.take("4f"), f.take("3f")
+        material = f.head()
+        alpha_mode, double_sided, unlit = f.take("3I")
+        base, emission, seen_only = f.take("4f"), f.take("3f"), f.take("I")
         metallic, roughness, transmission, ior, cutoff, *anisotropy = f.take("7f")
-        seen_only, specular, body = f.take("I"), f.take("4f"), f.take("5f")
+        specular, tint, body = f.take("4f"), f.take("3f"), f.take("2f")
+        body = (body[0], *tint, body[1])
         layers = dict(coat=f.take("2f"), sheen=f.take("4f"), film=f.take("4f"), dispersion=f.take("f"), through=f.take("4f"),
                       thin_walled=f.take("I"))
         uses = [dict(texture=u[0], texcoord=u[1], transform=u[2:8], strength=u[8]) for u in f.array("2I6ff")]
@@ -84,25 +92,27 @@ def decode(kind, payload):
                     cutoff=cutoff, anisotropy=anisotropy, seen_only=seen_only, specular=specular, body=body, textures=uses,
                     name=f.string())
     if kind == SET_TEXTURE:
-        texture, width, height, form, wrap_u, wrap_v, nearest = f.take("7I")
+        texture = f.head()
+        width, height, form, wrap_u, wrap_v, nearest = f.take("6I")
         return dict(id=texture, width=width, height=height, format=form, wrap=(wrap_u, wrap_v), nearest=nearest,
                     arrays=blob_refs(f), name=f.string())
     if kind == SET_LIGHT:
-        light, light_kind = f.take("2I")
+        light, light_kind = f.head(), f.take("I")
         return dict(id=light, kind=light_kind, colour=f.take("3f"), range=f.take("f"), cones=f.take("2f"),
                     size=f.take("2f"), name=f.string())
     if kind == SET_CAMERA:
-        return dict(id=f.take("I"), fov_y=f.take("f"), height=f.take("f"), near=f.take("f"), name=f.string())
+        return dict(id=f.head(), fov_y=f.take("f"), height=f.take("f"), near=f.take("f"), name=f.string())
     if kind == SET_ENVIRONMENT:
+        f.take("H")  # bytes of the record
         return dict(id=0, colour=f.take("3f"), rotation=f.take("f"), size=f.take("2I"), backdrop=f.take("I"), keeps_image=f.take("I"),
                     display_values=f.take("I"), light_group=f.take("I"), arrays=blob_refs(f))
     if kind == SET_SKIN:
-        return dict(id=f.take("I"), joints=f.take("I"), arrays=blob_refs(f), name=f.string())
+        return dict(id=f.head(), joints=f.take("I"), arrays=blob_refs(f), name=f.string())
     if kind == SET_CLIP:
         return dict(id=f.take("I"), arrays=blob_refs(f), name=f.string())
     if kind == SET_CHANNEL:
         names = ("id", "clip", "path", "object", "interpolation", "width", "keys", "first_time", "first_value")
-        return dict(zip(names, f.take("9I")))
+        return dict(zip(names, (f.head(), *f.take("8I"))))
     raise AssertionError("unexpected edit 0x%04x" % kind)
 
 

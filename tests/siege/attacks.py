@@ -127,7 +127,7 @@ def skins(address):
     client = Client(address)
     client.open_scene(1)
     client.upload(blobs)
-    body = tiny_client.payload(struct.pack("<2I", 1, joints),
+    body = tiny_client.payload(struct.pack("<I", 1) + tiny_client.record(struct.pack("<I", joints)),
                                tiny_client.array([tiny_client.blob_reference(blob) for blob in blobs]), tiny_client.string(""))
     edits = [tiny_client.set_node(1, 0, 0)] + [(SET_SKIN, body)] * 5000
     begun()
@@ -168,7 +168,7 @@ def environments(address):
     half = struct.pack("<4e", 1, 1, 1, 0)
     images = [(half * 8192 * 4096)[:-8] + struct.pack("<4e", 1 + i, 1, 1, 0) for i in range(2)]
     client.upload(images)
-    fixed = struct.pack("<4f4I", 1, 1, 1, 0, 8192, 4096, 0, 0)
+    fixed = tiny_client.record(struct.pack("<4f4I", 1, 1, 1, 0, 8192, 4096, 0, 0))
     edits = [(SET_ENVIRONMENT, tiny_client.payload(fixed, tiny_client.array([tiny_client.blob_reference(image)])))
              for image in images]
     begun()
@@ -343,7 +343,8 @@ def uncommitted(address):
             break
         request = client.ask(tiny_client.EDIT_BEGIN, tiny_client.payload(struct.pack("<I", 1)))
         weights_of = tiny_client.array([struct.pack("<f", 1)] * 1024)
-        body = tiny_client.payload(struct.pack("<5I12fI", 1, 0, 0, 0, 0, *tiny_client.IDENTITY, 0), weights_of, tiny_client.string(""))
+        node = tiny_client.record(struct.pack("<4I12fI", 0, 0, 0, 0, *tiny_client.IDENTITY, 0))
+        body = tiny_client.payload(struct.pack("<I", 1) + node, weights_of, tiny_client.string(""))
         head = struct.pack("<I2H2I", len(body), tiny_client.SET_NODE, 0, request, 0)
         client.edits = (head + body + bytes(-len(body) % 8)) * 64
         clients.append(client)

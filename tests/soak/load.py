@@ -88,11 +88,13 @@ def scene_of(side, unique):
     sphere = struct.pack("<4f", 0, 0, 1, 0.5 + unique * 1e-5)
     references = [tiny_client.blob_reference(blob) for blob in (texels, sphere)]
     payload, array_of, string = tiny_client.payload, tiny_client.array, tiny_client.string
+    first = struct.pack("<I", 1)
     edits = [
-        (SET_TEXTURE, payload(struct.pack("<7I", 1, TEXELS, TEXELS, 0, 0, 0, 0), array_of(references[:1]), string(""))),
+        (SET_TEXTURE, payload(first + tiny_client.record(struct.pack("<6I", TEXELS, TEXELS, 0, 0, 0, 0)), array_of(references[:1]),
+                              string(""))),
         tiny_client.set_material(1, (0.7, 0.5, 0.3)),
         tiny_client.set_mesh(1, (side + 1)**2, 2 * side**2, [positions, corners], 1),
-        (SET_SPHERES, payload(struct.pack("<2I", 1, 1), array_of(references[1:]),
+        (SET_SPHERES, payload(first + tiny_client.record(first), array_of(references[1:]),
                               array_of([struct.pack("<3I", 0, 1, 1)]), string(""))),
         tiny_client.set_node(1, tiny_client.NODE_MESH, 1),
         tiny_client.set_light(1, tiny_client.DIRECTIONAL, (3, 3, 3)),
