@@ -539,7 +539,8 @@ class Jobs(Case):
                 self.assertIn("the limit", result.stderr)
             holder.send_signal(signal.SIGINT)
             holder.wait(farlight_test.TIMEOUT_S)
-            self.expect(farlight("stats", "--server", address), 0)
+            # The place is free once the daemon has seen the client go.
+            self.expect(farlight("stats", "--server", address, "--retry-for", "1m"), 0)
 
     @contextlib.contextmanager
     def animation(self, daemon):
