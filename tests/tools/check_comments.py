@@ -39,7 +39,7 @@ AT_MOST = {
     "client/warp": (4, 0),
     "client/web": (4, 0),
     "protocol": (4, 0),
-    "protocol (docs)": (10, 0),
+    "protocol (docs)": (4, 0),
     "protocol/common": (4, 0),
     "protocol/docs": (4, 0),
     "protocol/pixels": (4, 0),
