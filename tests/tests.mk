@@ -225,7 +225,8 @@ $(FUZZ_SEED): %: %.o $(B)/tests/fuzz/seed_frames.o $(B)/tests/fuzz/recorded_sess
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libzstd libxxhash libturbojpeg) -lm -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
-$(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_transaction: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)
+$(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_transaction: $(COMMON_OBJ) \
+    $(filter-out %/confinement.o,$(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ)))
 $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,scene sealed transaction): FUZZ_LIBS = $(call pkg_libs,libsodium libxxhash) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
