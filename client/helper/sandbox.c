@@ -2,6 +2,8 @@
 /* The sandbox of helper programs: limits, Landlock, seccomp. */
 #include "sandbox.h"
 
+#include "protocol/sanitized.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -25,17 +27,6 @@
 #endif
 #ifndef LANDLOCK_ACCESS_FS_IOCTL_DEV
 #define LANDLOCK_ACCESS_FS_IOCTL_DEV (1ULL << 15)
-#endif
-/* The sanitizers map terabytes of shadow memory, and ptrace themselves to find leaks. */
-#if defined(__SANITIZE_ADDRESS__)
-#define SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#ifndef SANITIZED
-#define SANITIZED 0
 #endif
 
 #define DEFAULT_ADDRESS_SPACE_BYTES (8ULL << 30)

@@ -151,7 +151,7 @@ bool fl_connection_check_silence(struct fl_connection *connection, struct fl_err
     if (connection->lost_after_ns == 0 || (!heard && monotonic_now_ns() < connection->check_ns))
         return true;
     connection->stream.heard = false;
-    /* The daemon was not silent while nobody listened, as when this process was stopped. */
+    /* Time in which this process was stopped does not count as the daemon's silence. */
     connection->silent_ns = heard ? 0 : connection->silent_ns + silence_ns(connection);
     connection->check_ns = monotonic_now_ns() + silence_ns(connection);
     if (heard)

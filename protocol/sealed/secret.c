@@ -2,21 +2,11 @@
 /* Memory for keys. */
 #include "protocol/sealed/secret.h"
 
+#include "protocol/sanitized.h"
+
 #include <sodium.h>
 #include <string.h>
 #include <sys/prctl.h>
-
-/* Sanitizers trace their own process to find leaks. */
-#if defined(__SANITIZE_ADDRESS__)
-#define SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#ifndef SANITIZED
-#define SANITIZED 0
-#endif
 
 /* sodium_malloc() aligns the end of the block with the end of a page. */
 #define ALIGNMENT 16u

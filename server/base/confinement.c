@@ -2,6 +2,8 @@
 /* Sandbox of a process that serves clients: Landlock and seccomp. */
 #include "base/confinement.h"
 
+#include "protocol/sanitized.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -28,18 +30,6 @@
 #define ACCESS_NET (3ULL) /* LANDLOCK_ACCESS_NET_BIND_TCP and _CONNECT_TCP, ABI 4 */
 #define SCOPES (3ULL)     /* LANDLOCK_SCOPE_ABSTRACT_UNIX_SOCKET and _SIGNAL, ABI 6 */
 #define PATHS_MAX 128
-
-/* The leak sanitizer needs ptrace(), by which it stops threads. */
-#if defined(__SANITIZE_ADDRESS__)
-#define SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#ifndef SANITIZED
-#define SANITIZED 0
-#endif
 
 /* struct landlock_ruleset_attr in ABI 6; an older kernel reads its first members. */
 struct ruleset_attributes {
@@ -171,7 +161,7 @@ static bool enter_landlock(const struct confinement *confinement, bool *has_file
 
 /* ---- seccomp ----------------------------------------------------------------------------------------- */
 
-/* Denied calls; all others are allowed, as drivers make calls that nobody lists. */
+/* The filter denies these calls and allows all others: drivers do not document the calls that they make. */
 static const char *const denied[] = {
     /* Network, including sockets that clients are connected to. */
     "connect", "bind", "listen", "accept", "accept4", "io_uring_setup",

@@ -150,9 +150,9 @@ struct engine_command {
     enum sharing sharing;          /* scene_open */
     uint64_t kept_revision;        /* scene_open: the next transaction has this revision, and the keeper has it; 0:
                                       the scene is new */
-    uint64_t principal;  /* scene_open, _attach, _list, _trim, stats: the asking client's owner; kept scenes belong
-                            to owners */
-    uint64_t trim_bytes; /* scenes_trim */
+    /* scene_open, _attach, _list, stats: the principal of the asking client, to whom kept scenes belong. */
+    uint64_t principal;
+    uint64_t trim_bytes;      /* scenes_trim */
     struct scene_edit *edits; /* commit; malloc'ed array */
     size_t edit_count;
     uint64_t base_revision;       /* commit: above 0: see scene_edits_are_current() */

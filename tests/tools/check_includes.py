@@ -103,7 +103,7 @@ MAY_INCLUDE = {
             "input", "overlay", "view", "edit"))),
 }
 # Files that every room may include.
-FOR_EVERYBODY = re.compile(r"^protocol/((version|plain_text)\.h|(words|tracers|values)\.(h|def))$")
+FOR_EVERYBODY = re.compile(r"^protocol/((version|plain_text|sanitized)\.h|(words|tracers|values)\.(h|def))$")
 # A test in tests/unit/ROOM is one of the rooms of that name, with those in it (`client`: all of the client): it may include
 # them, all that is below them, and what UNIT_ALSO says. The rest of tests/ may include every room; no room includes tests/.
 TESTS, UNIT = "tests", "tests/unit/"
