@@ -66,10 +66,9 @@ static void read_fixed(struct reader *reader, const struct field_desc *field, ch
 static bool decode_fixed(struct decoder *decoder, struct reader *reader, const struct field_desc *field,
                          char *body, const struct path *parent)
 {
-    if (field->kind == FIELD_RECORD) {
-        struct path path = {parent, field->name, -1};
-        return decode_fixed_part(decoder, reader, field->record(), body + field->offset, &path);
-    }
+    /* Errors leave the record out: its fields have names that the message has once. */
+    if (field->kind == FIELD_RECORD)
+        return decode_fixed_part(decoder, reader, field->record(), body + field->offset, parent);
     size_t wire_bytes = (size_t)field->width_bytes * field->count;
     size_t left = reader_left(reader);
     if (wire_bytes > left) {

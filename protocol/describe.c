@@ -125,7 +125,7 @@ enum enum_index {
 #define BULK(field, max_bytes, field_doc)                                                                         \
     {.name = #field, .doc = field_doc, .kind = FIELD_BULK, .offset = offsetof(owner, field),                      \
      .count_offset = offsetof(owner, field##_bytes), .max = max_bytes},
-/* Settings lie in the member `settings` of the message that carries them. */
+/* Settings lie in the member `settings` of the record that carries them. */
 #define SETTING(owned, field, field_doc)                                                                    \
     .name = #owned "_" #field, .doc = field_doc, .tracer = #owned,                  \
     .width_bytes = 4, .count = 1, .offset = offsetof(owner, settings.owned.field)

@@ -125,7 +125,7 @@ static bool encode_struct(struct encoder *encoder, const struct struct_desc *des
         bool ok = false;
         switch (field->kind) {
         case FIELD_RECORD:
-            ok = encode_nested(encoder, field, body + field->offset, &field_path);
+            ok = encode_nested(encoder, field, body + field->offset, path);
             break;
         case FIELD_STRING:
             ok = encode_string(encoder, field, body, &field_path);

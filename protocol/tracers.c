@@ -34,15 +34,15 @@ const struct tracer_desc *tracer_describe(uint32_t number)
     return NULL;
 }
 
-/* Settings are described as fields of the message that carries them. */
+/* Settings are described as fields of the record that carries them. */
 static const struct struct_desc *carrier(void)
 {
-    return message_describe(MESSAGE_RENDER)->body();
+    return struct_field(message_describe(MESSAGE_RENDER)->body(), "tracing")->record();
 }
 
 static void *place_of(const struct tracer_settings *settings, const struct field_desc *field)
 {
-    return (char *)(uintptr_t)settings + (field->offset - offsetof(struct message_render, settings));
+    return (char *)(uintptr_t)settings + (field->offset - offsetof(struct record_tracing, settings));
 }
 
 /* The name as it is typed: --ldc-form for the prefix "--". */

@@ -192,7 +192,7 @@ static void print_table(const struct info_options *wanted, const struct fl_model
         printf("  %-10s camera 0, or --view, --azimuth, --eye\n", "seen by");
     else
         printf("  %-10s a camera at azimuth %g and elevation %g degrees that sees all, or --view, --eye\n",
-               "seen by", (double)usual.auto_azimuth, (double)usual.auto_elevation);
+               "seen by", (double)usual.camera.auto_azimuth, (double)usual.camera.auto_elevation);
     if (wanted->has_camera)
         cli_info_print_camera(&wanted->camera);
     print_objects("node", info->node_list, info->node_list_count);

@@ -14,14 +14,14 @@
 /* Reduces the picture to the fewest pixels of the same shape. */
 static void shrink(struct message_render *wanted)
 {
-    uint32_t a = wanted->width, b = wanted->height;
+    uint32_t a = wanted->picture.width, b = wanted->picture.height;
     while (b != 0) {
         const uint32_t rest = a % b;
         a = b;
         b = rest;
     }
-    wanted->width /= a;
-    wanted->height /= a;
+    wanted->picture.width /= a;
+    wanted->picture.height /= a;
 }
 
 /* Distance of the target on the view's axis, equal to the distance of the scene's middle. */
@@ -40,8 +40,8 @@ static bool render(struct fl_scene *scene, const struct fl_model_info *info, str
 {
     struct message_render wanted = fl_render_defaults();
     shrink(&wanted);
-    wanted.samples = 1;
-    wanted.depth = 0;
+    wanted.sampling.samples = 1;
+    wanted.light.depth = 0;
     if (!cli_find_camera(&wanted, NULL, NULL, false, scene, error))
         return false;
     struct fl_job *job = fl_render_start(scene, &wanted, error);

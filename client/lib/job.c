@@ -38,8 +38,8 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_rend
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another job runs on this connection");
         return NULL;
     }
-    if ((wanted->layers & ~FL_LAYERS_PICTURE) != 0 &&
-        (wanted->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || wanted->encoding == PROTOCOL_ENCODING_JPEG)) {
+    if ((wanted->picture.layers & ~FL_LAYERS_PICTURE) != 0 &&
+        (wanted->picture.format != PROTOCOL_PIXEL_FORMAT_RGBA32F || wanted->encoding == PROTOCOL_ENCODING_JPEG)) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "layers",
                      "need the pixel format rgba32f and the encoding raw or zstd");
         return NULL;
@@ -59,11 +59,13 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_rend
     job->last_frame = render->last_frame;
     job->frame_step = render->frame_step;
     job->assembly.expected = (struct fl_frame_expected){
-        .width = render->crop_width > 0 ? render->crop_width : render->width * render->views_across,
-        .height = render->crop_width > 0 ? render->crop_height : render->height * render->views_down,
-        .format = render->format,
+        .width = render->picture.crop_width > 0 ? render->picture.crop_width
+                                                : render->picture.width * render->picture.views_across,
+        .height = render->picture.crop_width > 0 ? render->picture.crop_height
+                                                 : render->picture.height * render->picture.views_down,
+        .format = render->picture.format,
         .encoding = render->encoding,
-        .layers = render->layers != 0 ? render->layers : FL_LAYERS_PICTURE,
+        .layers = render->picture.layers != 0 ? render->picture.layers : FL_LAYERS_PICTURE,
     };
     render->kind = PROTOCOL_JOB_BATCH;
     render->scene = scene->scene;

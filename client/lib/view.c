@@ -54,10 +54,10 @@ struct message_render fl_view_defaults(void)
 {
     struct message_render render = fl_render_defaults();
     render.kind = PROTOCOL_JOB_VIEW;
-    render.samples = DEFAULT_SAMPLES;
+    render.sampling.samples = DEFAULT_SAMPLES;
     render.frames_per_second = DEFAULT_FRAMES_PER_SECOND;
     render.credit = DEFAULT_FRAMES_IN_FLIGHT;
-    render.denoise = PROTOCOL_DENOISE_AUTO;
+    render.picture.denoise = PROTOCOL_DENOISE_AUTO;
     return render;
 }
 
@@ -67,7 +67,7 @@ static void fill_render(struct message_render *render, const struct fl_view *vie
     render->scene = view->scene;
     render->channel = view->channel;
     render->credit = (uint32_t)view->done.capacity;
-    render->format = PROTOCOL_PIXEL_FORMAT_RGBA8;
+    render->picture.format = PROTOCOL_PIXEL_FORMAT_RGBA8;
     render->first_frame = render->last_frame = 0;
 }
 
@@ -86,23 +86,24 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
     struct message message = {.type = MESSAGE_RENDER, .render = *wanted};
     struct message_render *render = &message.render;
     fill_render(render, view);
-    const uint32_t eyes = render->views_across * render->views_down;
+    const uint32_t eyes = render->picture.views_across * render->picture.views_down;
     struct asked *asked = &view->asked[view->asked_count];
     asked->request = fl_connection_next_request(view->connection);
     asked->change = view->changes;
-    asked->expected = (struct fl_frame_expected){.width = render->width * render->views_across,
-                                                 .height = render->height * render->views_down,
-                                                 .format = render->format,
-                                                 .encoding = render->encoding,
-                                                 .still_encoding = render->still_encoding,
-                                                 .layers = FL_LAYERS_PICTURE,
-                                                 .attachments = render->attachments,
-                                                 .is_view = true,
-                                                 .margin_x_max = margin_pixels(render->margin, render->width),
-                                                 .hidden_layers = render->hidden_layers,
-                                                 .parts = render->parts != 0,
-                                                 .is_bare_at_rest = render->margin > 0 && eyes > 1,
-                                                 .margin_y_max = margin_pixels(render->margin, render->height)};
+    asked->expected =
+        (struct fl_frame_expected){.width = render->picture.width * render->picture.views_across,
+                                   .height = render->picture.height * render->picture.views_down,
+                                   .format = render->picture.format,
+                                   .encoding = render->encoding,
+                                   .still_encoding = render->view.still_encoding,
+                                   .layers = FL_LAYERS_PICTURE,
+                                   .attachments = render->view.attachments,
+                                   .is_view = true,
+                                   .margin_x_max = margin_pixels(render->view.margin, render->picture.width),
+                                   .hidden_layers = render->view.hidden_layers,
+                                   .parts = render->view.parts != 0,
+                                   .is_bare_at_rest = render->view.margin > 0 && eyes > 1,
+                                   .margin_y_max = margin_pixels(render->view.margin, render->picture.height)};
     if (!fl_connection_send(view->connection, asked->request, 0, &message, error))
         return false;
     view->asked_count++;

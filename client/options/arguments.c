@@ -344,10 +344,10 @@ static error_t set_crop(struct cli_job *job, const char *field, const char *valu
 {
     struct message_render *options = &job->options;
     int length = 0;
-    if (sscanf(value, "%4u,%4u,%4u,%4u%n", &options->crop_x, &options->crop_y, &options->crop_width,
-               &options->crop_height, &length) == 4 &&
-        value[length] == '\0' && strspn(value, "0123456789,") == strlen(value) && options->crop_width > 0 &&
-        options->crop_height > 0)
+    if (sscanf(value, "%4u,%4u,%4u,%4u%n", &options->picture.crop_x, &options->picture.crop_y,
+               &options->picture.crop_width, &options->picture.crop_height, &length) == 4 &&
+        value[length] == '\0' && strspn(value, "0123456789,") == strlen(value) &&
+        options->picture.crop_width > 0 && options->picture.crop_height > 0)
         return 0;
     return cli_usage(job, field, "'%s' is no part of a picture: use X,Y,W,H as in 640,0,320,180", value);
 }
@@ -371,8 +371,8 @@ static error_t set_view(struct cli_job *job, const char *field, const char *valu
     for (size_t i = 0; i < sizeof(views) / sizeof(views[0]); i++) {
         if (strcmp(value, views[i].name) != 0)
             continue;
-        job->options.auto_azimuth = views[i].azimuth;
-        job->options.auto_elevation = views[i].elevation;
+        job->options.camera.auto_azimuth = views[i].azimuth;
+        job->options.camera.auto_elevation = views[i].elevation;
         job->camera.has_framing = true;
         return 0;
     }
@@ -384,14 +384,12 @@ error_t cli_set_background(struct cli_job *job, const char *field, const char *v
     struct message_render *options = &job->options;
     float colour[3];
     if (fl_text_colour(value, colour, NULL)) {
-        options->background = PROTOCOL_BACKGROUND_COLOUR;
-        options->background_red = colour[0];
-        options->background_green = colour[1];
-        options->background_blue = colour[2];
+        options->picture.background = PROTOCOL_BACKGROUND_COLOUR;
+        memcpy(options->picture.background_colour, colour, sizeof(colour));
         return 0;
     }
-    if (protocol_background_parse(value, &options->background) &&
-        options->background != PROTOCOL_BACKGROUND_COLOUR)
+    if (protocol_background_parse(value, &options->picture.background) &&
+        options->picture.background != PROTOCOL_BACKGROUND_COLOUR)
         return 0;
     return cli_usage(job, field, "'%s' is no background: use environment, transparent or a colour as #ffffff",
                      value);
@@ -422,7 +420,7 @@ static error_t set_layers(struct cli_job *job, const char *field, const char *va
             break;
         at += length + 1;
     }
-    job->options.layers = layers == 1u << PROTOCOL_LAYER_BEAUTY ? 0 : layers;
+    job->options.picture.layers = layers == 1u << PROTOCOL_LAYER_BEAUTY ? 0 : layers;
     return 0;
 }
 
@@ -478,7 +476,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_BACKGROUND:
         return cli_set_background(job, field, value);
     case KEY_GROUND:
-        job->options.ground = 1;
+        job->options.picture.ground = 1;
         return 0;
     case KEY_STUDIO:
         job->input.without_studio = strcmp(value, "off") == 0;
@@ -487,7 +485,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
                    : cli_unknown_value(job, field, "studio", value);
     case KEY_DENOISE:
         job->sampling.has_denoise = true;
-        return protocol_denoise_parse(value ? value : "on", &job->options.denoise)
+        return protocol_denoise_parse(value ? value : "on", &job->options.picture.denoise)
                    ? 0
                    : cli_unknown_value(job, field, "denoise", value);
     case KEY_CAMERA:
@@ -543,7 +541,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         job->talk.timings = value ? CLI_TIMINGS_JSON : CLI_TIMINGS_TABLE;
         return 0;
     case KEY_SIZE:
-        return fl_text_size(value, &job->options.width, &job->options.height, &job->error)
+        return fl_text_size(value, &job->options.picture.width, &job->options.picture.height, &job->error)
                    ? 0
                    : name_field(job, field);
     case KEY_CROP:

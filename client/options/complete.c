@@ -87,19 +87,19 @@ static void add_light_groups(struct cli_job *job)
     struct message_render *wanted = &job->options;
     if (job->light_groups.count == 0)
         return;
-    wanted->layers |= wanted->layers == 0 ? 1u << PROTOCOL_LAYER_BEAUTY : 0;
-    wanted->layers |= ((2u << job->light_groups.count) - 1) << PROTOCOL_LAYER_LIGHT_REST;
+    wanted->picture.layers |= wanted->picture.layers == 0 ? 1u << PROTOCOL_LAYER_BEAUTY : 0;
+    wanted->picture.layers |= ((2u << job->light_groups.count) - 1) << PROTOCOL_LAYER_LIGHT_REST;
 }
 
 /* Checks layers: only EXR has named channels, and half floats are too imprecise for their contents. */
 static bool complete_layers(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
-    const uint64_t bytes =
-        (uint64_t)wanted->width * wanted->views_across * wanted->height * wanted->views_down * 16;
-    const char *option = wanted->layers == 0 ? "--light-group" : "--layers";
+    const uint64_t bytes = (uint64_t)wanted->picture.width * wanted->picture.views_across *
+                           wanted->picture.height * wanted->picture.views_down * 16;
+    const char *option = wanted->picture.layers == 0 ? "--light-group" : "--layers";
     add_light_groups(job);
-    if (wanted->layers == 0)
+    if (wanted->picture.layers == 0)
         return true;
     for (size_t i = 0; i < job->output.count; i++) {
         if (job->output.list[i].image == CLI_IMAGE_EXR)
@@ -112,12 +112,12 @@ static bool complete_layers(struct cli_job *job)
         cli_usage(job, "--encoding", "jpeg does not carry the layers of %s", option);
         return fl_error_remedy(&job->error, "choose raw, zstd or predicted");
     }
-    if (bytes * (unsigned)__builtin_popcount(wanted->layers) > FRAME_BYTES_MAX) {
-        cli_usage(job, "--layers", "the number of layers of %ux%u pixels exceeds a frame's limit", wanted->width,
-                  wanted->height);
+    if (bytes * (unsigned)__builtin_popcount(wanted->picture.layers) > FRAME_BYTES_MAX) {
+        cli_usage(job, "--layers", "the number of layers of %ux%u pixels exceeds a frame's limit",
+                  wanted->picture.width, wanted->picture.height);
         return fl_error_remedy(&job->error, "render some of them at a time, or a smaller --size");
     }
-    wanted->format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    wanted->picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     return true;
 }
 
@@ -145,7 +145,7 @@ static bool complete_colours(struct cli_job *job)
         cli_usage(job, option, "there is no configuration that has views");
         return fl_error_remedy(&job->error, "name one by --ocio FILE or $OCIO");
     }
-    job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    job->options.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     return true;
 }
 
@@ -171,9 +171,9 @@ static bool complete_pixels(struct cli_job *job)
         return cli_usage(job, "--exr-compression", "%s files do not have it",
                          cli_image_name(job->output.list[0].image)) == 0;
     if (has[CLI_IMAGE_HDR] || job->output.float_pixels)
-        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+        job->options.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     else if (has[CLI_IMAGE_EXR])
-        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+        job->options.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
     return complete_colours(job) && complete_layers(job);
 }
 
@@ -214,7 +214,8 @@ static bool complete_encoding(struct cli_job *job)
 {
     if (!job->given.encoding && job->daemon.server && strncmp(job->daemon.server, "unix:", 5) != 0)
         job->options.encoding = PROTOCOL_ENCODING_ZSTD;
-    if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
+    if (job->options.encoding == PROTOCOL_ENCODING_JPEG &&
+        job->options.picture.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
         return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",
                          cli_image_name(job->output.list[0].image)) == 0;
     for (size_t i = 0; i < job->output.count; i++) {
@@ -281,7 +282,7 @@ static bool complete_camera(struct cli_job *job)
         return cli_usage(job, "--fov", "cannot be combined with --camera, which has its own") == 0;
     if (!has_key) {
         if (job->camera.has_fov)
-            job->options.auto_fov = (float)((double)job->camera.key.fov_y / RADIANS_PER_DEGREE);
+            job->options.camera.auto_fov = (float)((double)job->camera.key.fov_y / RADIANS_PER_DEGREE);
         job->camera.has_framing |= job->camera.has_fov;
         return true;
     }
@@ -290,10 +291,10 @@ static bool complete_camera(struct cli_job *job)
         return cli_usage(job, "--look-at", "is where --eye is") == 0;
     if (is_zero(job->camera.key.up_world) || is_degenerate(job))
         return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
-    job->options.ground_up_x = job->camera.key.up_world[0];
-    job->options.ground_up_y = job->camera.key.up_world[1];
-    job->options.ground_up_z = job->camera.key.up_world[2];
-    job->options.camera_path = PROTOCOL_CAMERA_KEYS;
+    job->options.picture.ground_up_x = job->camera.key.up_world[0];
+    job->options.picture.ground_up_y = job->camera.key.up_world[1];
+    job->options.picture.ground_up_z = job->camera.key.up_world[2];
+    job->options.camera.camera_path = PROTOCOL_CAMERA_KEYS;
     job->options.keys = &job->camera.key;
     job->options.keys_count = 1;
     return true;
@@ -346,18 +347,18 @@ void cli_move_camera(struct cli_job *job, const double origin[3])
 bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,
                      const struct fl_scene *scene, struct fl_error *error)
 {
-    if (framed && !fl_scene_find_object(scene, PROTOCOL_OBJECT_NODE, framed, &render->auto_node, error))
+    if (framed && !fl_scene_find_object(scene, PROTOCOL_OBJECT_NODE, framed, &render->camera.auto_node, error))
         return false;
     if (render->keys_count > 0 || is_placed)
         return true;
     if (camera) {
-        render->camera_path = PROTOCOL_CAMERA_NODE;
-        return fl_scene_find_camera(scene, camera, &render->camera_node, error);
+        render->camera.camera_path = PROTOCOL_CAMERA_NODE;
+        return fl_scene_find_camera(scene, camera, &render->camera.camera_node, error);
     }
     const struct fl_camera_info *first = fl_scene_camera(scene, 0);
     if (first) {
-        render->camera_path = PROTOCOL_CAMERA_NODE;
-        render->camera_node = first->node;
+        render->camera.camera_path = PROTOCOL_CAMERA_NODE;
+        render->camera.camera_node = first->node;
     }
     return true;
 }
@@ -365,18 +366,19 @@ bool cli_find_camera(struct message_render *render, const char *camera, const ch
 /* True if the pictures are for display, not linear light for programs. */
 static bool is_shown(const struct cli_job *job)
 {
-    return job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8 || job->output.display_view;
+    return job->options.picture.format == PROTOCOL_PIXEL_FORMAT_RGBA8 || job->output.display_view;
 }
 
 void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene)
 {
-    const bool shows = render->integrator == PROTOCOL_INTEGRATOR_WHITTED ||
-                       render->integrator == PROTOCOL_INTEGRATOR_DISTRIBUTED ||
-                       render->integrator == PROTOCOL_INTEGRATOR_PATH;
+    const bool shows = render->light.integrator == PROTOCOL_INTEGRATOR_WHITTED ||
+                       render->light.integrator == PROTOCOL_INTEGRATOR_DISTRIBUTED ||
+                       render->light.integrator == PROTOCOL_INTEGRATOR_PATH;
     if (job->sampling.filters && !job->input.without_studio && !job->input.scene && shows && is_shown(job) &&
-        render->background == PROTOCOL_BACKGROUND_ENVIRONMENT && render->camera_path != PROTOCOL_CAMERA_NODE &&
-        render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS && !fl_scene_is_lit(scene))
-        render->ground = 1;
+        render->picture.background == PROTOCOL_BACKGROUND_ENVIRONMENT &&
+        render->camera.camera_path != PROTOCOL_CAMERA_NODE &&
+        render->picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS && !fl_scene_is_lit(scene))
+        render->picture.ground = 1;
 }
 
 /* Chooses the integrator: lenses, shutters and several samples need distributed; a single sharp sample needs no
@@ -384,10 +386,10 @@ void cli_choose_ground(const struct cli_job *job, struct message_render *render,
 static void complete_integrator(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
-    const bool spreads = wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 ||
-                         job->clips.change_lens || job->sampling.endless;
+    const bool spreads = wanted->sampling.samples > 1 || wanted->camera.aperture > 0 ||
+                         wanted->camera.shutter > 0 || job->clips.change_lens || job->sampling.endless;
     if (!job->given.integrator)
-        job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
+        job->options.light.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
 }
 
 static float usual_clamp(uint32_t samples)
@@ -402,34 +404,34 @@ static void complete_samples(struct cli_job *job, bool is_series)
 {
     struct message_render *wanted = &job->options;
     if (job->sampling.is_auto) {
-        wanted->samples = AUTO_SAMPLES;
-        wanted->noise = wanted->noise > 0.0f ? wanted->noise : AUTO_NOISE;
+        wanted->sampling.samples = AUTO_SAMPLES;
+        wanted->sampling.noise = wanted->sampling.noise > 0.0f ? wanted->sampling.noise : AUTO_NOISE;
     }
-    const bool by_error = wanted->noise > 0.0f;
+    const bool by_error = wanted->sampling.noise > 0.0f;
     job->sampling.endless = job->sampling.progressive && !job->sampling.has_samples && !by_error;
     job->sampling.by_error = by_error && !is_series;
     if (!job->sampling.has_samples && by_error)
-        wanted->samples = NOISE_SAMPLES;
-    else if (!job->sampling.has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
-        wanted->samples = PATH_SAMPLES;
-    else if (!job->sampling.has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
-        wanted->samples = AO_SAMPLES;
+        wanted->sampling.samples = NOISE_SAMPLES;
+    else if (!job->sampling.has_samples && wanted->light.integrator == PROTOCOL_INTEGRATOR_PATH)
+        wanted->sampling.samples = PATH_SAMPLES;
+    else if (!job->sampling.has_samples && wanted->light.integrator == PROTOCOL_INTEGRATOR_AO)
+        wanted->sampling.samples = AO_SAMPLES;
     else if (!job->sampling.has_samples && !job->sampling.progressive && job->sampling.usual > 0)
-        wanted->samples = job->sampling.usual;
+        wanted->sampling.samples = job->sampling.usual;
     if (!job->given.clamp && !job->sampling.endless)
-        wanted->clamp = usual_clamp(wanted->samples);
+        wanted->light.clamp = usual_clamp(wanted->sampling.samples);
 }
 
 static bool complete_tracer(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
     struct setting_fault fault;
-    if (!tracer_settings_check(&wanted->settings, "--", &fault)) {
+    if (!tracer_settings_check(&wanted->tracing.settings, "--", &fault)) {
         cli_usage(job, fault.field, "%s", fault.text);
         return fl_error_remedy(&job->error, "%s", fault.remedy);
     }
     if (!job->given.primary)
-        wanted->primary = PROTOCOL_PRIMARY_AUTO;
+        wanted->tracing.primary = PROTOCOL_PRIMARY_AUTO;
     return true;
 }
 
@@ -484,9 +486,9 @@ static bool complete_scene(struct cli_job *job)
 static bool complete_noise(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
-    const bool is_made =
-        wanted->views_across * wanted->views_down > 1 || wanted->aperture > 0 || wanted->upsample > 1;
-    if (!(wanted->noise > 0.0f) || wanted->view_source != PROTOCOL_VIEW_SOURCE_LAYERS || !is_made)
+    const bool is_made = wanted->picture.views_across * wanted->picture.views_down > 1 ||
+                         wanted->camera.aperture > 0 || wanted->picture.upsample > 1;
+    if (!(wanted->sampling.noise > 0.0f) || wanted->picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS || !is_made)
         return true;
     cli_usage(job, "--noise", "pictures made from depth layers have a fixed number of samples");
     return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
@@ -495,7 +497,7 @@ static bool complete_noise(struct cli_job *job)
 /* Checks ground and layers: layers hold only visible surfaces, and a ground is invisible. */
 static bool complete_ground(struct cli_job *job)
 {
-    if (job->options.ground == 0 || job->options.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+    if (job->options.picture.ground == 0 || job->options.picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
         return true;
     cli_usage(job, "--ground", "pictures made from depth layers show no ground");
     return fl_error_remedy(&job->error, "render them as they are: --views rays, --lens rays");
@@ -504,20 +506,21 @@ static bool complete_ground(struct cli_job *job)
 static bool complete_crop(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
-    if (wanted->crop_width == 0)
+    if (wanted->picture.crop_width == 0)
         return true;
-    if (wanted->crop_x + wanted->crop_width > wanted->width ||
-        wanted->crop_y + wanted->crop_height > wanted->height) {
-        cli_usage(job, "--crop", "%ux%u pixels from (%u, %u) on are not in a picture of %ux%u", wanted->crop_width,
-                  wanted->crop_height, wanted->crop_x, wanted->crop_y, wanted->width, wanted->height);
+    if (wanted->picture.crop_x + wanted->picture.crop_width > wanted->picture.width ||
+        wanted->picture.crop_y + wanted->picture.crop_height > wanted->picture.height) {
+        cli_usage(job, "--crop", "%ux%u pixels from (%u, %u) on are not in a picture of %ux%u",
+                  wanted->picture.crop_width, wanted->picture.crop_height, wanted->picture.crop_x,
+                  wanted->picture.crop_y, wanted->picture.width, wanted->picture.height);
         return fl_error_remedy(&job->error, "--size gives the size of the whole picture");
     }
-    const char *other = wanted->noise > 0.0f                                 ? "--noise"
-                        : wanted->denoise != PROTOCOL_DENOISE_OFF            ? "--denoise"
-                        : job->views.has_stereo                              ? "--stereo"
-                        : job->views.has_light_field                         ? "--light-field"
-                        : wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS ? "--lens quadtree"
-                                                                             : NULL;
+    const char *other = wanted->sampling.noise > 0.0f                                ? "--noise"
+                        : wanted->picture.denoise != PROTOCOL_DENOISE_OFF            ? "--denoise"
+                        : job->views.has_stereo                                      ? "--stereo"
+                        : job->views.has_light_field                                 ? "--light-field"
+                        : wanted->picture.view_source == PROTOCOL_VIEW_SOURCE_LAYERS ? "--lens quadtree"
+                                                                                     : NULL;
     if (!other)
         return true;
     cli_usage(job, "--crop", "cannot be combined with %s, which reads neighbouring pixels", other);
@@ -527,8 +530,9 @@ static bool complete_crop(struct cli_job *job)
 /* Chooses the filter: files in linear light are for programs with filters of their own. */
 static void complete_denoise(struct cli_job *job)
 {
-    if (!job->sampling.has_denoise && job->sampling.filters && is_shown(job) && job->options.crop_width == 0)
-        job->options.denoise = PROTOCOL_DENOISE_AUTO;
+    if (!job->sampling.has_denoise && job->sampling.filters && is_shown(job) &&
+        job->options.picture.crop_width == 0)
+        job->options.picture.denoise = PROTOCOL_DENOISE_AUTO;
 }
 
 bool cli_job_complete(struct cli_job *job, bool is_series)
@@ -551,12 +555,12 @@ bool cli_job_complete_view(struct cli_job *job)
     if (!complete_scene(job))
         return false;
     if (!job->given.clamp)
-        wanted->clamp = CLAMP;
-    if (wanted->noise > 0.0f && !job->sampling.has_samples)
-        wanted->samples = NOISE_SAMPLES;
+        wanted->light.clamp = CLAMP;
+    if (wanted->sampling.noise > 0.0f && !job->sampling.has_samples)
+        wanted->sampling.samples = NOISE_SAMPLES;
     /* An integrator without noise is better while the camera moves. */
-    if (!job->given.integrator && (wanted->aperture > 0 || wanted->shutter > 0))
-        wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
+    if (!job->given.integrator && (wanted->camera.aperture > 0 || wanted->camera.shutter > 0))
+        wanted->light.integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
     if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)
         return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
     return cli_views_complete(job, false) && complete_noise(job) && complete_tracer(job) && complete_clips(job) &&

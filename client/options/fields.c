@@ -94,6 +94,8 @@ static const struct row {
 };
 #define ROW_COUNT (sizeof(rows) / sizeof(rows[0]))
 
+static struct field_desc leaves[FIELDS_MAX]; /* of the message and its records, with offsets in the message */
+static size_t leaf_count;
 static struct cli_field fields[FIELDS_MAX];
 static size_t field_count;
 
@@ -152,6 +154,15 @@ static int group_of(const struct field_desc *field)
     return CLI_GROUP_TRACERS + (int)tracer;
 }
 
+/* A field of the message or of one of its records; NULL: there is none. */
+static const struct field_desc *leaf(const char *name)
+{
+    for (size_t i = 0; i < leaf_count; i++)
+        if (strcmp(leaves[i].name, name) == 0)
+            return &leaves[i];
+    return NULL;
+}
+
 static struct cli_field *add(const char *name, const struct field_desc *field)
 {
     struct cli_field *option = &fields[field_count++];
@@ -167,16 +178,17 @@ static struct cli_field *add(const char *name, const struct field_desc *field)
 
 static void make_list(void)
 {
-    const struct struct_desc *render = message_describe(MESSAGE_RENDER)->body();
+    leaf_count = struct_leaves(message_describe(MESSAGE_RENDER)->body(), leaves, FIELDS_MAX);
     for (size_t i = 0; i < ROW_COUNT; i++) {
-        struct cli_field *option = add(rows[i].option, struct_field(render, rows[i].field));
+        struct cli_field *option = add(rows[i].option, leaf(rows[i].field));
         option->argument = rows[i].argument;
         option->group = rows[i].group;
         option->given_offset = rows[i].given_offset;
         option->is_of_shot = rows[i].is_of_shot;
         write_help(option, rows[i].doc);
     }
-    for (const struct field_desc *field = render->fields; field->name && field_count < FIELDS_MAX; field++) {
+    for (const struct field_desc *field = leaves; field < leaves + leaf_count && field_count < FIELDS_MAX;
+         field++) {
         if (!field->tracer)
             continue;
         struct cli_field *option = add(field->name, field);
@@ -241,10 +253,10 @@ static bool is_same_place(const char *name, const char *other)
 /* --depth and --bounces. */
 static error_t check_depth(struct cli_job *job, const char *name, const char *value, uint64_t depth)
 {
-    if (job->depth_field[0] != '\0' && strcmp(job->depth_field, name) != 0 && depth != job->options.depth &&
+    if (job->depth_field[0] != '\0' && strcmp(job->depth_field, name) != 0 && depth != job->options.light.depth &&
         is_same_place(job->depth_field, name)) {
         cli_usage(job, name, "%s contradicts %s %u, which is the same", value, job->depth_field,
-                  job->options.depth);
+                  job->options.light.depth);
         fl_error_remedy(&job->error, "leave out one of them");
         return EINVAL;
     }

@@ -115,14 +115,14 @@ static bool complete_eyes(struct cli_job *job)
         return refuse(job, "--baseline", "there is no light field",
                       "add --light-field 5x5; --stereo gives the distance between two eyes");
     if (views->has_light_field) {
-        wanted->views_across = views->across;
-        wanted->views_down = views->down;
-        wanted->baseline = views->baseline_m;
+        wanted->picture.views_across = views->across;
+        wanted->picture.views_down = views->down;
+        wanted->picture.baseline = views->baseline_m;
     } else if (views->has_stereo) {
-        wanted->eyes_over = views->layout == CLI_STEREO_OVER;
-        wanted->views_across = wanted->eyes_over ? 1 : 2;
-        wanted->views_down = wanted->eyes_over ? 2 : 1;
-        wanted->baseline = views->stereo_m;
+        wanted->picture.eyes_over = views->layout == CLI_STEREO_OVER;
+        wanted->picture.views_across = wanted->picture.eyes_over ? 1 : 2;
+        wanted->picture.views_down = wanted->picture.eyes_over ? 2 : 1;
+        wanted->picture.baseline = views->stereo_m;
     }
     return true;
 }
@@ -134,10 +134,10 @@ static bool complete_source(struct cli_job *job)
 {
     const struct cli_views *views = &job->views;
     struct message_render *wanted = &job->options;
-    const bool has_views = views->has_stereo || views->has_light_field || wanted->upsample > 1;
-    const bool has_lens = wanted->aperture > 0 || job->clips.change_lens;
-    const bool is_filtered = wanted->denoise == PROTOCOL_DENOISE_ON;
-    const bool is_rendered = is_filtered || wanted->layers >> PROTOCOL_LAYER_MOTION != 0;
+    const bool has_views = views->has_stereo || views->has_light_field || wanted->picture.upsample > 1;
+    const bool has_lens = wanted->camera.aperture > 0 || job->clips.change_lens;
+    const bool is_filtered = wanted->picture.denoise == PROTOCOL_DENOISE_ON;
+    const bool is_rendered = is_filtered || wanted->picture.layers >> PROTOCOL_LAYER_MOTION != 0;
     if (views->has_views && !has_views)
         return refuse(job, "--views", "the picture has a single view",
                       "add --stereo 0.065; a picture may have --light-field 5x5, an animation --upsample 4");
@@ -147,31 +147,32 @@ static bool complete_source(struct cli_job *job)
         return refuse(job, "--lens", "a picture has a single source, and --views gives another one",
                       "leave out one of them");
     if (views->has_views)
-        wanted->view_source = views->views;
+        wanted->picture.view_source = views->views;
     else if (views->has_lens)
-        wanted->view_source = views->lens;
+        wanted->picture.view_source = views->lens;
     else
-        wanted->view_source = has_views && (!is_rendered || wanted->upsample > 1) ? PROTOCOL_VIEW_SOURCE_LAYERS
-                                                                                  : PROTOCOL_VIEW_SOURCE_RAYS;
-    if (wanted->view_source == PROTOCOL_VIEW_SOURCE_RAYS && wanted->upsample > 1)
+        wanted->picture.view_source = has_views && (!is_rendered || wanted->picture.upsample > 1)
+                                          ? PROTOCOL_VIEW_SOURCE_LAYERS
+                                          : PROTOCOL_VIEW_SOURCE_RAYS;
+    if (wanted->picture.view_source == PROTOCOL_VIEW_SOURCE_RAYS && wanted->picture.upsample > 1)
         return refuse(job, "--upsample", "frames between rendered frames are not made of rays",
                       views->has_views ? "add --views quadtree" : "leave out --lens rays");
-    if (wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS && is_filtered)
+    if (wanted->picture.view_source == PROTOCOL_VIEW_SOURCE_LAYERS && is_filtered)
         return refuse(job, "--denoise", "pictures made from depth layers are not denoised",
-                      wanted->upsample > 1 ? "leave out --denoise or --upsample"
-                      : has_views          ? "leave it out, or add --views rays"
-                                           : "leave it out, or add --lens rays");
-    if (wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS && wanted->shutter > 0)
+                      wanted->picture.upsample > 1 ? "leave out --denoise or --upsample"
+                      : has_views                  ? "leave it out, or add --views rays"
+                                                   : "leave it out, or add --lens rays");
+    if (wanted->picture.view_source == PROTOCOL_VIEW_SOURCE_LAYERS && wanted->camera.shutter > 0)
         return refuse(job, "--shutter", "depth layers show the scene at one time",
-                      wanted->upsample > 1 ? "leave out --shutter or --upsample"
-                      : has_views          ? "leave it out, or add --views rays"
-                                           : "leave it out, or add --lens rays");
+                      wanted->picture.upsample > 1 ? "leave out --shutter or --upsample"
+                      : has_views                  ? "leave it out, or add --views rays"
+                                                   : "leave it out, or add --lens rays");
     return true;
 }
 
 bool cli_views_check_range(const struct cli_job *job, struct fl_error *error)
 {
-    if (job->options.upsample == 1 || fl_frame_run_count(&job->series.range) > 1)
+    if (job->options.picture.upsample == 1 || fl_frame_run_count(&job->series.range) > 1)
         return true;
     fl_error_set(error, FL_ERROR_ARGUMENT, "--upsample", "a single frame is rendered: there are none between");
     return fl_error_remedy(error, "leave it out, or use a range of --frames such as 1-120");
@@ -184,15 +185,15 @@ static bool complete_upsample(struct cli_job *job)
     struct message_render *wanted = &job->options;
     if (series->has_range && !cli_views_check_range(job, &job->error))
         return false;
-    const uint64_t step = series->has_range ? series->range.step : 1, frames = wanted->upsample * step;
-    if (wanted->upsample == 1)
+    const uint64_t step = series->has_range ? series->range.step : 1, frames = wanted->picture.upsample * step;
+    if (wanted->picture.upsample == 1)
         return true;
     if (frames <= VIEWS_MAX) {
-        wanted->upsample = (uint32_t)frames;
+        wanted->picture.upsample = (uint32_t)frames;
         return true;
     }
-    cli_usage(job, "--upsample", "every %u-th of every %llu-th frame is beyond every %u-th", wanted->upsample,
-              (unsigned long long)step, VIEWS_MAX);
+    cli_usage(job, "--upsample", "every %u-th of every %llu-th frame is beyond every %u-th",
+              wanted->picture.upsample, (unsigned long long)step, VIEWS_MAX);
     return fl_error_remedy(&job->error, "use a smaller one, or a smaller step of --frames");
 }
 

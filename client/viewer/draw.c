@@ -76,7 +76,7 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
         .scale = viewer->screen.scale,
         .notice = "",
         .settings = &view->settings,
-        .exposure_stops = (double)view->render.exposure_stops + view->settings.exposure_thirds / 3.0,
+        .exposure_stops = (double)view->render.picture.exposure_stops + view->settings.exposure_thirds / 3.0,
         .stereo_m = (double)viewer->options->view.stereo_m,
         .tour = &view->eye.tour,
         .metrics = &view->frames.metrics,
@@ -84,12 +84,12 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
         .picture_width = view->frames.last.width,
         .picture_height = view->frames.last.height,
         .samples = view->frames.last.samples,
-        .samples_wanted = view_has_samples(view, &view->frames.last, view->render.samples)
+        .samples_wanted = view_has_samples(view, &view->frames.last, view->render.sampling.samples)
                               ? view->frames.last.samples
-                              : view->render.samples,
-        .depth = view->render.depth,
-        .depth_less =
-            view->frames.last.depth_less < view->render.depth ? view->frames.last.depth_less : view->render.depth,
+                              : view->render.sampling.samples,
+        .depth = view->render.light.depth,
+        .depth_less = view->frames.last.depth_less < view->render.light.depth ? view->frames.last.depth_less
+                                                                              : view->render.light.depth,
         .moving = view->frames.last.moving,
         .revision = view->frames.last.revision,
         .wire_bytes = view->frames.last.wire_bytes,

@@ -138,8 +138,8 @@ static error_t set_still_encoding(struct command_line *line, const char *value)
 {
     struct viewer_options *viewer = &line->viewer;
     viewer->view.has_still_encoding = true;
-    if (protocol_encoding_parse(value, &line->job.options.still_encoding) &&
-        line->job.options.still_encoding != PROTOCOL_ENCODING_H264)
+    if (protocol_encoding_parse(value, &line->job.options.view.still_encoding) &&
+        line->job.options.view.still_encoding != PROTOCOL_ENCODING_H264)
         return 0;
     return cli_usage(&line->job, "--still-encoding", "'%s' is not raw, predicted, zstd or jpeg", value);
 }
@@ -176,7 +176,7 @@ static error_t set_holes(struct command_line *line, const char *value)
 static error_t set_integrator(struct command_line *line, const char *value)
 {
     line->job.given.integrator = true;
-    if (protocol_integrator_parse(value, &line->job.options.integrator))
+    if (protocol_integrator_parse(value, &line->job.options.light.integrator))
         return 0;
     return cli_usage(&line->job, "--integrator", "unknown integrator '%s'", value);
 }
@@ -237,9 +237,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return set_rate(line, value);
     case KEY_SAMPLES:
         line->job.sampling.has_samples = true;
-        return set_integer(&line->job, "--samples", value, 1, 65536, &line->job.options.samples);
+        return set_integer(&line->job, "--samples", value, 1, 65536, &line->job.options.sampling.samples);
     case KEY_PASS:
-        return set_integer(&line->job, "--pass-samples", value, 1, 256, &line->job.options.pass_samples);
+        return set_integer(&line->job, "--pass-samples", value, 1, 256, &line->job.options.view.pass_samples);
     case KEY_WEIGHT:
         return set_integer(&line->job, "--weight", value, 1, 16, &line->job.options.weight);
     case KEY_INTEGRATOR:
@@ -319,14 +319,14 @@ static void fill(struct command_line *line)
     viewer->point_size = job->input.point_size;
     viewer->scene_name = job->input.scene;
     viewer->view.render = job->options;
-    viewer->view.render.views_across = viewer->view.render.views_down = 1;
-    viewer->view.render.eyes_over = 0;
-    viewer->view.render.baseline = 0;
-    viewer->view.render.view_source = job->views.has_lens ? job->views.lens : PROTOCOL_VIEW_SOURCE_RAYS;
+    viewer->view.render.picture.views_across = viewer->view.render.picture.views_down = 1;
+    viewer->view.render.picture.eyes_over = 0;
+    viewer->view.render.picture.baseline = 0;
+    viewer->view.render.picture.view_source = job->views.has_lens ? job->views.lens : PROTOCOL_VIEW_SOURCE_RAYS;
     viewer->stereo = job->views.has_stereo;
     viewer->view.stereo_m = job->views.has_stereo ? job->views.stereo_m : STEREO_DEFAULT_M;
     viewer->view.stereo_over = job->views.layout == CLI_STEREO_OVER;
-    viewer->views = job->views.has_stereo ? job->options.view_source : PROTOCOL_VIEW_SOURCE_LAYERS;
+    viewer->views = job->views.has_stereo ? job->options.picture.view_source : PROTOCOL_VIEW_SOURCE_LAYERS;
     if (!line->has_moving_rate)
         viewer->view.moving_rate = viewer->view.never_adapt ? 0.0f : MOVING_RATE_DEFAULT;
     viewer->view.has_encoding = job->given.encoding;
@@ -350,17 +350,17 @@ static bool read_line(struct command_line *line, const struct argp *argp, int ar
                       const struct recall *recall)
 {
     struct message_render defaults = fl_view_defaults();
-    struct settings settings = {.tracer = defaults.tracer,
-                                .integrator = defaults.integrator,
-                                .tone_map = defaults.tone_map,
+    struct settings settings = {.tracer = defaults.tracing.tracer,
+                                .integrator = defaults.light.integrator,
+                                .tone_map = defaults.picture.tone_map,
                                 .local = LOCAL_AUTO};
     recall_apply(recall, &settings);
-    defaults.tracer = settings.tracer;
-    defaults.integrator = settings.integrator;
-    defaults.tone_map = settings.tone_map;
+    defaults.tracing.tracer = settings.tracer;
+    defaults.light.integrator = settings.integrator;
+    defaults.picture.tone_map = settings.tone_map;
     if (recall->width > 0) {
-        defaults.width = (uint32_t)recall->width;
-        defaults.height = (uint32_t)recall->height;
+        defaults.picture.width = (uint32_t)recall->width;
+        defaults.picture.height = (uint32_t)recall->height;
     }
     *line = (struct command_line){.viewer = {.local = settings.local,
                                              .holes = settings.holes,

@@ -78,10 +78,10 @@ static void forget_scene(struct viewer *viewer)
 {
     struct view *view = &viewer->view;
     view->render = viewer->options->view.render;
-    view->render.camera_path = fl_view_defaults().camera_path;
+    view->render.camera.camera_path = fl_view_defaults().camera.camera_path;
     view->render.keys = NULL;
     view->render.keys_count = 0;
-    view->render.auto_node = 0;
+    view->render.camera.auto_node = 0;
     view_forget_local(view);
     editor_forget(&viewer->edit);
     view->eye.has_camera = view->eye.has_home = view->frames.is_live = false;

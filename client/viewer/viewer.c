@@ -258,8 +258,8 @@ static void remember(const struct viewer *viewer)
     }
     recall.full_screen = place.full_screen;
     /* A size from the command line is not saved. */
-    if (!place.full_screen &&
-        (place.width != (int)options->view.render.width || place.height != (int)options->view.render.height)) {
+    if (!place.full_screen && (place.width != (int)options->view.render.picture.width ||
+                               place.height != (int)options->view.render.picture.height)) {
         recall.width = place.width;
         recall.height = place.height;
     }
@@ -293,14 +293,14 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
     viewer->view.screen = viewer->edit.screen = &viewer->screen;
     viewer->view.choice = &viewer->edit.choice;
     viewer->view.render = options->view.render;
-    viewer->screen.width = (int)options->view.render.width;
-    viewer->screen.height = (int)options->view.render.height;
+    viewer->screen.width = (int)options->view.render.picture.width;
+    viewer->screen.height = (int)options->view.render.picture.height;
     viewer->screen.scale = 1;
     viewer->edit.choice.tab = EDIT_MATERIAL;
-    viewer->view.settings = (struct settings){.tracer = options->view.render.tracer,
-                                              .integrator = options->view.render.integrator,
-                                              .tone_map = options->view.render.tone_map,
-                                              .tracers = options->view.render.settings,
+    viewer->view.settings = (struct settings){.tracer = options->view.render.tracing.tracer,
+                                              .integrator = options->view.render.light.integrator,
+                                              .tone_map = options->view.render.picture.tone_map,
+                                              .tracers = options->view.render.tracing.settings,
                                               .coarser = (int)options->coarser,
                                               .overlay = options->overlay,
                                               .stereo = options->stereo,

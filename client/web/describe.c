@@ -72,11 +72,12 @@ char *web_describe_scene(struct fl_scene *scene, const char *name, const struct 
 {
     return print(json_pack(
         "{s:{s:s,s:b,s:I,s:I,s:b,s:o,s:o,s:o,s:o,s:s,s:s,s:o,s:o}}", "scene", "name", name, "edit", may_edit,
-        "node", (json_int_t)(render->camera_path == PROTOCOL_CAMERA_NODE ? render->camera_node : 0), "triangles",
-        (json_int_t)bounds->triangles, "h264", can_h264, "cameras", cameras(scene), "clips", clips(scene),
-        "tracers", tracers(), "integrators", integrators(), "tracer", protocol_tracer_text(render->tracer),
-        "integrator", protocol_integrator_text(render->integrator), "lower", numbers(bounds->lower_world, 3),
-        "upper", numbers(bounds->upper_world, 3)));
+        "node", (json_int_t)(render->camera.camera_path == PROTOCOL_CAMERA_NODE ? render->camera.camera_node : 0),
+        "triangles", (json_int_t)bounds->triangles, "h264", can_h264, "cameras", cameras(scene), "clips",
+        clips(scene), "tracers", tracers(), "integrators", integrators(), "tracer",
+        protocol_tracer_text(render->tracing.tracer), "integrator",
+        protocol_integrator_text(render->light.integrator), "lower", numbers(bounds->lower_world, 3), "upper",
+        numbers(bounds->upper_world, 3)));
 }
 
 static json_t *stages(const struct fl_frame *frame)

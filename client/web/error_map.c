@@ -10,10 +10,10 @@
 
 static void shrink(struct message_render *render)
 {
-    const double pixels = (double)render->width * render->height;
+    const double pixels = (double)render->picture.width * render->picture.height;
     const double share = pixels > ERROR_MAP_PIXELS_MAX ? sqrt(ERROR_MAP_PIXELS_MAX / pixels) : 1;
-    render->width = (uint32_t)fmax(1, render->width * share);
-    render->height = (uint32_t)fmax(1, render->height * share);
+    render->picture.width = (uint32_t)fmax(1, render->picture.width * share);
+    render->picture.height = (uint32_t)fmax(1, render->picture.height * share);
 }
 
 /* A job's first frame is at its time 0, so the clip starts earlier by the view's time. */
@@ -27,15 +27,15 @@ static void place(struct error_map *map, const struct fl_view_camera *camera)
         render->clips_count = 1;
     }
     if (camera->node != 0) {
-        render->camera_path = PROTOCOL_CAMERA_NODE;
-        render->camera_node = camera->node;
+        render->camera.camera_path = PROTOCOL_CAMERA_NODE;
+        render->camera.camera_node = camera->node;
         return;
     }
     memcpy(map->key.eye_world, camera->eye_world, sizeof(map->key.eye_world));
     memcpy(map->key.look_at_world, camera->look_at_world, sizeof(map->key.look_at_world));
     memcpy(map->key.up_world, camera->up_world, sizeof(map->key.up_world));
     map->key.fov_y = camera->fov_y;
-    render->camera_path = PROTOCOL_CAMERA_KEYS;
+    render->camera.camera_path = PROTOCOL_CAMERA_KEYS;
     render->keys = &map->key;
     render->keys_count = 1;
 }
@@ -47,16 +47,16 @@ bool error_map_begin(struct error_map *map, struct fl_scene *scene, const struct
     map->render = *view;
     struct message_render *render = &map->render;
     shrink(render);
-    render->samples = ERROR_MAP_SAMPLES;
-    render->primary = PROTOCOL_PRIMARY_TRACE;
-    render->compare = 1;
-    render->compare_with = PROTOCOL_TRACER_REFERENCE;
-    render->encoding = render->still_encoding =
-        PROTOCOL_ENCODING_PREDICTED;        /* errors of a lossy encoding would count */
-    render->denoise = PROTOCOL_DENOISE_OFF; /* a filter would hide errors */
-    render->adapt = 0;
+    render->sampling.samples = ERROR_MAP_SAMPLES;
+    render->tracing.primary = PROTOCOL_PRIMARY_TRACE;
+    render->comparison.compare = 1;
+    render->comparison.compare_with = PROTOCOL_TRACER_REFERENCE;
+    render->encoding = render->view.still_encoding =
+        PROTOCOL_ENCODING_PREDICTED;                /* errors of a lossy encoding would count */
+    render->picture.denoise = PROTOCOL_DENOISE_OFF; /* a filter would hide errors */
+    render->view.adapt = 0;
     render->weight = WEIGHT;
-    render->moving_rate = render->noise = 0;
+    render->view.moving_rate = render->sampling.noise = 0;
     if (camera)
         place(map, camera);
     map->job = fl_render_start(scene, render, error);
@@ -80,8 +80,8 @@ static void mark(struct fl_frame *frame, const struct fl_frame *reference)
 /* Starts the same picture with the reference. */
 static bool go_on(struct error_map *map, struct fl_scene *scene, struct fl_error *error)
 {
-    map->render.compare = 0;
-    map->render.tracer = PROTOCOL_TRACER_REFERENCE;
+    map->render.comparison.compare = 0;
+    map->render.tracing.tracer = PROTOCOL_TRACER_REFERENCE;
     map->job = fl_render_start(scene, &map->render, error);
     return map->job != NULL;
 }

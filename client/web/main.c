@@ -142,10 +142,10 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_VIEWERS:
         return set_number(line, "--viewers", value, VIEWERS_MAX, &line->gateway.viewers);
     case KEY_SAMPLES:
-        return set_number(line, "--samples", value, 65536, &job->options.samples);
+        return set_number(line, "--samples", value, 65536, &job->options.sampling.samples);
     case KEY_INTEGRATOR:
         job->given.integrator = true;
-        return protocol_integrator_parse(value, &job->options.integrator)
+        return protocol_integrator_parse(value, &job->options.light.integrator)
                    ? 0
                    : cli_usage(job, "--integrator", "unknown integrator '%s'", value);
     case ARGP_KEY_ARG: /* words after -- are the daemon's */

@@ -93,18 +93,18 @@ static bool fill_render(struct seat *seat, const struct web_show *show, struct f
     const struct cli_job *job = seat->options.job;
     struct message_render *render = &seat->render;
     *render = job->options;
-    render->width = show->width;
-    render->height = show->height;
+    render->picture.width = show->width;
+    render->picture.height = show->height;
     if (show->has_tracer)
-        render->tracer = show->tracer;
+        render->tracing.tracer = show->tracer;
     if (show->has_integrator)
-        render->integrator = show->integrator;
-    if (render->moving_rate == 0)
-        render->moving_rate = MOVING_RATE;
-    render->adapt = 1;
+        render->light.integrator = show->integrator;
+    if (render->view.moving_rate == 0)
+        render->view.moving_rate = MOVING_RATE;
+    render->view.adapt = 1;
     render->encoding =
         show->h264 && fl_connection_can_h264(seat->connection) ? PROTOCOL_ENCODING_H264 : PROTOCOL_ENCODING_JPEG;
-    render->still_encoding = PROTOCOL_ENCODING_JPEG;
+    render->view.still_encoding = PROTOCOL_ENCODING_JPEG;
     if (show->clip != 0) {
         seat->clip = (struct record_clip_use){.clip = show->clip, .speed = 1, .loop = 1};
         render->clips = &seat->clip;
@@ -212,8 +212,9 @@ static bool pass_errors(struct seat *seat, struct fl_error *error)
         return true;
     if (!error_map_step(map, seat->scene, error))
         return error->code == FL_ERROR_NONE || refuse_compare(seat, error);
-    const bool sent = post(seat, web_describe_errors(map->frame, (double)map->render.compare_far, map->id),
-                           map->frame->pixels, (size_t)map->frame->width * map->frame->height, error);
+    const bool sent =
+        post(seat, web_describe_errors(map->frame, (double)map->render.comparison.compare_far, map->id),
+             map->frame->pixels, (size_t)map->frame->width * map->frame->height, error);
     error_map_end(map);
     return sent;
 }

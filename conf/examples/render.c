@@ -39,16 +39,16 @@ int main(int argc, char **argv)
     const struct fl_load_options load = {.model = argv[1]};
     struct message_render options = fl_render_defaults(); /* every field: farlight/protocol/messages.def */
     struct fl_error error = {0};
-    options.width = 160;
-    options.height = 120;
-    options.samples = 4;
+    options.picture.width = 160;
+    options.picture.height = 120;
+    options.sampling.samples = 4;
 
     struct fl_connection *connection = fl_connect(&connect, &error);
     struct fl_scene *scene = connection ? fl_scene_load(connection, &load, &error) : NULL;
     const struct fl_camera_info *camera = scene ? fl_scene_camera(scene, 0) : NULL;
     if (camera) { /* without one the scene is seen from its front */
-        options.camera_path = PROTOCOL_CAMERA_NODE;
-        options.camera_node = camera->node;
+        options.camera.camera_path = PROTOCOL_CAMERA_NODE;
+        options.camera.camera_node = camera->node;
     }
     struct fl_job *job = scene ? fl_render_start(scene, &options, &error) : NULL;
     struct fl_frame *frame = job ? fl_render_next(job, &error) : NULL;

@@ -247,7 +247,7 @@ static void print_field_row(const struct field_desc *field, size_t offset)
     if (has_default) {
         printf("; default %s", field_default_text(field, text, sizeof(text)));
     }
-    printf(" | %s |\n", field->doc);
+    printf(" | %s |\n", field->kind == FIELD_RECORD && !*field->doc ? field->record()->doc : field->doc);
 }
 
 static void print_fields(const struct struct_desc *desc, size_t offset)

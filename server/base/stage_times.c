@@ -6,13 +6,16 @@
 
 #include <string.h>
 
+#define WAVE_NUMBER_MAX UINT16_MAX /* the protocol's */
+
 void stage_times_begin(struct stage_times *times)
 {
     times->origin_ns = clock_now_ns();
     times->count = 0;
 }
 
-static struct stage_span *last_of(struct stage_times *times, uint32_t count, enum stage stage, enum clock clock)
+static struct record_stage_time *last_of(struct stage_times *times, uint32_t count, enum stage stage,
+                                         enum clock clock)
 {
     for (uint32_t i = count; i-- > 0;) {
         if (times->spans[i].stage == stage && times->spans[i].clock == clock)
@@ -25,8 +28,8 @@ static struct stage_span *last_of(struct stage_times *times, uint32_t count, enu
 static void merge_last(struct stage_times *times)
 {
     for (uint32_t i = times->count; i-- > 0;) {
-        struct stage_span *span = &times->spans[i];
-        struct stage_span *before = last_of(times, i, span->stage, span->clock);
+        struct record_stage_time *span = &times->spans[i];
+        struct record_stage_time *before = last_of(times, i, (enum stage)span->stage, (enum clock)span->clock);
         if (!before)
             continue;
         before->duration_ns += span->duration_ns;
@@ -41,7 +44,7 @@ void stage_times_add(struct stage_times *times, enum stage stage, enum clock clo
     if (!times)
         return;
     if (times->count == STAGE_SPANS_MAX) {
-        struct stage_span *last = last_of(times, times->count, stage, clock);
+        struct record_stage_time *last = last_of(times, times->count, stage, clock);
         if (last) {
             last->duration_ns += duration_ns;
             return;
@@ -50,10 +53,10 @@ void stage_times_add(struct stage_times *times, enum stage stage, enum clock clo
     }
     /* Spans from before the frame's start (edits that it waited for) begin at its origin. */
     uint64_t since_origin_ns = start_ns > times->origin_ns ? start_ns - times->origin_ns : 0;
-    times->spans[times->count++] = (struct stage_span){
+    times->spans[times->count++] = (struct record_stage_time){
         .stage = stage,
         .clock = clock,
-        .wave = wave,
+        .wave = wave < WAVE_NUMBER_MAX ? wave : WAVE_NUMBER_MAX,
         .start_ns = since_origin_ns,
         .duration_ns = duration_ns,
     };

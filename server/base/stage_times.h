@@ -4,20 +4,11 @@
 #define FARLIGHT_BASE_STAGE_TIMES_H
 
 #include "base/words.h"
+#include "protocol/values.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-struct stage_span {
-    enum stage stage;
-    enum clock clock;
-    /* Number of the wave in its frame, for trace and shade. For a build by `ldc`: the cube, 0 the static one, 1
-     * the dynamic one; on the GPU's clock a build has no other spans. */
-    uint32_t wave;
-    uint64_t start_ns; /* since `origin_ns` */
-    uint64_t duration_ns;
-};
 
 /* Maximum of spans, as the wire carries 512; further spans are added to the last one of the same stage and
  * clock. */
@@ -26,7 +17,7 @@ struct stage_span {
 struct stage_times {
     uint64_t origin_ns; /* clock_now_ns() at the frame's start */
     uint32_t count;
-    struct stage_span spans[STAGE_SPANS_MAX];
+    struct record_stage_time spans[STAGE_SPANS_MAX];
 };
 
 void stage_times_begin(struct stage_times *times); /* empties it, sets the origin to now */

@@ -141,7 +141,7 @@ static void print_frame(struct timeline *timeline, const struct timeline_frame *
     struct job_tracks *job = find_tracks(timeline, frame, writer);
     struct trace_event events[STAGE_SPANS_MAX];
     for (uint32_t i = 0; i < times->count; i++) {
-        const struct stage_span *span = &times->spans[i];
+        const struct record_stage_time *span = &times->spans[i];
         events[i] = (struct trace_event){
             .name = stage_name(span->stage),
             .gpu = span->clock == CLOCK_GPU,

@@ -30,9 +30,9 @@ static struct frame_request request_of(const struct gpu_device *device, bool sev
     const uint32_t side =
         (uint32_t)sqrt(device->facts.slice_rays_max) / 2; /* a quarter of a slice, which fills the device */
     struct frame_request request = check_request(TRACER_BVH, side, side);
-    request.samples = several ? SAMPLES_SEVERAL : 1;
-    request.primary = way == FIRST_HITS_TRACED ? PRIMARY_TRACE : PRIMARY_RASTER;
-    request.layers = 1u << LAYER_DEPTH;
+    request.sampling.samples = several ? SAMPLES_SEVERAL : 1;
+    request.tracing.primary = way == FIRST_HITS_TRACED ? PRIMARY_TRACE : PRIMARY_RASTER;
+    request.picture.layers = 1u << LAYER_DEPTH;
     return request;
 }
 
@@ -77,8 +77,8 @@ static bool measure_ways(struct check_frames *frames, bool several, struct first
     for (int way = 0; ok && way < 2; way++) {
         const struct frame_request request = request_of(frames->device, several, (enum first_hits_way)way);
         ok = measure(frames, &request, &measured->ns[several][way], &results[way], error);
-        measured->ns[several][way] /= request.samples;
-        measured->pixels = (uint64_t)request.width * request.height;
+        measured->ns[several][way] /= request.sampling.samples;
+        measured->pixels = (uint64_t)request.picture.width * request.picture.height;
     }
     if (ok && !several) /* with several samples the places in the pixels differ */
         measured->agree = agreement(&results[0], &results[1]);

@@ -41,14 +41,14 @@ bool check_frame(struct check_frames *frames, const struct frame_request *reques
 struct frame_request check_request(unsigned tracer, uint32_t width, uint32_t height)
 {
     struct frame_request request = {
-        .width = width,
-        .height = height,
-        .samples = 1,
-        .depth = 3,
-        .tracer = tracer,
+        .picture.width = width,
+        .picture.height = height,
+        .sampling.samples = 1,
+        .light.depth = 3,
+        .tracing.tracer = tracer,
         .tracer_options = {.ldc.resolution = CHECK_CELLS, .abuffer.resolution = CHECK_CELLS},
-        .integrator = INTEGRATOR_WHITTED,
-        .format = PIXEL_FORMAT_RGBA32F,
+        .light.integrator = INTEGRATOR_WHITTED,
+        .picture.format = PIXEL_FORMAT_RGBA32F,
     };
     (void)frame_camera_look_at(&request.camera, (const float[]){0.7f, 2.2f, 5}, (const float[]){0, 0, 0},
                                (const float[]){0, 1, 0}, 0.8f);

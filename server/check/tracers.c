@@ -84,8 +84,8 @@ static struct agreement agreement_of(const struct frame_result *result, bool sam
 {
     struct agreement sum = {0};
     for (uint32_t i = 0; i < result->comparison_count; i++) {
-        const struct wave_comparison *wave = &result->comparisons[i];
-        const uint64_t differ = wave->only_first + wave->only_second + (samples ? 0 : wave->far);
+        const struct record_wave_comparison *wave = &result->comparisons[i];
+        const uint64_t differ = wave->only_tracer + wave->only_reference + (samples ? 0 : wave->far);
         const double median =
             samples ? (double)wave->distance_median * cells_a_diagonal : (double)wave->relative_median;
         sum.rays += wave->rays;
@@ -141,8 +141,8 @@ static struct frame_request compared_request(unsigned tracer, bool samples)
 {
     struct frame_request request =
         check_request(samples ? reference_tracer() : tracer, COMPARED_WIDTH, COMPARED_HEIGHT);
-    request.compare = true;
-    request.compare_with = samples ? tracer : reference_tracer();
+    request.comparison.compare = true;
+    request.comparison.compare_with = samples ? tracer : reference_tracer();
     return request;
 }
 
@@ -174,7 +174,7 @@ static bool watched_frame(struct checking *checking, const struct frame_request 
     gpu_watch_begin(checking->frames.device, &watch);
     bool rendered = check_frame(&checking->frames, request, result, error);
     gpu_watch_end(checking->frames.device);
-    struct longest *longest = &checking->longest[request->tracer == TRACER_NAIVE];
+    struct longest *longest = &checking->longest[request->tracing.tracer == TRACER_NAIVE];
     if (watch.longest_ns > longest->ns)
         *longest = (struct longest){watch.longest_ns, watch.longest_program};
     return rendered;
@@ -242,13 +242,13 @@ static void check_integrators(struct checking *checking)
                 {"ao", INTEGRATOR_AO}};
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         struct frame_request request = timed_request(checking, TRACER_BVH);
-        request.integrator = rows[i].number;
-        request.samples = 2;
+        request.light.integrator = rows[i].number;
+        request.sampling.samples = 2;
         request.aperture = rows[i].number == INTEGRATOR_DISTRIBUTED ? 0.05f : 0.0f;
         render_twice(checking, &request, rows[i].name);
     }
     struct frame_request layers = timed_request(checking, TRACER_BVH);
-    layers.layers = (1u << (LAYER_CRYPTO_MATERIAL2 + 1)) - 1;
+    layers.picture.layers = (1u << (LAYER_CRYPTO_MATERIAL2 + 1)) - 1;
     render_twice(checking, &layers, "all layers");
 }
 

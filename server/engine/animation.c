@@ -13,6 +13,7 @@
 #define FOV_MAX 3.1f
 /* The protocol's range of a frame's camera; composed transforms and splines may leave it. */
 #define PLACE_MAX 1e12f
+#define DEGREE 0.017453293f /* radians */
 
 double animation_time_s(const struct engine_job *job, uint32_t frame)
 {
@@ -22,12 +23,13 @@ double animation_time_s(const struct engine_job *job, uint32_t frame)
 /* ---- keys --------------------------------------------------------------------------------------- */
 
 /* A key's numbers lie behind its time, without gaps. */
-#define KEY_FLOATS (sizeof(struct camera_key) / sizeof(float))
-_Static_assert(offsetof(struct camera_key, eye_world) == sizeof(float) &&
-                   offsetof(struct camera_key, fov_y) == (KEY_FLOATS - 1) * sizeof(float),
+#define KEY_FLOATS (sizeof(struct record_camera_key) / sizeof(float))
+_Static_assert(offsetof(struct record_camera_key, eye_world) == sizeof(float) &&
+                   offsetof(struct record_camera_key, fov_y) == (KEY_FLOATS - 1) * sizeof(float),
                "a curve goes through the numbers of a key as through an array");
 
-void animation_key_at(const struct camera_key *keys, uint32_t key_count, double time_s, struct camera_key *key)
+void animation_key_at(const struct record_camera_key *keys, uint32_t key_count, double time_s,
+                      struct record_camera_key *key)
 {
     const struct curve curve = {
         .times = &keys[0].time_s,
@@ -47,7 +49,7 @@ void animation_key_at(const struct camera_key *keys, uint32_t key_count, double 
     key->fov_y = fminf(fmaxf(key->fov_y, FOV_MIN), FOV_MAX);
 }
 
-bool animation_key_camera(const struct camera_key *key, const char *field, struct frame_camera *camera,
+bool animation_key_camera(const struct record_camera_key *key, const char *field, struct frame_camera *camera,
                           struct error *error)
 {
     if (frame_camera_look_at(camera, key->eye_world, key->look_at_world, key->up_world, key->fov_y))
@@ -95,24 +97,36 @@ static bool animation_turn(struct frame_camera *camera, const float axis_world[3
     return true;
 }
 
+static struct frame_framing framing_of(const struct record_shot *camera)
+{
+    return (struct frame_framing){
+        .azimuth = camera->auto_azimuth * DEGREE,
+        .elevation = camera->auto_elevation * DEGREE,
+        .fov_y = camera->auto_fov * DEGREE,
+        .margin = camera->auto_margin,
+        .zoom = camera->auto_zoom,
+    };
+}
+
 /* Bounds of the whole scene, or of the framed node, at the job's time 0. */
 static bool find_bounds(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
                         struct error *error)
 {
-    if (job->framed_node && !scene_node(scene, job->framed_node))
-        return error_set(error, ERROR_UNKNOWN_ID, "render.auto_node", "node %u does not exist", job->framed_node);
+    if (job->camera.auto_node && !scene_node(scene, job->camera.auto_node))
+        return error_set(error, ERROR_UNKNOWN_ID, "render.auto_node", "node %u does not exist",
+                         job->camera.auto_node);
     if (bounds->known && bounds->revision == scene->revision)
         return true;
     struct scene_pose pose;
     if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, 0.0, error))
         return false;
     *bounds = (struct animation_bounds){.known = true, .revision = scene->revision};
-    bool any = scene_bounds_below(scene, &pose, job->framed_node, bounds->lower, bounds->upper);
+    bool any = scene_bounds_below(scene, &pose, job->camera.auto_node, bounds->lower, bounds->upper);
     scene_pose_finish(&pose);
-    if (!any && job->framed_node) {
+    if (!any && job->camera.auto_node) {
         bounds->known = false;
         error_set(error, ERROR_INVALID, "render.auto_node", "nothing of node %u and what is below it is visible",
-                  job->framed_node);
+                  job->camera.auto_node);
         return error_remedy(error, "frame a node that shows a mesh or spheres, or one above it");
     }
     for (int axis = 0; axis < 3 && !any; axis++) {
@@ -147,7 +161,8 @@ static bool find_reach(const struct engine_job *job, const struct scene *scene, 
     float centre[3];
     struct scene_pose pose;
     _Static_assert(FRAME_CAMERA_DIRECTIONS <= SCENE_SUPPORTS_MAX, "all at once");
-    frame_camera_directions(directions, &job->framing, aspect);
+    const struct frame_framing framing = framing_of(&job->camera);
+    frame_camera_directions(directions, &framing, aspect);
     if (bounds->reach_known && memcmp(bounds->directions, directions, sizeof(directions)) == 0)
         return true;
     if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, 0.0, NULL))
@@ -155,9 +170,9 @@ static bool find_reach(const struct engine_job *job, const struct scene *scene, 
     memcpy(bounds->directions, directions, sizeof(directions));
     middle(bounds, centre);
     const double axis[2] = {(double)centre[0], (double)centre[2]};
-    bounds->reach_known =
-        scene_supports_below(scene, &pose, job->framed_node, job->path == CAMERA_ORBIT ? axis : NULL, directions,
-                             bounds->supports, FRAME_CAMERA_DIRECTIONS);
+    bounds->reach_known = scene_supports_below(scene, &pose, job->camera.auto_node,
+                                               job->camera.camera_path == CAMERA_ORBIT ? axis : NULL, directions,
+                                               bounds->supports, FRAME_CAMERA_DIRECTIONS);
     scene_pose_finish(&pose);
     return bounds->reach_known;
 }
@@ -170,14 +185,15 @@ static bool auto_camera(const struct engine_job *job, const struct scene *scene,
     uint32_t width, height;
     frame_view_size(&job->frame, &width, &height);
     const float aspect = (float)width / (float)height;
+    const struct frame_framing framing = framing_of(&job->camera);
     double size = 0.0;
     if (!find_reach(job, scene, aspect, bounds)) {
-        frame_camera_auto(camera, &job->framing, bounds->lower, bounds->upper, aspect);
+        frame_camera_auto(camera, &framing, bounds->lower, bounds->upper, aspect);
         return true;
     }
     for (int axis = 0; axis < 3; axis++)
         size += fabs((double)bounds->upper[axis] - (double)bounds->lower[axis]);
-    frame_camera_around(camera, &job->framing, aspect, bounds->supports, size);
+    frame_camera_around(camera, &framing, aspect, bounds->supports, size);
     return true;
 }
 
@@ -197,8 +213,8 @@ static bool orbit_camera(const struct engine_job *job, const struct scene *scene
             return false;
         middle(bounds, centre_world);
     }
-    double turns = job->orbit_turn != 0.0f ? time_s / (double)job->orbit_seconds : 0.0;
-    if (animation_turn(camera, axis_world, centre_world, (double)job->orbit_turn * turns))
+    double turns = job->camera.orbit_turn != 0.0f ? time_s / (double)job->camera.orbit_seconds : 0.0;
+    if (animation_turn(camera, axis_world, centre_world, (double)job->camera.orbit_turn * turns))
         return true;
     return error_set(error, ERROR_INVALID, "render.keys[0].up_world", "the orbit has no axis: up is zero");
 }
@@ -241,20 +257,20 @@ static bool node_camera(const struct engine_job *job, const struct scene *scene,
                         struct frame_camera *camera, struct error *error)
 {
     const char *field = "render.camera_node";
-    const struct scene_node *node = scene_node(scene, job->camera_node);
+    const struct scene_node *node = scene_node(scene, job->camera.camera_node);
     if (!node)
-        return error_set(error, ERROR_UNKNOWN_ID, field, "node %u does not exist", job->camera_node);
+        return error_set(error, ERROR_UNKNOWN_ID, field, "node %u does not exist", job->camera.camera_node);
     const struct scene_camera *shown =
         node->value.kind == NODE_CAMERA ? scene_camera(scene, node->value.object) : NULL;
     if (!shown)
-        return error_set(error, ERROR_INVALID, field, "node %u shows no camera", job->camera_node);
+        return error_set(error, ERROR_INVALID, field, "node %u shows no camera", job->camera.camera_node);
     *camera = (struct frame_camera){
         .fov_y = shown->value.fov_y, .ortho_height = shown->value.height, .near = shown->value.near};
     if (scene_world_from_node(scene, pose, node->base.id, camera->world_from_view) &&
         make_rigid(camera->world_from_view))
         return true;
     return error_set(error, ERROR_INVALID, field, "the transform of node %u flattens its camera",
-                     job->camera_node);
+                     job->camera.camera_node);
 }
 
 /* ---- all paths ---------------------------------------------------------------------------------- */
@@ -264,9 +280,10 @@ bool animation_check(const struct engine_job *job, struct error *error)
     if (!(job->frames_per_second > 0.0f))
         return error_set(error, ERROR_INVALID, "render.frames_per_second", "%g is not above 0",
                          (double)job->frames_per_second);
-    if ((unsigned)job->path > CAMERA_ORBIT)
-        return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path", (unsigned)job->path);
-    if (job->path == CAMERA_KEYS && !job->key_count)
+    if ((unsigned)job->camera.camera_path > CAMERA_ORBIT)
+        return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path",
+                         (unsigned)job->camera.camera_path);
+    if (job->camera.camera_path == CAMERA_KEYS && !job->key_count)
         return error_set(error, ERROR_INVALID, "render.keys", "the camera path keys needs at least one key");
     for (uint32_t i = 1; i < job->key_count; i++) {
         if (job->keys[i].time_s > job->keys[i - 1].time_s)
@@ -276,9 +293,10 @@ bool animation_check(const struct engine_job *job, struct error *error)
         return error_set(error, ERROR_INVALID, field, "%g s is not after the key before it, at %g s",
                          (double)job->keys[i].time_s, (double)job->keys[i - 1].time_s);
     }
-    if (job->path == CAMERA_ORBIT && job->orbit_turn != 0.0f && !(job->orbit_seconds > 0.0f))
+    if (job->camera.camera_path == CAMERA_ORBIT && job->camera.orbit_turn != 0.0f &&
+        !(job->camera.orbit_seconds > 0.0f))
         return error_set(error, ERROR_INVALID, "render.orbit_seconds", "%g is not above 0",
-                         (double)job->orbit_seconds);
+                         (double)job->camera.orbit_seconds);
     return true;
 }
 
@@ -286,7 +304,7 @@ bool animation_check(const struct engine_job *job, struct error *error)
 static bool keys_camera(const struct engine_job *job, const struct pose_view *given, double time_s,
                         struct frame_camera *camera, float *focus, struct error *error)
 {
-    struct camera_key key;
+    struct record_camera_key key;
     animation_key_at(job->keys, job->key_count, time_s, &key);
     if (given->given & POSE_VIEW_EYE)
         memcpy(key.eye_world, given->eye_world, sizeof(key.eye_world));
@@ -302,7 +320,8 @@ static bool keys_camera(const struct engine_job *job, const struct pose_view *gi
 
 static bool path_allows(const struct engine_job *job, const struct pose_view *given, struct error *error)
 {
-    if (job->path == CAMERA_KEYS || !(given->given & (POSE_VIEW_EYE | POSE_VIEW_LOOK_AT | POSE_VIEW_UP)))
+    if (job->camera.camera_path == CAMERA_KEYS ||
+        !(given->given & (POSE_VIEW_EYE | POSE_VIEW_LOOK_AT | POSE_VIEW_UP)))
         return true;
     error_set(error, ERROR_INVALID, "render.camera_path",
               "a clip moves the view's eye, look_at or up, which this camera path does not have");
@@ -319,7 +338,7 @@ static bool camera_at(const struct engine_job *job, const struct scene *scene, c
     float centre_world[3];
     if (!path_allows(job, given, error))
         return false;
-    switch (job->path) {
+    switch (job->camera.camera_path) {
     case CAMERA_KEYS:
         return keys_camera(job, given, time_s, camera, &view->focus, error);
     case CAMERA_AUTO:
@@ -335,14 +354,15 @@ static bool camera_at(const struct engine_job *job, const struct scene *scene, c
             return false;
         break;
     default:
-        return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path", (unsigned)job->path);
+        return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path",
+                         (unsigned)job->camera.camera_path);
     }
-    if (job->path == CAMERA_ORBIT && job->key_count) {
+    if (job->camera.camera_path == CAMERA_ORBIT && job->key_count) {
         view->focus = animation_distance(camera, job->keys[0].look_at_world);
         return true;
     }
     /* The bounds cost something: only a lens asks for them. */
-    if (!(job->frame.aperture > 0.0f) && !(given->given & POSE_VIEW_APERTURE))
+    if (!(job->camera.aperture > 0.0f) && !(given->given & POSE_VIEW_APERTURE))
         return true;
     if (!find_bounds(job, scene, bounds, error))
         return false;

@@ -16,7 +16,8 @@
 /* Seconds since `time_origin_frame`; negative before it. */
 double animation_time_s(const struct engine_job *job, uint32_t frame);
 /* Catmull-Rom through the keys in time; before the first and after the last it stands still. At least one key. */
-void animation_key_at(const struct camera_key *keys, uint32_t key_count, double time_s, struct camera_key *key);
+void animation_key_at(const struct record_camera_key *keys, uint32_t key_count, double time_s,
+                      struct record_camera_key *key);
 /* Errors that depend on neither the frame nor the scene. */
 bool animation_check(const struct engine_job *job, struct error *error);
 /* The scene's bounds at the job's time 0, for cameras that show the whole scene. They depend on the scene's
@@ -32,7 +33,7 @@ struct animation_bounds {
     struct frame_ground ground;
 };
 /* Camera of one key; false if its vectors do not span a view. */
-bool animation_key_camera(const struct camera_key *key, const char *field, struct frame_camera *camera,
+bool animation_key_camera(const struct record_camera_key *key, const char *field, struct frame_camera *camera,
                           struct error *error);
 /* Distance along the view; 0 where the point is not in front. */
 float animation_distance(const struct frame_camera *camera, const float point_world[3]);

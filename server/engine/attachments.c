@@ -40,10 +40,11 @@ static bool round_depths(struct engine_frame *frame, uint16_t **rounded, struct 
                                           .width = result->width,
                                           .height = result->height,
                                           .fov_y = frame->request.camera.fov_y,
-                                          .pixels = frame->depth.pixels,
-                                          .radius = frame->depth.radius};
+                                          .pixels = frame->view.depth_pixels,
+                                          .radius = frame->view.depth_radius};
     *rounded = NULL;
-    return frame->depth.form != DEPTH_FORM_INVERSE || depth_round(&picture, rounded, &frame->depth_step, error);
+    return frame->view.depth_form != DEPTH_FORM_INVERSE ||
+           depth_round(&picture, rounded, &frame->depth_step, error);
 }
 
 /* Appends the bytes and frees them. */

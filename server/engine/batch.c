@@ -16,7 +16,7 @@
 
 static bool can_encode(const struct engine_job *spec, enum encoding encoding)
 {
-    uint32_t pixel_bytes = frame_format_bytes(spec->frame.format);
+    uint32_t pixel_bytes = frame_format_bytes(spec->frame.picture.format);
     return encoder_supports(encoding, pixel_bytes) ||
            (spec->kind == JOB_VIEW && encoder_stream_supports(encoding, pixel_bytes));
 }
@@ -28,24 +28,18 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
     if (spec->last_frame < spec->first_frame)
         return error_set(error, ERROR_INVALID, "render.last_frame", "%u lies before the first frame, %u",
                          spec->last_frame, spec->first_frame);
-    if (!spec->frame_step)
-        return error_set(error, ERROR_INVALID, "render.frame_step", "0 would render the first frame for ever");
-    if (!spec->frame.width || !spec->frame.height)
-        return error_set(error, ERROR_INVALID, spec->frame.width ? "render.height" : "render.width",
-                         "a picture has at least one pixel");
-    if (!spec->frame.samples)
-        return error_set(error, ERROR_INVALID, "render.samples", "a pixel has at least one sample");
     if (!can_encode(spec, spec->encoding)) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "encoding %u cannot carry pixels of %u bytes",
-                  (unsigned)spec->encoding, frame_format_bytes(spec->frame.format));
+                  (unsigned)spec->encoding, frame_format_bytes(spec->frame.picture.format));
         return error_remedy(error, "use the pixel format rgba8, or the encoding raw, zstd or predicted");
     }
-    if (spec->kind == JOB_VIEW && !can_encode(spec, spec->still_encoding))
+    if (spec->kind == JOB_VIEW && !can_encode(spec, spec->view.still_encoding))
         return error_set(error, ERROR_UNSUPPORTED, "render.still_encoding",
-                         "encoding %u cannot carry pixels of %u bytes", (unsigned)spec->still_encoding,
-                         frame_format_bytes(spec->frame.format));
-    return tracer_find(spec->frame.tracer, "render.tracer", error) &&
-           (!spec->frame.compare || tracer_find(spec->frame.compare_with, "render.compare_with", error)) &&
+                         "encoding %u cannot carry pixels of %u bytes", (unsigned)spec->view.still_encoding,
+                         frame_format_bytes(spec->frame.picture.format));
+    return tracer_find(spec->frame.tracing.tracer, "render.tracer", error) &&
+           (!spec->frame.comparison.compare ||
+            tracer_find(spec->frame.comparison.compare_with, "render.compare_with", error)) &&
            shot_check(spec, scene, bounds, error);
 }
 
@@ -100,7 +94,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
         .window = window_of(engine, &command->job.frame),
         .credit = command->job.kind == JOB_VIEW ? UINT64_MAX : command->job.credit,
     });
-    bool streams = command->job.encoding == ENCODING_H264 || command->job.still_encoding == ENCODING_H264;
+    bool streams = command->job.encoding == ENCODING_H264 || command->job.view.still_encoding == ENCODING_H264;
     struct encode_lane *lane = streams ? encode_lane_create(command->job.frames_per_second) : NULL;
     struct job *before = replaced_by(engine, command);
     struct engine_event *end_before = before ? event_create(ENGINE_DONE, before->client, before->request) : NULL;

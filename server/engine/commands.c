@@ -128,8 +128,9 @@ static void start(struct engine *engine, struct engine_reference *reference, str
  */
 static bool searches_long(struct engine_scene *scene, const struct engine_job *job)
 {
-    const bool is_framed = job->path == CAMERA_AUTO || (job->path == CAMERA_ORBIT && job->key_count == 0);
-    if (!is_framed && !(job->frame.aperture > 0.0f) && !job->has_ground)
+    const bool is_framed =
+        job->camera.camera_path == CAMERA_AUTO || (job->camera.camera_path == CAMERA_ORBIT && job->key_count == 0);
+    if (!is_framed && !(job->camera.aperture > 0.0f) && !job->frame.picture.ground)
         return false;
     engine_count_contents(scene);
     return (uint64_t)scene->instances * (scene->triangles + scene->spheres) > SEARCHED_HERE_MAX;

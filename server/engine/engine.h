@@ -64,19 +64,6 @@ struct engine_options {
     const struct engine_keeper *keeper;   /* NULL: scenes end with the process */
 };
 
-/* Camera of a job over time, `time_s` and ten numbers that a spline goes through. */
-struct camera_key {
-    float time_s;
-    float eye_world[3], look_at_world[3], up_world[3];
-    float fov_y;
-};
-
-/* How attached depth travels. */
-struct view_depth {
-    enum depth_form form;
-    float pixels, radius; /* inverse: the bound, see protocol/pixels/inverse_depth.h */
-};
-
 /* A job's terms; engine/shot.h makes the request and the poses of each frame from them. */
 struct engine_job {
     enum job_kind kind;
@@ -84,21 +71,15 @@ struct engine_job {
     uint32_t first_frame, last_frame, frame_step;
     float frames_per_second;
     uint32_t time_origin_frame;
-    struct frame_request frame; /* camera, focus and seed are filled per frame */
-    float shutter;              /* time for which it is open from the frame's time on, in frames */
+    struct frame_request frame; /* camera, lens, ground and seed are filled per frame */
     enum encoding encoding;
     unsigned quality;
-    enum camera_path path;
-    uint32_t camera_node;
-    struct frame_framing framing; /* framing of the path `auto` */
-    uint32_t framed_node;         /* 0: all of the scene */
-    bool has_ground;              /* whether frames have a ground, see engine/ground.h */
-    float ground_up_world[3];     /* not 0 */
-    float orbit_turn, orbit_seconds;
-    struct camera_key *keys; /* owned */
+    struct record_shot camera;
+    struct record_camera_key *keys; /* owned */
     uint32_t key_count;
-    struct clip_use *clips; /* owned */
+    struct record_clip_use *clips; /* owned */
     uint32_t clip_count;
+    struct record_view view; /* for a view */
     /* Frames that may be handed out so far, absolute. Without credit, nothing is rendered or reserved. Beyond it,
      * a batch renders as many frames as may be in flight and keeps them; a view begins none, so that none becomes
      * stale. */
@@ -106,16 +87,7 @@ struct engine_job {
     /* A view's wishes, see engine/view_wishes.h; owned: a reference. The view replaces a view with the same
      * wishes, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, continue. */
     struct view_wishes *wishes;
-    uint32_t upsample;     /* batch: distance of the frames whose layers are rendered, counted from time 0; 0: 1 */
-    uint32_t pass_samples; /* view: samples that each frame adds, up to frame.samples */
-    enum encoding still_encoding;
-    unsigned weight;         /* its share of the device's time among the jobs of all clients; 0: 1 */
-    bool adapt;              /* view: quality and size follow the link */
-    bool keeps_rate;         /* view: resolution and bounces follow the time of rendering */
-    struct view_depth depth; /* view: form of attached depths */
-    float margin; /* view: margin of frames while the camera moves, share of width and height on each side */
-    uint32_t hidden_layers; /* view: hidden layers that follow each frame while the camera moves */
-    bool parts;             /* view: frames may come in parts where its wishes say so */
+    unsigned weight; /* its share of the device's time among the jobs of all clients; 0: 1 */
 };
 
 enum engine_command_kind {
@@ -274,7 +246,7 @@ struct engine_frame {
     bool in_parts;               /* .. unless the frame is encoded in parts .. */
     struct part_list parts;      /* .. which this list describes; empty: it could not be divided */
     size_t coarse_bytes;         /* size of its coarse depths, a part of size_bytes */
-    struct view_depth depth;     /* requested form of depths .. */
+    struct record_view view;     /* requested form of depths .. */
     float depth_step;            /* .. and the step that was used, in 1 / metres; 0: depths are metres */
     uint32_t margin_x, margin_y; /* pixels on each side beyond what the job asks for */
     uint32_t of_frame;           /* request.hidden_layer above 0: the frame to which the layer belongs */

@@ -38,7 +38,8 @@ static bool extend_reach(const struct engine_job *job, const struct scene *scene
 static bool find(const struct engine_job *job, const struct scene *scene, struct frame_ground *ground,
                  struct error *error)
 {
-    const float *up = job->ground_up_world;
+    const struct record_picture *picture = &job->frame.picture;
+    const float up[3] = {picture->ground_up_x, picture->ground_up_y, picture->ground_up_z};
     const double length =
         sqrt((double)up[0] * (double)up[0] + (double)up[1] * (double)up[1] + (double)up[2] * (double)up[2]);
     double down[1][3], reach = -INFINITY, diagonal = 0.0, along = 0.0;
@@ -73,7 +74,7 @@ bool ground_place(const struct engine_job *job, const struct scene *scene, struc
                   struct frame_ground *ground, struct error *error)
 {
     *ground = (struct frame_ground){0};
-    if (!job->has_ground)
+    if (!job->frame.picture.ground)
         return true;
     if (bounds && bounds->ground_known && bounds->ground_revision == scene->revision) {
         *ground = bounds->ground;

@@ -35,8 +35,9 @@ static void set_lens(struct frame_request *request, const struct animation_view 
     if (given->given & POSE_VIEW_FOCUS)
         request->focus = given->focus;
     if (given->given & POSE_VIEW_EXPOSURE)
-        request->exposure_stops =
-            fminf(fmaxf(request->exposure_stops + given->exposure_stops, -EXPOSURE_MAX_STOPS), EXPOSURE_MAX_STOPS);
+        request->picture.exposure_stops =
+            fminf(fmaxf(request->picture.exposure_stops + given->exposure_stops, -EXPOSURE_MAX_STOPS),
+                  EXPOSURE_MAX_STOPS);
     if (!(request->focus > 0.0f))
         request->focus = fminf(view->focus, FOCUS_MAX);
     if (!(request->camera.fov_y > 0.0f))
@@ -62,7 +63,9 @@ static bool shot_begin(struct shot *shot, const struct engine_job *job, const st
                        struct error *error)
 {
     *shot = (struct shot){.request = job->frame, .time_s = (float)time_s};
-    shot->shutter_s = (float)fmin((double)job->shutter / (double)job->frames_per_second, SHUTTER_MAX_S);
+    shot->request.aperture = job->camera.aperture;
+    shot->request.focus = job->camera.focus;
+    shot->shutter_s = (float)fmin((double)job->camera.shutter / (double)job->frames_per_second, SHUTTER_MAX_S);
     return motion_make(shot, job, scene, time_s, error);
 }
 
@@ -70,7 +73,7 @@ static bool shot_begin(struct shot *shot, const struct engine_job *job, const st
 static void set_source(struct frame_request *request)
 {
     if (!frame_has_views(request) && !(request->aperture > 0.0f) && !request->has_key)
-        request->view_source = VIEW_SOURCE_RAYS;
+        request->picture.view_source = VIEW_SOURCE_RAYS;
 }
 
 static bool check_time(uint32_t frame, double time_s, struct error *error)
@@ -101,7 +104,7 @@ static bool add_neighbours(struct shot *shot, const struct engine_job *job, cons
     struct frame_request *request = &shot->request;
     struct scene_motion *motion = &shot->motion;
     const double step_s = 1.0 / (double)job->frames_per_second, times_s[2] = {time_s - step_s, time_s + step_s};
-    if (!(request->layers & 1u << LAYER_MOTION))
+    if (!(request->picture.layers & 1u << LAYER_MOTION))
         return true;
     if (job->clip_count &&
         !scene_motion_add_neighbours(motion, scene, job->clips, job->clip_count, times_s, error))
@@ -139,14 +142,15 @@ static bool make_alone(struct shot *shot, const struct engine_job *job, const st
     set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
     set_source(&shot->request);
     shot->request.starts_anew &= frame == job->first_frame;
-    if (!shot->request.accumulate)
-        shot->request.seed = shot_seed(job->frame.seed, frame);
+    if (!shot->request.sampling.accumulate)
+        shot->request.sampling.seed = shot_seed(job->frame.sampling.seed, frame);
     return true;
 }
 
 uint32_t shot_key_frame(const struct engine_job *job, uint32_t frame)
 {
-    const int64_t every = job->upsample > 1 ? job->upsample : 1, origin = job->time_origin_frame;
+    const int64_t every = job->frame.picture.upsample > 1 ? job->frame.picture.upsample : 1,
+                  origin = job->time_origin_frame;
     const int64_t below = (((int64_t)frame - origin) % every + every) % every; /* distance to the key before */
     const bool is_next = 2 * below > every || below > (int64_t)frame;          /* there is no frame below 0 */
     return (uint32_t)((int64_t)frame - below + (is_next ? every : 0));
@@ -157,7 +161,7 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
 {
     struct shot own;
     const uint32_t key = shot_key_frame(job, frame);
-    if (key == frame && job->upsample <= 1)
+    if (key == frame && job->frame.picture.upsample <= 1)
         return make_alone(shot, job, scene, frame, bounds, error);
     /* The camera and its lens are the frame's own; poses, shutter and noise are those of the key. The key itself
      * is made in this way, too: its layers are rendered for the others anyway, and look like it. */
@@ -166,19 +170,19 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
     shot_finish(&own);
     if (!make_alone(shot, job, scene, key, bounds, error))
         return false;
-    const uint64_t seed = shot->request.seed;
+    const uint64_t seed = shot->request.sampling.seed;
     const struct frame_camera key_camera = shot->request.camera;
     shot->request = own.request;
-    shot->request.seed = seed;
+    shot->request.sampling.seed = seed;
     shot->request.has_key = true;
     shot->request.key_camera = key_camera;
-    shot->request.view_source = job->frame.view_source;
+    shot->request.picture.view_source = job->frame.picture.view_source;
     shot->time_s = own.time_s;
     return true;
 }
 
 /* The client's key sets the view's camera, whatever the clips say of the job's camera. */
-static bool view_from_key(const struct camera_key *key, struct animation_view *view, struct error *error)
+static bool view_from_key(const struct record_camera_key *key, struct animation_view *view, struct error *error)
 {
     if (!animation_key_camera(key, "view_camera.up_world", &view->camera, error))
         return false;
@@ -192,8 +196,8 @@ static bool view_from_node(const struct engine_job *job, const struct scene *sce
                            struct animation_view *view, struct error *error)
 {
     struct engine_job along = *job;
-    along.path = CAMERA_NODE;
-    along.camera_node = from->node;
+    along.camera.camera_path = CAMERA_NODE;
+    along.camera.camera_node = from->node;
     struct error local = {0};
     if (animation_view(&along, scene, pose, (double)from->key.time_s, bounds, view, &local))
         return true;

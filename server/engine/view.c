@@ -30,7 +30,7 @@ void view_follow(struct job *job, const struct job *before)
 /* Whether frames accumulate samples; if one frame has all of them, it is rendered like a batch's. */
 static bool adds_up(const struct job *job)
 {
-    return job->spec.frame.samples > job->spec.pass_samples;
+    return job->spec.frame.sampling.samples > job->spec.view.pass_samples;
 }
 
 /* Whether the wishes or the scene have changed since the last frame. */
@@ -66,7 +66,7 @@ static uint64_t hidden_due_ns(const struct view *view)
 static bool may_refine(const struct job *job)
 {
     const struct view *view = &job->view;
-    return view->shown && !view->shown_moving && view->held_samples < job->spec.frame.samples;
+    return view->shown && !view->shown_moving && view->held_samples < job->spec.frame.sampling.samples;
 }
 
 /* Begin of a frame that need not wait to be encoded: each is encoded while the next one is rendered, and one that
@@ -105,15 +105,15 @@ static void set_due(struct job *job)
 /* Whether frames follow the link or the rate, which they do while the camera moves. */
 static bool adapts(const struct job *job)
 {
-    return (job->spec.adapt || job->spec.keeps_rate) && job->view.wish.camera.moving;
+    return (job->spec.view.adapt || job->spec.view.moving_rate > 0.0f) && job->view.wish.camera.moving;
 }
 
 static uint32_t samples_of_next(const struct job *job)
 {
     const struct view *view = &job->view;
-    uint32_t samples = job->spec.frame.samples;
+    uint32_t samples = job->spec.frame.sampling.samples;
     uint32_t wanted = view->refining ? samples - view->held_samples : samples;
-    wanted = wanted < job->spec.pass_samples ? wanted : job->spec.pass_samples;
+    wanted = wanted < job->spec.view.pass_samples ? wanted : job->spec.view.pass_samples;
     const bool limited = adapts(job) && view->wish.effort.samples > 0 && view->wish.effort.samples < wanted;
     return limited ? view->wish.effort.samples : wanted;
 }
@@ -126,14 +126,14 @@ static enum frame_history history_of(const struct job *job, uint32_t samples)
     if (view->wish.camera.moving)
         return HISTORY_MOVING;
     const uint32_t held = samples + (view->refining ? view->held_samples : 0);
-    return held < job->spec.frame.samples ? HISTORY_USED : HISTORY_KEPT;
+    return held < job->spec.frame.sampling.samples ? HISTORY_USED : HISTORY_KEPT;
 }
 
 /* Bounces dropped so that the frame meets its deadline. */
 static uint32_t depth_less(const struct job *job)
 {
     const uint32_t less = adapts(job) ? job->view.wish.effort.depth_less : 0;
-    return less < job->spec.frame.depth ? less : job->spec.frame.depth;
+    return less < job->spec.frame.light.depth ? less : job->spec.frame.light.depth;
 }
 
 /* Reduces resolution and bounces while the camera moves, if the rate requires it. */
@@ -141,14 +141,14 @@ static void apply_effort(const struct job *job, struct frame_request *request)
 {
     const struct view_wish *wish = &job->view.wish;
     uint32_t scale = wish->effort.scale_32nds;
-    request->depth = job->spec.frame.depth - depth_less(job);
+    request->light.depth = job->spec.frame.light.depth - depth_less(job);
     if (!adapts(job) || !scale || scale >= 32)
         return;
     uint32_t width, height;
     frame_view_size(request, &width, &height);
-    const uint32_t across = request->width / width, down = request->height / height;
-    request->width = across * (width * scale >= 32 ? width * scale / 32 : 1);
-    request->height = down * (height * scale >= 32 ? height * scale / 32 : 1);
+    const uint32_t across = request->picture.width / width, down = request->picture.height / height;
+    request->picture.width = across * (width * scale >= 32 ? width * scale / 32 : 1);
+    request->picture.height = down * (height * scale >= 32 ? height * scale / 32 : 1);
 }
 
 /* Widens the camera's view for a picture `growth` times as high; pixels keep their size. */
@@ -161,24 +161,24 @@ static void widen(struct frame_camera *camera, float growth)
 static float margin_share(const struct job *job)
 {
     const unsigned halves_less = adapts(job) ? job->view.wish.effort.margin_halves_less : 0;
-    return halves_less < 2 ? job->spec.margin * (float)(2 - halves_less) / 2.0f : 0.0f;
+    return halves_less < 2 ? job->spec.view.margin * (float)(2 - halves_less) / 2.0f : 0.0f;
 }
 
 /* While the camera moves, only the middle view is rendered for a client that makes views of its own: it makes the
  * others from it. */
 static void choose_eyes(const struct job *job, struct frame_request *request)
 {
-    if (!(job->spec.margin > 0.0f) || !frame_has_views(request))
+    if (!(job->spec.view.margin > 0.0f) || !frame_has_views(request))
         return;
     if (!job->view.wish.camera.moving) {
         request->attachments = 0;
         return;
     }
-    frame_view_size(request, &request->width, &request->height);
-    request->views_across = request->views_down = 1;
-    request->eyes_over = false;
-    request->baseline = 0.0f;
-    request->view_source = VIEW_SOURCE_RAYS;
+    frame_view_size(request, &request->picture.width, &request->picture.height);
+    request->picture.views_across = request->picture.views_down = 1;
+    request->picture.eyes_over = false;
+    request->picture.baseline = 0.0f;
+    request->picture.view_source = VIEW_SOURCE_RAYS;
 }
 
 /* Adds a margin while the camera moves, so that the client has something to show beyond the picture's edges. */
@@ -186,23 +186,24 @@ static void add_margin(struct job *job, struct frame_request *request)
 {
     struct view *view = &job->view;
     view->margin_x = view->margin_y = 0;
-    if (!view->wish.camera.moving || !(job->spec.margin > 0.0f))
+    if (!view->wish.camera.moving || !(job->spec.view.margin > 0.0f))
         return;
-    view->margin_x = margin_pixels(margin_share(job), request->width);
-    view->margin_y = margin_pixels(margin_share(job), request->height);
-    widen(&request->camera, (float)(request->height + 2 * view->margin_y) / (float)request->height);
-    request->width += 2 * view->margin_x;
-    request->height += 2 * view->margin_y;
+    view->margin_x = margin_pixels(margin_share(job), request->picture.width);
+    view->margin_y = margin_pixels(margin_share(job), request->picture.height);
+    widen(&request->camera,
+          (float)(request->picture.height + 2 * view->margin_y) / (float)request->picture.height);
+    request->picture.width += 2 * view->margin_x;
+    request->picture.height += 2 * view->margin_y;
 }
 
 /* Hidden layers have half the resolution: they are mostly seen in narrow strips, cost a fifth in this way, and
  * views made from them are hardly worse. */
 static void halve(struct view *view, struct frame_request *request)
 {
-    const uint32_t height = (request->height + 1) / 2;
-    widen(&request->camera, 2.0f * (float)height / (float)request->height);
-    request->width = (request->width + 1) / 2;
-    request->height = height;
+    const uint32_t height = (request->picture.height + 1) / 2;
+    widen(&request->camera, 2.0f * (float)height / (float)request->picture.height);
+    request->picture.width = (request->picture.width + 1) / 2;
+    request->picture.height = height;
     view->margin_x /= 2;
     view->margin_y /= 2;
 }
@@ -215,12 +216,12 @@ static bool begin_hidden_frame(struct job *job, struct shot *shot, struct error 
     if (!shot_make_at(shot, &job->spec, job->scene->scene, &view->wish.camera, &job->bounds, error))
         return false;
     view->refining = false;
-    request->seed = job->spec.frame.seed;
-    request->accumulate = false;
-    request->samples = 1;
-    request->noise = 0.0f;
+    request->sampling.seed = job->spec.frame.sampling.seed;
+    request->sampling.accumulate = false;
+    request->sampling.samples = 1;
+    request->sampling.noise = 0.0f;
     request->hidden_layer = view->hidden_layer;
-    request->hidden_radius = job->spec.depth.radius;
+    request->hidden_radius = job->spec.view.depth_radius;
     choose_eyes(job, request);
     apply_effort(job, request);
     add_margin(job, request);
@@ -245,11 +246,12 @@ bool view_begin_frame(struct job *job, struct shot *shot, struct error *error)
                     : shot_make(shot, &job->spec, scene, job->spec.first_frame, &job->bounds, error);
     if (!made)
         return false;
-    shot->request.seed = job->spec.frame.seed; /* a camera position gives the same picture each time */
-    shot->request.accumulate = adds_up(job);
-    shot->request.samples = samples_of_next(job);
-    shot->request.samples_max = job->spec.frame.samples; /* a complete picture may be requested again */
-    shot->request.history = history_of(job, shot->request.samples);
+    shot->request.sampling.seed =
+        job->spec.frame.sampling.seed; /* a camera position gives the same picture each time */
+    shot->request.sampling.accumulate = adds_up(job);
+    shot->request.sampling.samples = samples_of_next(job);
+    shot->request.samples_max = job->spec.frame.sampling.samples; /* a complete picture may be requested again */
+    shot->request.history = history_of(job, shot->request.sampling.samples);
     choose_eyes(job, &shot->request);
     apply_effort(job, &shot->request);
     add_margin(job, &shot->request);
@@ -274,7 +276,7 @@ enum ycbcr view_ycbcr(const struct job *job)
     if (job->view.hidden_layer > 0)
         return YCBCR_NONE; /* empty pixels must be filled first */
     /* At rest the number of samples decides on the encoding, which is known only after rendering. */
-    bool certain = job->view.wish.camera.moving || job->spec.still_encoding == job->spec.encoding;
+    bool certain = job->view.wish.camera.moving || job->spec.view.still_encoding == job->spec.encoding;
     return certain ? encoder_takes(job->spec.encoding, quality_of(job)) : YCBCR_NONE;
 }
 
@@ -293,11 +295,11 @@ static void note_camera(struct job *job, struct engine_frame *frame)
     frame->received_ns = view->wish.camera.received_ns;
     frame->moving = view->wish.camera.moving;
     frame->quality = quality_of(job);
-    frame->depth = job->spec.depth;
+    frame->view = job->spec.view;
     frame->margin_x = view->margin_x;
     frame->margin_y = view->margin_y;
     const struct view_effort *effort = &view->wish.effort;
-    frame->in_parts = job->spec.parts && (frame->moving ? effort->parts : effort->still_parts);
+    frame->in_parts = job->spec.view.parts && (frame->moving ? effort->parts : effort->still_parts);
 }
 
 static void hidden_done(struct job *job, struct engine_frame *frame)
@@ -306,7 +308,7 @@ static void hidden_done(struct job *job, struct engine_frame *frame)
     frame->encoding = encoding_of_hidden(job);
     frame->of_frame = view->picture;
     view->hidden_ns += frame->rendered_ns - frame->applied_ns;
-    view->hidden_layer = view->hidden_layer < job->spec.hidden_layers ? view->hidden_layer + 1 : 0;
+    view->hidden_layer = view->hidden_layer < job->spec.view.hidden_layers ? view->hidden_layer + 1 : 0;
     if (view->hidden_layer == 0)
         hidden_budget_spend(&view->hidden_budget, view->hidden_ns, !view->hidden_is_paid);
 }
@@ -316,7 +318,7 @@ static void plan_hidden(struct job *job, const struct engine_frame *frame)
 {
     struct view *view = &job->view;
     view->hidden_layer = 0;
-    if (!view->wish.camera.moving || job->spec.hidden_layers == 0)
+    if (!view->wish.camera.moving || job->spec.view.hidden_layers == 0)
         return;
     hidden_budget_earn(&view->hidden_budget, frame->applied_ns - view->begun_ns);
     view->begun_ns = frame->applied_ns;
@@ -331,7 +333,7 @@ bool view_drop_hidden_layers(struct job *job, const struct error *error)
     if (job->view.hidden_layer == 0)
         return false;
     log_write(LOG_WARNING, "engine", "a view goes on without what its pictures hide: %s", error->text);
-    job->view.hidden_layer = job->spec.hidden_layers = 0;
+    job->view.hidden_layer = job->spec.view.hidden_layers = 0;
     return true;
 }
 
@@ -355,8 +357,8 @@ void view_done(struct job *job, struct engine_frame *frame)
     view->shown_revision = frame->result.revision;
     view->shown_moving = camera->moving;
     view->held_samples = frame->result.samples;
-    if (frame->result.noise <= job->spec.frame.noise && job->spec.frame.noise > 0.0f)
-        view->held_samples = job->spec.frame.samples; /* the noise is low enough */
+    if (frame->result.noise <= job->spec.frame.sampling.noise && job->spec.frame.sampling.noise > 0.0f)
+        view->held_samples = job->spec.frame.sampling.samples; /* the noise is low enough */
     view->needs_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
     if (adapts(job)) {
@@ -366,9 +368,10 @@ void view_done(struct job *job, struct engine_frame *frame)
         frame->depth_less = depth_less(job);
         frame->wanted_bytes = effort->bytes;
     }
-    bool spares = job->spec.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.samples;
-    if (!camera->moving && !spares && job->spec.still_encoding != job->spec.encoding) {
-        frame->encoding = job->spec.still_encoding;
+    bool spares =
+        job->spec.view.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.sampling.samples;
+    if (!camera->moving && !spares && job->spec.view.still_encoding != job->spec.encoding) {
+        frame->encoding = job->spec.view.still_encoding;
         if (!encoder_loses(frame->encoding))
             frame->quality = 0; /* the quality was that of the lossy encoding; 0 is the fastest level */
     }

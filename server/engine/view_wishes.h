@@ -7,11 +7,11 @@
 #include "engine/engine.h"
 
 struct view_camera {
-    uint64_t command;      /* the client's number for it; 0: none has come */
-    uint64_t received_ns;  /* clock_now_ns() when the network thread read it */
-    bool moving;           /* more will follow soon */
-    struct camera_key key; /* its time is that of the job */
-    uint32_t node;         /* node whose camera overrides the key's, except for the time; 0: none */
+    uint64_t command;             /* the client's number for it; 0: none has come */
+    uint64_t received_ns;         /* clock_now_ns() when the network thread read it */
+    bool moving;                  /* more will follow soon */
+    struct record_camera_key key; /* its time is that of the job */
+    uint32_t node;                /* node whose camera overrides the key's, except for the time; 0: none */
 };
 
 struct view_wishes;

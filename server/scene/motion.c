@@ -253,8 +253,9 @@ static bool choose_poses(struct scene_motion *motion, struct player *player, dou
     return true;
 }
 
-bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene, const struct clip_use *uses,
-                           uint32_t use_count, double open_s, double shutter_s, struct error *error)
+bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene,
+                           const struct record_clip_use *uses, uint32_t use_count, double open_s, double shutter_s,
+                           struct error *error)
 {
     struct player player;
     bool moves = shutter_s > 0.0;
@@ -271,7 +272,7 @@ bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scen
 }
 
 bool scene_motion_add_neighbours(struct scene_motion *motion, const struct scene *scene,
-                                 const struct clip_use *uses, uint32_t use_count, const double times_s[2],
+                                 const struct record_clip_use *uses, uint32_t use_count, const double times_s[2],
                                  struct error *error)
 {
     motion->has_neighbours = scene_pose_evaluate(&motion->earlier, scene, uses, use_count, times_s[0], error) &&

@@ -79,7 +79,7 @@ static void take_channel(struct player *player, const struct scene_channel *chan
         player->weight_count += channel->value.width;
 }
 
-static bool uses_check(const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
+static bool uses_check(const struct scene *scene, const struct record_clip_use *uses, uint32_t use_count,
                        struct error *error)
 {
     for (uint32_t i = 0; i < use_count; i++) {
@@ -92,8 +92,8 @@ static bool uses_check(const struct scene *scene, const struct clip_use *uses, u
     return true;
 }
 
-bool player_init(struct player *player, const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
-                 struct error *error)
+bool player_init(struct player *player, const struct scene *scene, const struct record_clip_use *uses,
+                 uint32_t use_count, struct error *error)
 {
     *player = (struct player){.scene = scene, .uses = uses, .use_count = use_count};
     if (!uses_check(scene, uses, use_count, error))
@@ -142,7 +142,7 @@ double scene_clip_duration_s(const struct scene *scene, uint32_t clip_id)
 static void set_times(struct player *player, double time_s)
 {
     for (uint32_t i = 0; player->times_s && i < player->use_count; i++) {
-        const struct clip_use *use = &player->uses[i];
+        const struct record_clip_use *use = &player->uses[i];
         double clip_s = fmax((time_s - (double)use->start_s) * (double)use->speed, 0.0);
         if (use->loop)
             clip_s = player->durations_s[i] > 0.0 ? fmod(clip_s, player->durations_s[i]) : 0.0;

@@ -16,7 +16,7 @@ struct player_track {
 
 struct player {
     const struct scene *scene;
-    const struct clip_use *uses; /* borrowed */
+    const struct record_clip_use *uses; /* borrowed */
     uint32_t use_count;
     double *durations_s, *times_s; /* per use: duration of its clip; time within it for the current pose */
     struct player_track *tracks;   /* sorted by target, object, use, channel: the last one wins */
@@ -26,8 +26,8 @@ struct player {
 };
 
 /* Initialises a player. ERROR_OUT_OF_MEMORY, ERROR_UNKNOWN_ID ("clips[2].clip"). Finish it in either case. */
-bool player_init(struct player *player, const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
-                 struct error *error);
+bool player_init(struct player *player, const struct scene *scene, const struct record_clip_use *uses,
+                 uint32_t use_count, struct error *error);
 void player_finish(struct player *player);
 /* The pose's entry of a node; NULL: none, or no pose. */
 const struct pose_node *scene_pose_node(const struct scene_pose *pose, uint32_t id);

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, const struct clip_use *uses,
+bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, const struct record_clip_use *uses,
                          uint32_t use_count, double time_s, struct error *error)
 {
     struct player player;

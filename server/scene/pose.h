@@ -59,26 +59,20 @@ struct scene_motion {
 };
 void scene_motion_finish(struct scene_motion *motion);
 
-struct clip_use {
-    uint32_t clip;
-    float start_s; /* time at which the clip begins; before it the clip's first pose holds */
-    float speed;
-    bool loop;
-};
-
 /* Evaluates clips at a time; where two change the same value, the later one counts. Rotations are normalised,
  * values clamped to the protocol's range. ERROR_OUT_OF_MEMORY, ERROR_UNKNOWN_ID ("clips[2].clip"). */
-bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, const struct clip_use *uses,
+bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, const struct record_clip_use *uses,
                          uint32_t use_count, double time_s, struct error *error);
 /* Evaluates the poses from `open_s` on for `shutter_s`; 0 s: one pose. Also one pose if nothing moves in that
  * time; otherwise 2, 3, 5 or 9, so that no unskinned mesh or set of spheres rotates by more than
  * MOTION_TURN_MAX between two poses, as far as MOTION_POSES_MAX allows. Errors as above. */
 #define MOTION_TURN_MAX 0.1745 /* radians, 10 degrees: a chord is 0.4 % of the radius inside its arc */
-bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene, const struct clip_use *uses,
-                           uint32_t use_count, double open_s, double shutter_s, struct error *error);
+bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene,
+                           const struct record_clip_use *uses, uint32_t use_count, double open_s, double shutter_s,
+                           struct error *error);
 /* Adds the poses at two other times. Errors as above. */
 bool scene_motion_add_neighbours(struct scene_motion *motion, const struct scene *scene,
-                                 const struct clip_use *uses, uint32_t use_count, const double times_s[2],
+                                 const struct record_clip_use *uses, uint32_t use_count, const double times_s[2],
                                  struct error *error);
 /* Length of a clip in seconds: its last key. 0: no clip, or no channel. */
 double scene_clip_duration_s(const struct scene *scene, uint32_t clip);

@@ -35,9 +35,9 @@ void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint
 void frame_fill_begin(struct message_frame_begin *begin, const struct engine_frame *frame)
 {
     begin->frame = frame->frame;
-    const struct frame_crop *crop = &frame->request.crop;
-    begin->width = crop->width > 0 ? crop->width : frame->request.width;
-    begin->height = crop->width > 0 ? crop->height : frame->request.height;
+    const struct frame_crop crop = frame_request_crop(&frame->request);
+    begin->width = crop.width;
+    begin->height = crop.height;
     begin->samples = frame->result.samples;
     begin->noise = frame->result.noise;
     begin->revision = frame->result.revision;
@@ -54,12 +54,12 @@ void frame_fill_begin(struct message_frame_begin *begin, const struct engine_fra
     begin->hidden_layer = frame->request.hidden_layer;
     begin->of_frame = frame->of_frame;
     begin->depth_less = frame->depth_less;
-    begin->format = (enum protocol_pixel_format)frame->request.format;
+    begin->format = (enum protocol_pixel_format)frame->request.picture.format;
     begin->encoding = (enum protocol_encoding)frame->encoding;
-    begin->tracer = (enum protocol_tracer)frame->request.tracer;
-    begin->integrator = (enum protocol_integrator)frame->request.integrator;
+    begin->tracer = (enum protocol_tracer)frame->request.tracing.tracer;
+    begin->integrator = (enum protocol_integrator)frame->request.light.integrator;
     begin->digest = frame->digest;
-    begin->exposure_stops = frame->request.exposure_stops;
+    begin->exposure_stops = frame->request.picture.exposure_stops;
     memcpy(begin->world_from_view, frame->request.camera.world_from_view, sizeof(begin->world_from_view));
     begin->fov_y = frame->request.camera.fov_y;
     begin->ortho_height = frame->request.camera.ortho_height;
@@ -89,36 +89,6 @@ void frame_fill_parts(struct message_frame_parts *message, struct record_frame_p
     message->parts_count = list->count;
 }
 
-static uint32_t fill_comparisons(struct record_wave_comparison *records, const struct frame_result *result)
-{
-    uint32_t count = result->comparison_count < COMPARISONS_MAX ? result->comparison_count : COMPARISONS_MAX;
-    for (uint32_t i = 0; i < count; i++) {
-        const struct wave_comparison *from = &result->comparisons[i];
-        records[i] = (struct record_wave_comparison){
-            .wave = from->wave,
-            .kind = (enum protocol_ray_kind)from->kind,
-            .rays = from->rays,
-            .both_hit = from->both_hit,
-            .both_missed = from->both_missed,
-            .only_tracer = from->only_first,
-            .only_reference = from->only_second,
-            .far = from->far,
-            .edges = from->edges,
-            .other_surface = from->other_surface,
-            .tracer_ns = from->first_ns,
-            .reference_ns = from->second_ns,
-            .distance_median = from->distance_median,
-            .distance_p99 = from->distance_p99,
-            .distance_max = from->distance_max,
-            .relative_median = from->relative_median,
-            .normal_median = from->normal_median,
-            .normal_p99 = from->normal_p99,
-            .normal_max = from->normal_max,
-        };
-    }
-    return count;
-}
-
 static uint32_t fill_structure(struct record_structure_row *records, const struct frame_result *result)
 {
     const struct structure_rows *from = &result->structure;
@@ -136,25 +106,10 @@ static uint32_t fill_structure(struct record_structure_row *records, const struc
     return from->count;
 }
 
-static uint32_t fill_stages(struct record_stage_time *records, const struct stage_times *times)
+void frame_fill_end(struct message_frame_end *end, struct record_structure_row rows[STRUCTURE_ROWS_MAX],
+                    struct engine_frame *frame)
 {
-    for (uint32_t i = 0; i < times->count; i++) {
-        const struct stage_span *span = &times->spans[i];
-        records[i] = (struct record_stage_time){
-            .stage = (enum protocol_stage)span->stage,
-            .clock = (enum protocol_clock)span->clock,
-            .wave = span->wave < UINT16_MAX ? span->wave : UINT16_MAX,
-            .start_ns = span->start_ns,
-            .duration_ns = span->duration_ns,
-        };
-    }
-    return times->count;
-}
-
-void frame_fill_end(struct message_frame_end *end, struct frame_end_records *records,
-                    const struct engine_frame *frame)
-{
-    const struct frame_result *result = &frame->result;
+    struct frame_result *result = &frame->result;
     end->frame = frame->frame;
     end->primary_rays = result->primary_rays;
     end->shadow_rays = result->shadow_rays;
@@ -165,10 +120,11 @@ void frame_fill_end(struct message_frame_end *end, struct frame_end_records *rec
     end->barriers = result->barriers;
     end->uploaded_bytes = result->uploaded_bytes;
     end->structure_bytes = result->structure_bytes;
-    end->stages = records->stages;
-    end->stages_count = fill_stages(records->stages, &result->times);
-    end->comparisons = records->comparisons;
-    end->comparisons_count = fill_comparisons(records->comparisons, result);
-    end->structure = records->structure;
-    end->structure_count = fill_structure(records->structure, result);
+    end->stages = result->times.spans;
+    end->stages_count = result->times.count;
+    end->comparisons = result->comparisons;
+    end->comparisons_count =
+        result->comparison_count < COMPARISONS_MAX ? result->comparison_count : COMPARISONS_MAX;
+    end->structure = rows;
+    end->structure_count = fill_structure(rows, result);
 }

@@ -133,10 +133,10 @@ static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now
     uint64_t send_ns = now_ns - pending->begun_ns;
     stage_times_add(times, STAGE_QUEUE, CLOCK_CPU, 0, frame->encoded_ns, queue_ns);
     stage_times_add(times, STAGE_SEND, CLOCK_CPU, 0, pending->begun_ns, send_ns);
-    struct frame_end_records records;
+    struct record_structure_row rows[STRUCTURE_ROWS_MAX];
     struct message message;
     message_init(&message, MESSAGE_FRAME_END);
-    frame_fill_end(&message.frame_end, &records, frame);
+    frame_fill_end(&message.frame_end, rows, frame);
     message.frame_end.abandoned = abandoned;
     session_send(job->session, pending->request, job->channel, &message);
     const struct hub_options *hub = &job->session->hub->options;

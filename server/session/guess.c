@@ -29,7 +29,7 @@ uint64_t guess_render_ns(const struct stage_times *times, uint64_t wave_ns[PACIN
     for (size_t s = 0; s < sizeof(stages) / sizeof(*stages); s++) {
         struct repeated waves[PACING_WAVES] = {0};
         for (uint32_t i = 0; i < times->count; i++) {
-            const struct stage_span *span = &times->spans[i];
+            const struct record_stage_time *span = &times->spans[i];
             if (span->stage != stages[s] || span->clock != clock || span->wave >= PACING_WAVES)
                 continue;
             struct repeated *all = &waves[span->wave];

@@ -23,36 +23,36 @@
 #define QUALITY_OF_JPEG 90
 #define QUALITY_OF_H264 80
 #define LEVEL_OF_ZSTD 1
-#define DEGREE 0.017453293f
 
 /* ---- checks ------------------------------------------------------------------------------------------ */
 
 /* Pixels of a view's frame while the camera moves. */
 static uint32_t with_margin(const struct message_render *render, uint32_t pixels)
 {
-    return pixels + 2 * margin_pixels(render->margin, pixels);
+    return pixels + 2 * margin_pixels(render->view.margin, pixels);
 }
 
 static uint64_t frame_bytes_of(const struct message_render *render)
 {
-    uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
-    uint32_t pixel_bytes = protocol_pixel_format_bytes(render->format) * (uint32_t)__builtin_popcount(layers) +
-                           ATTACHMENT_PIXEL_BYTES * (uint32_t)__builtin_popcount(render->attachments);
-    return (uint64_t)with_margin(render, render->width * render->views_across) *
-           with_margin(render, render->height * render->views_down) * pixel_bytes;
+    uint32_t layers = render->picture.layers ? render->picture.layers : BEAUTY_ALONE;
+    uint32_t pixel_bytes =
+        protocol_pixel_format_bytes(render->picture.format) * (uint32_t)__builtin_popcount(layers) +
+        ATTACHMENT_PIXEL_BYTES * (uint32_t)__builtin_popcount(render->view.attachments);
+    return (uint64_t)with_margin(render, render->picture.width * render->picture.views_across) *
+           with_margin(render, render->picture.height * render->picture.views_down) * pixel_bytes;
 }
 
 static bool check_layers(const struct message_render *render, struct error *error)
 {
-    if (!render->layers || render->layers == BEAUTY_ALONE)
+    if (!render->picture.layers || render->picture.layers == BEAUTY_ALONE)
         return true;
     if (render->kind == PROTOCOL_JOB_VIEW) {
         error_set(error, ERROR_UNSUPPORTED, "render.layers", "a view shows the picture alone");
         return error_remedy(error, "a batch of one frame has layers; a view may have attachments");
     }
-    if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
+    if (render->picture.format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
         error_set(error, ERROR_UNSUPPORTED, "render.layers", "%s in %s carries the beauty alone",
-                  protocol_pixel_format_text(render->format), protocol_encoding_text(render->encoding));
+                  protocol_pixel_format_text(render->picture.format), protocol_encoding_text(render->encoding));
         return error_remedy(error, "layers need the format rgba32f and the encoding raw, zstd or predicted");
     }
     if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
@@ -71,40 +71,40 @@ struct job *job_replaced_by(const struct session *session, const struct message_
 
 static bool has_views(const struct message_render *render)
 {
-    return render->views_across > 1 || render->views_down > 1;
+    return render->picture.views_across > 1 || render->picture.views_down > 1;
 }
 
 /* Checks several views in a picture. */
 static bool check_eyes(const struct message_render *render, struct error *error)
 {
-    if (render->eyes_over && (render->views_across != 1 || render->views_down < 2)) {
+    if (render->picture.eyes_over && (render->picture.views_across != 1 || render->picture.views_down < 2)) {
         error_set(error, ERROR_INVALID, "render.eyes_over",
-                  "%u x %u views; those of eyes side by side are one below the other", render->views_across,
-                  render->views_down);
+                  "%u x %u views; those of eyes side by side are one below the other",
+                  render->picture.views_across, render->picture.views_down);
         return error_remedy(error, "set views_across to 1 and views_down to 2, or eyes_over to 0");
     }
-    if (!has_views(render) || render->baseline > 0.0f)
+    if (!has_views(render) || render->picture.baseline > 0.0f)
         return true;
     error_set(error, ERROR_INVALID, "render.baseline", "all %u views would be from one place",
-              render->views_across * render->views_down);
+              render->picture.views_across * render->picture.views_down);
     return error_remedy(error, "give the distance of neighbouring eyes in metres");
 }
 
 /* Checks frames that are made from rendered ones. */
 static bool check_upsample(const struct message_render *render, struct error *error)
 {
-    if (render->upsample == 1)
+    if (render->picture.upsample == 1)
         return true;
     if (render->kind == PROTOCOL_JOB_VIEW) {
         error_set(error, ERROR_UNSUPPORTED, "render.upsample", "the next frames of a view are not known");
         return error_remedy(error, "set it to 1; a batch has frames between those that are rendered");
     }
-    if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS) {
+    if (render->picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS) {
         error_set(error, ERROR_INVALID, "render.upsample",
                   "frames between those that are rendered are not made of rays");
         return error_remedy(error, "set view_source to layers, or upsample to 1");
     }
-    if (!render->accumulate)
+    if (!render->sampling.accumulate)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.upsample", "such frames do not add to one another");
     return error_remedy(error, "set accumulate to off, or upsample to 1");
@@ -112,19 +112,19 @@ static bool check_upsample(const struct message_render *render, struct error *er
 
 static bool check_hidden(const struct message_render *render, struct error *error)
 {
-    if (!render->hidden_layers)
+    if (!render->view.hidden_layers)
         return true;
-    if (render->kind == PROTOCOL_JOB_BATCH || (has_views(render) && !(render->margin > 0.0f))) {
+    if (render->kind == PROTOCOL_JOB_BATCH || (has_views(render) && !(render->view.margin > 0.0f))) {
         error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
                   "a batch has none, nor have several views without a margin");
         return error_remedy(error, "set it to 0");
     }
-    if (!(render->attachments & 1u << PROTOCOL_ATTACHMENT_DEPTH)) {
+    if (!(render->view.attachments & 1u << PROTOCOL_ATTACHMENT_DEPTH)) {
         error_set(error, ERROR_INVALID, "render.hidden_layers",
                   "they need depth, which says where there is a surface");
         return error_remedy(error, "add depth to attachments");
     }
-    if (render->aperture > 0.0f || render->shutter > 0.0f || render->compare) {
+    if (render->camera.aperture > 0.0f || render->camera.shutter > 0.0f || render->comparison.compare) {
         error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
                   "what is hidden is that of one time and place of an eye, and is traced by no second tracer");
         return error_remedy(error, "set it to 0, or aperture, shutter and compare");
@@ -134,16 +134,16 @@ static bool check_hidden(const struct message_render *render, struct error *erro
 
 static bool is_made_of_layers(const struct message_render *render)
 {
-    return render->view_source == PROTOCOL_VIEW_SOURCE_LAYERS &&
-           (has_views(render) || render->aperture > 0.0f || render->upsample > 1);
+    return render->picture.view_source == PROTOCOL_VIEW_SOURCE_LAYERS &&
+           (has_views(render) || render->camera.aperture > 0.0f || render->picture.upsample > 1);
 }
 
 /* Checks sampling to a noise, in which tiles differ in their number of samples. */
 static bool check_noise(const struct message_render *render, struct error *error)
 {
-    if (!(render->noise > 0.0f))
+    if (!(render->sampling.noise > 0.0f))
         return true;
-    if (render->compare) {
+    if (render->comparison.compare) {
         error_set(error, ERROR_UNSUPPORTED, "render.noise", "tracers are compared by a number of samples");
         return error_remedy(error, "set noise to 0, or compare to 0");
     }
@@ -157,15 +157,15 @@ static bool check_noise(const struct message_render *render, struct error *error
 /* Checks the ground, which pictures made of layers do not show: its pixels would lack their neighbours. */
 static bool check_ground(const struct message_render *render, struct error *error)
 {
-    const double up =
-        fabs((double)render->ground_up_x) + fabs((double)render->ground_up_y) + fabs((double)render->ground_up_z);
-    if (!render->ground)
+    const double up = fabs((double)render->picture.ground_up_x) + fabs((double)render->picture.ground_up_y) +
+                      fabs((double)render->picture.ground_up_z);
+    if (!render->picture.ground)
         return true;
     if (!(up > 1e-6)) {
         error_set(error, ERROR_INVALID, "render.ground_up_y", "the ground's normal is zero");
         return error_remedy(error, "give a direction, such as 0, 1, 0");
     }
-    if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+    if (render->picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.ground", "pictures that are made of layers show no ground");
     return error_remedy(error, "set view_source to rays, or ground to 0");
@@ -173,18 +173,19 @@ static bool check_ground(const struct message_render *render, struct error *erro
 
 static bool check_crop(const struct message_render *render, struct error *error)
 {
-    if (render->crop_width == 0 && render->crop_height == 0)
+    if (render->picture.crop_width == 0 && render->picture.crop_height == 0)
         return true;
-    if (render->crop_width == 0 || render->crop_height == 0 ||
-        render->crop_x + render->crop_width > render->width ||
-        render->crop_y + render->crop_height > render->height) {
+    if (render->picture.crop_width == 0 || render->picture.crop_height == 0 ||
+        render->picture.crop_x + render->picture.crop_width > render->picture.width ||
+        render->picture.crop_y + render->picture.crop_height > render->picture.height) {
         error_set(error, ERROR_INVALID, "render.crop_width", "%u x %u pixels from (%u, %u) on are not in %u x %u",
-                  render->crop_width, render->crop_height, render->crop_x, render->crop_y, render->width,
-                  render->height);
+                  render->picture.crop_width, render->picture.crop_height, render->picture.crop_x,
+                  render->picture.crop_y, render->picture.width, render->picture.height);
         return error_remedy(error, "ask for a part of the picture, or set all four to 0");
     }
-    if (render->kind == PROTOCOL_JOB_BATCH && !(render->noise > 0.0f) && render->denoise == PROTOCOL_DENOISE_OFF &&
-        !has_views(render) && render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+    if (render->kind == PROTOCOL_JOB_BATCH && !(render->sampling.noise > 0.0f) &&
+        render->picture.denoise == PROTOCOL_DENOISE_OFF && !has_views(render) &&
+        render->picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.crop_width",
               "a part of a picture has one view, a number of samples, and no filter for noise");
@@ -195,14 +196,14 @@ static bool check_views(const struct message_render *render, struct error *error
 {
     if (!check_eyes(render, error) || !check_upsample(render, error) || !check_hidden(render, error))
         return false;
-    if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+    if (render->picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
         return true;
-    if (render->compare) {
+    if (render->comparison.compare) {
         error_set(error, ERROR_UNSUPPORTED, "render.compare",
                   "tracers are not compared in pictures that are made of layers");
         return error_remedy(error, "set view_source to rays, or compare to 0");
     }
-    if (!(render->shutter > 0.0f))
+    if (!(render->camera.shutter > 0.0f))
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.shutter", "layers show the scene at one time");
     return error_remedy(error, "set view_source to rays, or shutter to 0");
@@ -212,23 +213,23 @@ static bool check_views(const struct message_render *render, struct error *error
 static bool check_size(const struct session_limits *limits, const struct message_render *render,
                        struct error *error)
 {
-    const uint32_t width = with_margin(render, render->width * render->views_across);
-    const uint32_t height = with_margin(render, render->height * render->views_down);
+    const uint32_t width = with_margin(render, render->picture.width * render->picture.views_across);
+    const uint32_t height = with_margin(render, render->picture.height * render->picture.views_down);
     const bool is_wide = width > limits->width_pixels;
     if (!is_wide && height <= limits->height_pixels)
         return true;
-    if (render->margin > 0.0f) {
+    if (render->view.margin > 0.0f) {
         error_set(error, ERROR_LIMIT, "render.margin", "%u x %u pixels with it, the limit is %u x %u", width,
                   height, limits->width_pixels, limits->height_pixels);
         return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
     }
     const char *field = is_wide ? "render.width" : "render.height";
     if (has_views(render)) {
-        const uint32_t views = is_wide ? render->views_across : render->views_down;
+        const uint32_t views = is_wide ? render->picture.views_across : render->picture.views_down;
         field = views > 1 ? is_wide ? "render.views_across" : "render.views_down" : field;
         error_set(error, ERROR_LIMIT, field, "%u x %u views of %u x %u pixels are %u x %u, the limit is %u x %u",
-                  render->views_across, render->views_down, render->width, render->height, width, height,
-                  limits->width_pixels, limits->height_pixels);
+                  render->picture.views_across, render->picture.views_down, render->picture.width,
+                  render->picture.height, width, height, limits->width_pixels, limits->height_pixels);
         return error_remedy(error,
                             "ask for fewer or smaller views, or raise [limits] in the daemon's configuration");
     }
@@ -242,8 +243,9 @@ static bool check_limits(const struct session *session, const struct message_ren
     const struct session_limits *limits = &session->hub->options.limits;
     if (!check_size(limits, render, error))
         return false;
-    if (render->samples > limits->samples) {
-        error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples, limits->samples);
+    if (render->sampling.samples > limits->samples) {
+        error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->sampling.samples,
+                  limits->samples);
         return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
     }
     if (session->job_count >= limits->jobs_per_client && !job_replaced_by(session, render)) {
@@ -292,9 +294,9 @@ static bool check_room(const struct session *session, const struct message_rende
 
 static bool check_camera(const struct message_render *render, struct error *error)
 {
-    if (render->camera_path == PROTOCOL_CAMERA_KEYS && !render->keys_count)
+    if (render->camera.camera_path == PROTOCOL_CAMERA_KEYS && !render->keys_count)
         return error_set(error, ERROR_INVALID, "render.keys", "camera path keys needs at least one key");
-    if (render->camera_path == PROTOCOL_CAMERA_NODE && !render->camera_node)
+    if (render->camera.camera_path == PROTOCOL_CAMERA_NODE && !render->camera.camera_node)
         return error_set(error, ERROR_INVALID, "render.camera_node", "camera path node needs a node");
     for (uint32_t i = 1; i < render->keys_count; i++) {
         if (!(render->keys[i].time_s > render->keys[i - 1].time_s))
@@ -319,18 +321,18 @@ static bool check_encoding(const struct session *session, const struct message_r
                             "a client that decodes it says so in its handshake, and a daemon that encodes it "
                             "in the reply; choose jpeg otherwise");
     }
-    uint32_t pixel_bytes = protocol_pixel_format_bytes(render->format);
+    uint32_t pixel_bytes = protocol_pixel_format_bytes(render->picture.format);
     if (is_stream ? pixel_bytes == 4 : encoder_supports((enum encoding)encoding, pixel_bytes))
         return true;
     error_set(error, ERROR_UNSUPPORTED, field, "%s does not carry %s", protocol_encoding_text(encoding),
-              protocol_pixel_format_text(render->format));
+              protocol_pixel_format_text(render->picture.format));
     return error_remedy(error, "raw, zstd and predicted carry every format");
 }
 
 static bool check_tracers(const struct message_render *render, struct error *error)
 {
     struct setting_fault fault;
-    if (tracer_settings_check(&render->settings, "render.", &fault))
+    if (tracer_settings_check(&render->tracing.settings, "render.", &fault))
         return true;
     error_set(error, ERROR_INVALID, fault.field, "%s", fault.text);
     return error_remedy(error, "%s", fault.remedy);
@@ -339,12 +341,12 @@ static bool check_tracers(const struct message_render *render, struct error *err
 /* Checks options that differ between views and batches. */
 static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
-    if (render->margin > 0.0f && render->kind == PROTOCOL_JOB_BATCH) {
+    if (render->view.margin > 0.0f && render->kind == PROTOCOL_JOB_BATCH) {
         error_set(error, ERROR_UNSUPPORTED, "render.margin", "only a view has it, while it moves");
         return error_remedy(error, "set it to 0, or ask for a larger picture and field of view");
     }
     if (render->kind == PROTOCOL_JOB_BATCH) {
-        if (render->attachments) {
+        if (render->view.attachments) {
             error_set(error, ERROR_UNSUPPORTED, "render.attachments", "frames of a batch have none");
             return error_remedy(error, "a batch has layers");
         }
@@ -353,12 +355,13 @@ static bool check_kind(const struct session *session, const struct message_rende
                              render->last_frame, render->first_frame);
         return true;
     }
-    if (!check_encoding(session, render, render->still_encoding, "render.still_encoding", error))
+    if (!check_encoding(session, render, render->view.still_encoding, "render.still_encoding", error))
         return false;
-    if (!encoder_loses((enum encoding)render->still_encoding) || encoder_loses((enum encoding)render->encoding))
+    if (!encoder_loses((enum encoding)render->view.still_encoding) ||
+        encoder_loses((enum encoding)render->encoding))
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.still_encoding", "%s goes by a quality, and that of %s is none",
-              protocol_encoding_text(render->still_encoding), protocol_encoding_text(render->encoding));
+              protocol_encoding_text(render->view.still_encoding), protocol_encoding_text(render->encoding));
     return error_remedy(error, "let what moves lose as much, or what rests nothing");
 }
 
@@ -394,60 +397,31 @@ static uint32_t job_quality(const struct message_render *render)
 
 /* ---- for the engine ---------------------------------------------------------------------------------- */
 
-static bool fill_clips(struct engine_job *job, const struct message_render *render)
-{
-    if (!render->clips_count)
-        return true;
-    job->clips = calloc(render->clips_count, sizeof(*job->clips));
-    if (!job->clips)
-        return false;
-    job->clip_count = render->clips_count;
-    for (uint32_t i = 0; i < render->clips_count; i++) {
-        const struct record_clip_use *from = &render->clips[i];
-        job->clips[i] = (struct clip_use){from->clip, from->start_s, from->speed, from->loop != 0};
-    }
-    return true;
-}
-
-static bool fill_keys(struct engine_job *job, const struct message_render *render)
-{
-    if (!render->keys_count)
-        return true;
-    job->keys = calloc(render->keys_count, sizeof(*job->keys));
-    if (!job->keys)
-        return false;
-    job->key_count = render->keys_count;
-    for (uint32_t i = 0; i < render->keys_count; i++) {
-        const struct record_camera_key *from = &render->keys[i];
-        struct camera_key *key = &job->keys[i];
-        key->time_s = from->time_s;
-        memcpy(key->eye_world, from->eye_world, sizeof(key->eye_world));
-        memcpy(key->look_at_world, from->look_at_world, sizeof(key->look_at_world));
-        memcpy(key->up_world, from->up_world, sizeof(key->up_world));
-        key->fov_y = from->fov_y;
-    }
-    return true;
-}
-
 static struct tracer_options options_of(const struct session *session, const struct message_render *render)
 {
-    const uint64_t pixels = (uint64_t)render->width * render->height * render->views_across * render->views_down;
-    struct tracer_options options = tracer_options_of(&render->settings, &session->hub->options.limits.tracers);
-    tracer_options_note_picture(&options, render->tracer, pixels);
-    if (render->compare)
-        tracer_options_note_picture(&options, render->compare_with, pixels);
+    const uint64_t pixels = (uint64_t)render->picture.width * render->picture.height *
+                            render->picture.views_across * render->picture.views_down;
+    struct tracer_options options =
+        tracer_options_of(&render->tracing.settings, &session->hub->options.limits.tracers);
+    tracer_options_note_picture(&options, render->tracing.tracer, pixels);
+    if (render->comparison.compare)
+        tracer_options_note_picture(&options, render->comparison.compare_with, pixels);
     return options;
 }
 
-/* Fills the job except keys and clips, which are set already. */
-static void fill_rest(struct engine_job *job, const struct session *session, const struct message_render *render)
+/* Copies an array of `count` records; NULL: there are none, or no memory. */
+static void *copy_of(const void *records, uint32_t count, size_t record_bytes)
 {
-    bool is_view = render->kind == PROTOCOL_JOB_VIEW;
+    void *copy = count > 0 ? malloc(count * record_bytes) : NULL;
+    if (copy)
+        memcpy(copy, records, count * record_bytes);
+    return copy;
+}
+
+bool job_fill(struct engine_job *job, const struct session *session, const struct message_render *render)
+{
+    const bool is_view = render->kind == PROTOCOL_JOB_VIEW;
     *job = (struct engine_job){
-        .keys = job->keys,
-        .key_count = job->key_count,
-        .clips = job->clips,
-        .clip_count = job->clip_count,
         .kind = (enum job_kind)render->kind,
         .scene = render->scene,
         .first_frame = render->first_frame,
@@ -457,80 +431,28 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .time_origin_frame = render->time_origin_frame,
         .frame =
             {
-                .width = render->width * render->views_across,
-                .height = render->height * render->views_down,
-                .crop = {render->crop_x, render->crop_y, render->crop_width, render->crop_height},
-                .views_across = render->views_across,
-                .views_down = render->views_down,
-                .baseline = render->baseline,
-                .eyes_over = render->eyes_over != 0,
-                .view_source = (enum view_source)render->view_source,
-                .samples = render->samples,
-                .noise = (float)render->noise,
-                .depth = render->depth,
-                .seed = render->seed,
-                .tracer = render->tracer,
+                .picture = render->picture,
+                .sampling = render->sampling,
+                .light = render->light,
+                .comparison = render->comparison,
+                .tracing = render->tracing,
                 .tracer_options = options_of(session, render),
-                .integrator = (enum integrator_kind)render->integrator,
-                .primary = (enum primary_kind)render->primary,
-                .tone_map = (enum tone_map)render->tone_map,
-                .format = (enum pixel_format)render->format,
-                .exposure_stops = render->exposure_stops,
-                .background = (enum background)render->background,
-                .background_colour = {render->background_red, render->background_green, render->background_blue},
-                .denoise = (enum denoise)render->denoise,
-                .aperture = render->aperture,
-                .focus = render->focus,
-                .filter = (enum pixel_filter)render->pixel_filter,
-                .brdf = (enum brdf)render->brdf,
-                .clamp = render->clamp,
-                .ao_distance = render->ao_distance,
-                .ao_falloff = render->ao_falloff,
-                .ao_rays = render->ao_rays,
-                .layer_opacity = render->layer_opacity,
-                .wireframe = render->wireframe,
-                .layers = render->layers,
-                .attachments = render->attachments,
-                .accumulate = render->accumulate != PROTOCOL_ACCUMULATION_OFF,
-                .starts_anew = !is_view && render->accumulate == PROTOCOL_ACCUMULATION_ANEW,
-                .compare = render->compare != 0,
-                .compare_with = render->compare_with,
-                .compare_far_share = render->compare_far,
+                .attachments = render->view.attachments,
+                .starts_anew = !is_view && render->sampling.accumulate == PROTOCOL_ACCUMULATION_ANEW,
             },
-        .shutter = render->shutter,
         .encoding = (enum encoding)render->encoding,
         .quality = job_quality(render),
-        .path = (enum camera_path)render->camera_path,
-        .camera_node = render->camera_node,
-        .framing = {.azimuth = render->auto_azimuth * DEGREE,
-                    .elevation = render->auto_elevation * DEGREE,
-                    .fov_y = render->auto_fov * DEGREE,
-                    .margin = render->auto_margin,
-                    .zoom = render->auto_zoom},
-        .framed_node = render->auto_node,
-        .has_ground = render->ground != 0,
-        .ground_up_world = {render->ground_up_x, render->ground_up_y, render->ground_up_z},
-        .orbit_turn = render->orbit_turn,
-        .orbit_seconds = render->orbit_seconds,
-        .upsample = render->upsample,
-        .pass_samples = render->pass_samples,
-        .still_encoding = (enum encoding)render->still_encoding,
+        .camera = render->camera,
+        .view = render->view,
+        .keys = copy_of(render->keys, render->keys_count, sizeof(*render->keys)),
+        .key_count = render->keys_count,
+        .clips = copy_of(render->clips, render->clips_count, sizeof(*render->clips)),
+        .clip_count = render->clips_count,
         .weight = render->weight ? render->weight
                   : is_view      ? WEIGHT_OF_VIEW
                                  : WEIGHT_OF_BATCH,
-        .adapt = render->adapt != 0,
-        .keeps_rate = render->moving_rate > 0.0f,
-        .depth = {(enum depth_form)render->depth_form, render->depth_pixels, render->depth_radius},
-        .hidden_layers = render->hidden_layers,
-        .parts = render->parts != 0,
-        .margin = is_view ? render->margin : 0.0f,
     };
-}
-
-bool job_fill(struct engine_job *job, const struct session *session, const struct message_render *render)
-{
-    if (!fill_keys(job, render) || !fill_clips(job, render))
-        return false;
-    fill_rest(job, session, render);
-    return true;
+    job->frame.picture.width *= render->picture.views_across;
+    job->frame.picture.height *= render->picture.views_down;
+    return (job->keys || job->key_count == 0) && (job->clips || job->clip_count == 0);
 }

@@ -48,7 +48,7 @@ static struct job *job_create(struct session *session, uint32_t request, const s
         .request = request,
         .channel = render->channel,
         .scene = render->scene,
-        .tracer = render->tracer,
+        .tracer = render->tracing.tracer,
         .first_frame = render->first_frame,
         .last_frame = render->last_frame,
         .frame_step = render->frame_step,
@@ -79,7 +79,7 @@ static bool add_change(struct job *job, uint32_t request, const struct message_r
     *change = (struct view_change){
         .request = request,
         .scene = render->scene,
-        .tracer = render->tracer,
+        .tracer = render->tracing.tracer,
         .credit = job->client_credit > job->frames_sent ? 1 : 0,
         .frame_bytes = job_bytes(job->session, render),
         .terms = view_terms_of(render),

@@ -47,20 +47,21 @@ static uint64_t deadline_ns_of(float moving_rate)
 struct view_terms view_terms_of(const struct message_render *render)
 {
     const uint64_t frame_ns = (uint64_t)(SECOND_NS / (double)render->frames_per_second);
-    const uint32_t samples = render->samples < render->pass_samples ? render->samples : render->pass_samples;
+    const uint32_t samples = render->sampling.samples < render->view.pass_samples ? render->sampling.samples
+                                                                                  : render->view.pass_samples;
     return (struct view_terms){
-        .frame_ns = render->margin > 0.0f && frame_ns < KEY_NS ? KEY_NS : frame_ns,
-        .samples = render->samples,
-        .moving = {.margin = render->margin,
-                   .hidden_layers = render->hidden_layers,
+        .frame_ns = render->view.margin > 0.0f && frame_ns < KEY_NS ? KEY_NS : frame_ns,
+        .samples = render->sampling.samples,
+        .moving = {.margin = render->view.margin,
+                   .hidden_layers = render->view.hidden_layers,
                    .samples = samples,
-                   .depth = render->depth,
-                   .deadline_ns = deadline_ns_of(render->moving_rate),
-                   .ignores_link = !render->adapt},
-        .still_encoding = (enum encoding)render->still_encoding,
+                   .depth = render->light.depth,
+                   .deadline_ns = deadline_ns_of(render->view.moving_rate),
+                   .ignores_link = !render->view.adapt},
+        .still_encoding = (enum encoding)render->view.still_encoding,
         .quality = encoder_loses((enum encoding)render->encoding) ? render->quality : 0,
-        .adapt = render->adapt != 0,
-        .parts = render->parts != 0,
+        .adapt = render->view.adapt != 0,
+        .parts = render->view.parts != 0,
     };
 }
 
@@ -259,7 +260,7 @@ static void waves_of(const struct stage_times *times, uint64_t wave_ns[PACING_WA
     for (uint32_t i = 0; i < times->count; i++)
         has_gpu |= times->spans[i].clock == CLOCK_GPU;
     for (uint32_t i = 0; i < times->count; i++) {
-        const struct stage_span *span = &times->spans[i];
+        const struct record_stage_time *span = &times->spans[i];
         const bool counts = span->stage == STAGE_TRACE || span->stage == STAGE_SHADE;
         if (counts && span->wave < PACING_WAVES && span->clock == (has_gpu ? CLOCK_GPU : CLOCK_CPU))
             wave_ns[span->wave] += span->duration_ns;
@@ -273,7 +274,7 @@ static struct pacing_advice advice_of(const struct engine_frame *frame)
         .scale_32nds = frame->scale_32nds ? frame->scale_32nds : PACING_SCALE_FULL,
         .quality = frame->quality,
         .margin_halves_less = frame->margin_halves_less,
-        .samples = frame->request.samples,
+        .samples = frame->request.sampling.samples,
         .depth_less = frame->depth_less,
     };
 }
@@ -299,7 +300,8 @@ static void guess(struct session_view *view, const struct engine_frame *frame)
  * compilation; frames that refine it do not. */
 static bool is_learned_from(const struct session_view *view, const struct engine_frame *frame)
 {
-    return frame->moving || (view->terms.moving.deadline_ns > 0 && frame->result.samples > frame->request.samples);
+    return frame->moving ||
+           (view->terms.moving.deadline_ns > 0 && frame->result.samples > frame->request.sampling.samples);
 }
 
 void view_frame_made(struct job *job, const struct engine_frame *frame)

@@ -19,14 +19,14 @@ static void half_noisy(struct fixture *fixture)
     fixture_square(fixture, 10.0f, wall->base.id, NULL);
     fixture_sphere(fixture, 1.2f, 0.0f, 0.8f, 0.4f, wall->base.id);
     fixture_light(fixture, LIGHT_SPHERE, 1.5f, 0.5f, 3.0f, 60.0f);
-    fixture->request.width = WIDTH;
-    fixture->request.height = HEIGHT;
+    fixture->request.picture.width = WIDTH;
+    fixture->request.picture.height = HEIGHT;
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 2.4f;
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
-    fixture->request.depth = 0;
-    fixture->request.noise = LIMIT;
-    fixture->request.samples = SAMPLES_MAX;
+    fixture->request.light.integrator = INTEGRATOR_DISTRIBUTED;
+    fixture->request.light.depth = 0;
+    fixture->request.sampling.noise = LIMIT;
+    fixture->request.sampling.samples = SAMPLES_MAX;
 }
 
 ALL_TESTS(fixture_setup, fixture_teardown)
@@ -35,13 +35,14 @@ EACH_TEST(fixture_clear, NULL)
 static struct frame_result plain(struct fixture *fixture, uint32_t samples)
 {
     const struct frame_request adaptive = fixture->request;
-    fixture->request.noise = 0.0f;
-    fixture->request.accumulate = true; /* whose textures and order of lights do not depend on the number either */
-    fixture->request.samples = samples;
-    fixture->request.seed++; /* not gone on from the last */
+    fixture->request.sampling.noise = 0.0f;
+    fixture->request.sampling.accumulate =
+        true; /* whose textures and order of lights do not depend on the number either */
+    fixture->request.sampling.samples = samples;
+    fixture->request.sampling.seed++; /* not gone on from the last */
     struct frame_result other = fixture_render(fixture);
     frame_result_finish(&other);
-    fixture->request.seed--;
+    fixture->request.sampling.seed--;
     struct frame_result result = fixture_render(fixture);
     fixture->request = adaptive;
     return result;
@@ -114,7 +115,7 @@ TEST_LONG(the_error_against_the_converged_picture_is_below_the_limit)
     half_noisy(fixture);
     struct frame_result truth = plain(fixture, 1024);
     for (int i = 0; i < 2; i++) {
-        fixture->request.noise = i ? LIMIT / 2 : LIMIT;
+        fixture->request.sampling.noise = i ? LIMIT / 2 : LIMIT;
         struct frame_result result = fixture_render(fixture);
         double worst = 0.0, squares = 0.0;
         for (uint32_t tile = 0; tile < TILES; tile++) {
@@ -122,7 +123,7 @@ TEST_LONG(the_error_against_the_converged_picture_is_below_the_limit)
             worst = fmax(worst, error);
             squares += error * error / TILES;
         }
-        const double limit = (double)fixture->request.noise;
+        const double limit = (double)fixture->request.sampling.noise;
         print_message("limit %.3f: %u samples at most, off by %.4f, the worst tile by %.4f\n", limit,
                       result.samples, sqrt(squares), worst);
         /* A tile's estimate is from 64 pixels, and known to 1 / sqrt(128) = 9 % where they are alike: of 32 tiles
@@ -153,7 +154,7 @@ TEST_LONG(a_picture_that_stops_by_its_noise_is_nearer_to_the_truth_denoised)
     half_noisy(fixture);
     struct frame_result truth = plain(fixture, 1024);
     struct frame_result noisy = fixture_render(fixture);
-    fixture->request.denoise = DENOISE_ON;
+    fixture->request.picture.denoise = DENOISE_ON;
     struct frame_result denoised = fixture_render(fixture);
     assert_int_equal(noisy.primary_rays, denoised.primary_rays);
     assert_near(noisy.noise, denoised.noise, 0.0);
@@ -174,9 +175,9 @@ TEST_LONG(a_picture_stops_alike_however_it_is_cut)
 {
     struct fixture *fixture = *state;
     half_noisy(fixture);
-    fixture->request.samples = 64;
+    fixture->request.sampling.samples = 64;
     for (int traced = 0; traced < 2; traced++) {
-        fixture->request.primary = traced ? PRIMARY_TRACE : PRIMARY_RASTER;
+        fixture->request.tracing.primary = traced ? PRIMARY_TRACE : PRIMARY_RASTER;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);
         struct frame_result whole = fixture_render(fixture);
         frame_renderer_set_capacity(fixture->renderer, 1000, 1000);
@@ -189,18 +190,18 @@ TEST_LONG(a_picture_stops_alike_however_it_is_cut)
         assert_memory_equal(whole.pixels, queued.pixels, whole.size_bytes);
         frame_result_finish(&queued);
         frame_renderer_queue_ahead(fixture->renderer, false);
-        fixture->request.accumulate = true;
+        fixture->request.sampling.accumulate = true;
         fixture->request.samples_max = 64;
         for (uint32_t held = 0; held < 64;) {
-            fixture->request.samples = held < 20 ? 5 : 22;
+            fixture->request.sampling.samples = held < 20 ? 5 : 22;
             struct frame_result part = fixture_render(fixture);
             held = part.samples;
             if (held == 64)
                 assert_memory_equal(whole.pixels, part.pixels, whole.size_bytes);
             frame_result_finish(&part);
         }
-        fixture->request.accumulate = false;
-        fixture->request.samples = 64;
+        fixture->request.sampling.accumulate = false;
+        fixture->request.sampling.samples = 64;
         frame_result_finish(&whole);
         frame_result_finish(&cut);
     }
@@ -214,11 +215,11 @@ TEST(a_picture_without_noise_has_the_fewest_samples_and_is_handed_out_again)
     fixture_square(fixture, 10.0f, flat->base.id, NULL);
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 1.0f;
-    fixture->request.width = 24;
-    fixture->request.height = 20; /* tiles reach beyond it */
-    fixture->request.noise = LIMIT;
-    fixture->request.samples = SAMPLES_MAX;
-    fixture->request.accumulate = true;
+    fixture->request.picture.width = 24;
+    fixture->request.picture.height = 20; /* tiles reach beyond it */
+    fixture->request.sampling.noise = LIMIT;
+    fixture->request.sampling.samples = SAMPLES_MAX;
+    fixture->request.sampling.accumulate = true;
     for (int again = 0; again < 2; again++) {
         struct frame_result result = fixture_render(fixture);
         assert_int_equal(result.samples, 16);
@@ -241,13 +242,11 @@ TEST(what_cannot_stop_by_error_is_refused)
     struct fixture *fixture = *state;
     half_noisy(fixture);
     fixture_commit(fixture);
-    fixture->request.noise = 1.5f;
+    fixture->request.sampling.noise = LIMIT;
+    fixture->request.comparison.compare = true;
+    fixture->request.comparison.compare_with = fixture->request.tracing.tracer;
     expect_refused(fixture);
-    fixture->request.noise = LIMIT;
-    fixture->request.compare = true;
-    fixture->request.compare_with = fixture->request.tracer;
-    expect_refused(fixture);
-    fixture->request.compare = false;
-    fixture->request.view_source = VIEW_SOURCE_LAYERS;
+    fixture->request.comparison.compare = false;
+    fixture->request.picture.view_source = VIEW_SOURCE_LAYERS;
     expect_refused(fixture);
 }

@@ -35,9 +35,9 @@ static inline double psnr(const struct frame_result *a, const struct frame_resul
 static inline void request_picture(struct fixture *fixture, uint32_t depth)
 {
     struct frame_request *request = &fixture->request;
-    request->width = request->height = SIDE;
-    request->format = PIXEL_FORMAT_RGBA8;
-    request->depth = depth;
+    request->picture.width = request->picture.height = SIDE;
+    request->picture.format = PIXEL_FORMAT_RGBA8;
+    request->light.depth = depth;
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
 }
 

@@ -42,9 +42,9 @@ static struct scene_material *a_checker(struct fixture *fixture, const float pla
 
 static struct frame_result rendered(struct fixture *fixture, enum denoise denoise, uint32_t samples, uint64_t seed)
 {
-    fixture->request.denoise = denoise;
-    fixture->request.samples = samples;
-    fixture->request.seed = seed;
+    fixture->request.picture.denoise = denoise;
+    fixture->request.sampling.samples = samples;
+    fixture->request.sampling.seed = seed;
     return fixture_render(fixture);
 }
 
@@ -107,7 +107,7 @@ TEST(an_exposure_for_what_is_dark_filters_no_less)
     wall->value.base_colour[0] = wall->value.base_colour[1] = wall->value.base_colour[2] = 1.0f / 32.0f;
     struct frame_result noisy = rendered(fixture, DENOISE_OFF, 16, 1),
                         usual = rendered(fixture, DENOISE_ON, 16, 1);
-    fixture->request.exposure_stops = 5.0f;
+    fixture->request.picture.exposure_stops = 5.0f;
     struct frame_result exposed = rendered(fixture, DENOISE_ON, 16, 1);
     assert_true(distance(&noisy, &usual) > 0.001);
     for (uint32_t i = 0; i < EDGE * EDGE; i++) /* halves hold a 2048th */
@@ -135,9 +135,9 @@ TEST_LONG(pictures_without_noise_stay_as_they_are)
     struct fixture *fixture = *state;
     static const unsigned integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_RAYCAST};
     fixture_mixture(fixture);
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.tracing.tracer = TRACER_BVH;
     for (size_t i = 0; i < COUNT(integrators); i++) {
-        fixture->request.integrator = integrators[i];
+        fixture->request.light.integrator = integrators[i];
         struct frame_result plain = rendered(fixture, DENOISE_OFF, 4, 0);
         struct frame_result denoised = rendered(fixture, DENOISE_ON, 4, 0);
         assert_same_picture(&plain, &denoised);
@@ -188,8 +188,8 @@ TEST_LONG(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.light.integrator = INTEGRATOR_DISTRIBUTED;
     struct frame_result whole = rendered(fixture, DENOISE_ON, 6, 3);
     frame_renderer_queue_ahead(fixture->renderer, true);
     struct frame_result queued = rendered(fixture, DENOISE_ON, 6, 3);
@@ -202,7 +202,7 @@ TEST_LONG(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
     frame_result_finish(&queued);
     frame_result_finish(&cut);
 
-    fixture->request.accumulate = true;
+    fixture->request.sampling.accumulate = true;
     struct frame_result added = {0};
     for (uint32_t samples = 1; samples <= 3; samples++) { /* 1 + 2 + 3 */
         frame_result_finish(&added);

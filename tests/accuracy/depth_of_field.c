@@ -16,10 +16,10 @@ static void an_edge(struct fixture *fixture)
     const float parent_from_node[12] = {1, 0, 0, 50, 0, 1, 0, 0, 0, 0, 1, EDGE_Z};
     fixture_square(fixture, 50.0f, material->base.id, parent_from_node);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 1.0f); /* so that there is no default sky */
-    fixture->request.width = WIDTH;
-    fixture->request.height = HEIGHT;
-    fixture->request.samples = 256;
-    fixture->request.filter = FILTER_BOX;
+    fixture->request.picture.width = WIDTH;
+    fixture->request.picture.height = HEIGHT;
+    fixture->request.sampling.samples = 256;
+    fixture->request.sampling.pixel_filter = FILTER_BOX;
 }
 
 /* The share of a disc of radius 1 on the far side of a line at `t` from its middle. */
@@ -93,8 +93,8 @@ TEST(what_is_in_focus_is_as_sharp_as_without_a_lens)
 {
     struct fixture *fixture = *state;
     an_edge(fixture);
-    fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.samples = 64;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
+    fixture->request.sampling.samples = 64;
     fixture->request.camera.fov_y = 0.2f;
     struct frame_result sharp = fixture_render(fixture);
     fixture->request.aperture = 0.5f;
@@ -115,7 +115,7 @@ TEST(without_a_focal_distance_the_middle_of_the_scene_is_in_focus)
     fixture_sphere(fixture, 0.5f, 0.0f, -2.0f, 0.5f, material->base.id);
     fixture_sphere(fixture, -0.5f, 0.0f, 2.0f, 0.5f, material->base.id);
     fixture->request.aperture = 0.3f;
-    fixture->request.samples = 4;
+    fixture->request.sampling.samples = 4;
     struct frame_result open = fixture_render(fixture);
     fixture->request.focus = 5.0f;
     struct frame_result stated = fixture_render(fixture);
@@ -138,7 +138,7 @@ TEST(nothing_before_the_near_plane_is_seen_through_a_lens)
     fixture->request.aperture = 2.0f;
     fixture->request.focus = 1.0f; /* rays slant by as much as 45 degrees and more */
     fixture->request.camera.fov_y = 1.0f;
-    fixture->request.samples = 16;
+    fixture->request.sampling.samples = 16;
     for (int beyond = 0; beyond < 2; beyond++) {
         fixture->request.camera.near = beyond ? 5.001f : 4.999f;
         struct frame_result result = fixture_render(fixture);

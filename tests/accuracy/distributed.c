@@ -119,8 +119,8 @@ static const struct scene_motion *motion_of_scene; /* NULL: nothing moves */
 /* Green of every pixel. */
 static void picture(struct fixture *fixture, uint32_t samples, uint64_t seed, double values[PIXELS])
 {
-    fixture->request.samples = samples;
-    fixture->request.seed = seed;
+    fixture->request.sampling.samples = samples;
+    fixture->request.sampling.seed = seed;
     struct frame_result result = fixture_render_motion(fixture, motion_of_scene);
     for (uint32_t i = 0; i < PIXELS; i++)
         values[i] = (double)fixture_pixel(&result, i % EDGE, i / EDGE)[1];
@@ -130,8 +130,8 @@ static void picture(struct fixture *fixture, uint32_t samples, uint64_t seed, do
 static void begin(struct fixture *fixture, void (*build)(struct fixture *fixture))
 {
     path_begin(fixture, TRACER_BVH, 4);
-    fixture->request.filter = FILTER_BLACKMAN_HARRIS;
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
+    fixture->request.sampling.pixel_filter = FILTER_BLACKMAN_HARRIS;
+    fixture->request.light.integrator = INTEGRATOR_DISTRIBUTED;
     motion_of_scene = build == in_motion ? &falling : NULL;
     build(fixture);
 }
@@ -148,9 +148,9 @@ TEST_LONG(where_all_is_smooth_the_mean_is_whitteds_picture)
     double own[PIXELS], whitted[PIXELS], blocks[BLOCKS][SEEDS] = {{0}}, whole[SEEDS] = {0};
     begin(fixture, smooth_things);
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
-        fixture->request.integrator = INTEGRATOR_WHITTED; /* the same places in the pixels */
+        fixture->request.light.integrator = INTEGRATOR_WHITTED; /* the same places in the pixels */
         picture(fixture, SAMPLES, seed, whitted);
-        fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
+        fixture->request.light.integrator = INTEGRATOR_DISTRIBUTED;
         picture(fixture, SAMPLES, seed, own);
         for (uint32_t i = 0; i < PIXELS; i++) {
             blocks[i / EDGE / ACROSS * 4 + i % EDGE / ACROSS][seed] += (own[i] - whitted[i]) / (PIXELS / BLOCKS);
@@ -181,9 +181,9 @@ TEST_LONG(soft_things_converge_without_bias_as_fast_as_independent_samples)
     for (size_t k = 0; k < COUNT(scenes); k++) {
         double truth[PIXELS], found[PIXELS], x_sum = 0.0, y_sum = 0.0, xx = 0.0, xy = 0.0;
         begin(fixture, scenes[k].build);
-        fixture->request.tracer = tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : TRACER_BVH;
+        fixture->request.tracing.tracer = tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : TRACER_BVH;
         picture(fixture, TRUTH_SAMPLES, 99, truth);
-        fixture->request.tracer = TRACER_BVH;
+        fixture->request.tracing.tracer = TRACER_BVH;
         for (uint32_t step = 0, samples = 4; step < STEPS; step++, samples *= 4) {
             double sum = 0.0, squares = 0.0;
             for (uint64_t seed = 0; seed < REPEATS; seed++) {
@@ -226,13 +226,13 @@ TEST(a_moving_surface_covers_a_pixel_for_the_share_of_time_it_is_in_it)
             .node = node, .parent_from_node = {1, 0, 0, 0, 0, 1, 0, -1.5f + 3.0f * (float)i, 0, 0, 1, 0}};
         poses[i] = (struct scene_pose){.nodes = &fall[i], .node_count = 1};
     }
-    fixture->request.width = fixture->request.height = WIDTH;
-    fixture->request.samples = SAMPLES;
-    fixture->request.filter = FILTER_BOX;
+    fixture->request.picture.width = fixture->request.picture.height = WIDTH;
+    fixture->request.sampling.samples = SAMPLES;
+    fixture->request.sampling.pixel_filter = FILTER_BOX;
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 0.8f;
     for (int i = 0; i < 2; i++) {
-        fixture->request.integrator = i ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED;
+        fixture->request.light.integrator = i ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED;
         struct frame_result result = fixture_render_motion(fixture, &falling);
         for (uint32_t p = 0; p < WIDTH * WIDTH; p++)
             /* a third of the time, and one in each 256th of it: off by a sample at each end */
@@ -245,8 +245,8 @@ TEST_LONG(motion_of_other_content_begins_an_accumulated_picture_from_new)
 {
     struct fixture *fixture = *state;
     begin(fixture, in_motion);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 2;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 2;
     static const uint32_t expected[] = {2, 4, 2, 4, 2};
     for (int i = 0; i < 5; i++) {
         if (i == 2)
@@ -263,7 +263,7 @@ TEST_LONG(coverage_is_1_where_translucent_panes_stand_before_a_wall)
 {
     struct fixture *fixture = *state;
     begin(fixture, smooth_things);
-    fixture->request.samples = 7;
+    fixture->request.sampling.samples = 7;
     struct frame_result result = fixture_render(fixture);
     for (uint32_t i = 0; i < PIXELS; i++)
         assert_near(fixture_pixel(&result, i % EDGE, i / EDGE)[3], 1.0, 0.0);
@@ -274,8 +274,8 @@ TEST_LONG(a_sample_has_one_shadow_ray_a_hit_and_one_child_at_most)
 {
     struct fixture *fixture = *state;
     begin(fixture, smooth_things);
-    fixture->request.samples = 16;
-    fixture->request.depth = 3;
+    fixture->request.sampling.samples = 16;
+    fixture->request.light.depth = 3;
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.splits, 0);
     assert_true(result.shadow_rays <= result.primary_rays + result.secondary_rays);

@@ -118,11 +118,11 @@ static void expect_few_calls(struct fixture *fixture, unsigned tracer, unsigned 
                              enum primary_kind primary)
 {
     memset(&calls, 0, sizeof(calls));
-    fixture->request.integrator = integrator;
-    fixture->request.depth = 4;
-    fixture->request.samples = samples;
-    fixture->request.tracer = tracer;
-    fixture->request.primary = primary;
+    fixture->request.light.integrator = integrator;
+    fixture->request.light.depth = 4;
+    fixture->request.sampling.samples = samples;
+    fixture->request.tracing.tracer = tracer;
+    fixture->request.tracing.primary = primary;
     struct frame_result result = fixture_render(fixture);
     frame_result_finish(&result);
     assert_int_equal(calls.locations, 0);
@@ -143,7 +143,7 @@ TEST_LONG(so_do_those_of_other_tracers_integrators_and_layers)
     static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_LDC, TRACER_ABUFFER},
                           integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_PATH, INTEGRATOR_AO};
     fixture_mixture(fixture);
-    fixture->request.layers = LAYER_BITS_SEEN | LAYER_BITS_CRYPTO;
+    fixture->request.picture.layers = LAYER_BITS_SEEN | LAYER_BITS_CRYPTO;
     for (unsigned i = 0; i < 3; i++)
         for (unsigned k = 0; k < 4; k++)
             expect_few_calls(fixture, tracers[k], integrators[i], 2, (i + k) % 2 ? PRIMARY_TRACE : PRIMARY_RASTER);
@@ -154,9 +154,9 @@ TEST(the_driver_is_not_asked_for_a_reset_in_every_pass)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.integrator = INTEGRATOR_WHITTED;
-    fixture->request.depth = 4;
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.depth = 4;
+    fixture->request.tracing.tracer = TRACER_BVH;
     for (unsigned ahead = 0; ahead < 2; ahead++) {
         frame_renderer_queue_ahead(fixture->renderer, ahead);
         struct frame_result first = fixture_render(fixture);

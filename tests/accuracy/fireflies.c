@@ -37,16 +37,16 @@ static struct scene_material *a_lamp(struct fixture *fixture, float half, float 
 static void begin(struct fixture *fixture, enum integrator_kind integrator, uint32_t depth)
 {
     path_begin(fixture, TRACER_REFERENCE, depth);
-    fixture->request.integrator = integrator;
+    fixture->request.light.integrator = integrator;
 }
 
 static float *picture(struct fixture *fixture, float clamp, uint32_t samples, uint64_t seed)
 {
     float *pixels = malloc(PIXELS * 4 * sizeof(*pixels));
     assert_non_null(pixels);
-    fixture->request.clamp = clamp;
-    fixture->request.samples = samples;
-    fixture->request.seed = seed;
+    fixture->request.light.clamp = clamp;
+    fixture->request.sampling.samples = samples;
+    fixture->request.sampling.seed = seed;
     struct frame_result result = fixture_render(fixture);
     for (uint32_t i = 0; i < PIXELS; i++)
         memcpy(pixels + (size_t)4 * i, fixture_pixel(&result, i % EDGE, i / EDGE), 4 * sizeof(*pixels));
@@ -112,7 +112,7 @@ TEST(a_sample_brings_no_more_than_the_limit)
     a_lamp(fixture, 0.1f, 0.0f, 1.21f, 1000.0f);
     fixture_look(fixture, 1.2f, 0.3f, 0.5f, 0.8f);
     const struct summary off = summary_of(fixture, 0.0f, 4), on = summary_of(fixture, 2.0f, 4);
-    fixture->request.exposure_stops = 1.0f; /* the limit is that of the picture's values */
+    fixture->request.picture.exposure_stops = 1.0f; /* the limit is that of the picture's values */
     const struct summary exposed = summary_of(fixture, 4.0f, 4);
     print_message("maximum %.3f, limited %.3f; mean %.4f, limited %.4f\n", off.most, on.most, off.mean, on.mean);
     assert_true(off.most > 10.0);

@@ -14,10 +14,10 @@ static void take_as_measured(float one, float several)
 
 static struct frame_result render(struct fixture *fixture, unsigned tracer, enum primary_kind primary)
 {
-    fixture->request.tracer = tracer;
+    fixture->request.tracing.tracer = tracer;
     fixture->request.tracer_options.ldc.resolution = 64;
     fixture->request.tracer_options.abuffer.resolution = 64;
-    fixture->request.primary = primary;
+    fixture->request.tracing.primary = primary;
     return fixture_render(fixture);
 }
 
@@ -64,9 +64,9 @@ static void expect_choices(struct fixture *fixture, bool of_bvh)
             continue;
         take_as_measured(rows[i].one, rows[i].several);
         device->measured.known = rows[i].measured;
-        fixture->request.samples = rows[i].samples;
-        fixture->request.width = rows[i].width;
-        fixture->request.height = rows[i].height;
+        fixture->request.sampling.samples = rows[i].samples;
+        fixture->request.picture.width = rows[i].width;
+        fixture->request.picture.height = rows[i].height;
         assert_chosen(fixture, rows[i].tracer, rows[i].expected);
     }
 }
@@ -87,16 +87,16 @@ TEST(frames_that_add_up_have_the_choice_of_one_frame_of_all_samples)
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
     take_as_measured(1e9f, 0.0f); /* several samples are traced, one is not */
-    fixture->request.accumulate = true;
-    fixture->request.samples = 6;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 6;
     struct frame_result whole = render(fixture, TRACER_BVH, PRIMARY_AUTO);
-    fixture->request.seed++; /* something else in between */
-    fixture->request.samples = 1;
+    fixture->request.sampling.seed++; /* something else in between */
+    fixture->request.sampling.samples = 1;
     struct frame_result sum = render(fixture, TRACER_BVH, PRIMARY_AUTO);
-    fixture->request.seed--;
+    fixture->request.sampling.seed--;
     for (uint32_t samples = 1; samples <= 3; samples++) {
         frame_result_finish(&sum);
-        fixture->request.samples = samples;
+        fixture->request.sampling.samples = samples;
         sum = render(fixture, TRACER_BVH, PRIMARY_AUTO);
     }
     assert_int_equal(sum.samples, 6);

@@ -35,10 +35,10 @@ EACH_TEST(fixture_clear, NULL)
 static void build(struct fixture *fixture)
 {
     fixture_mixture(fixture);
-    fixture->request.width = 24;
-    fixture->request.height = 18;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.picture.width = 24;
+    fixture->request.picture.height = 18;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 64;
 }
 
@@ -90,18 +90,18 @@ TEST_LONG(the_host_waits_once_whatever_the_integrator_tracer_and_layers)
     for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++)
         for (size_t k = 0; k < sizeof(tracers) / sizeof(tracers[0]); k++) {
             char what[64];
-            fixture->request.integrator = forms[i].integrator;
-            fixture->request.depth = forms[i].depth;
-            fixture->request.samples = forms[i].samples;
-            fixture->request.tracer = tracers[k];
-            fixture->request.primary = (i + k) % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
+            fixture->request.light.integrator = forms[i].integrator;
+            fixture->request.light.depth = forms[i].depth;
+            fixture->request.sampling.samples = forms[i].samples;
+            fixture->request.tracing.tracer = tracers[k];
+            fixture->request.tracing.primary = (i + k) % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
             snprintf(what, sizeof(what), "integrator %u, tracer %u", forms[i].integrator, tracers[k]);
             assert_ahead_is_as_waiting(fixture, what);
         }
-    fixture->request.layers = LAYER_BITS_SEEN | LAYER_BITS_CRYPTO;
+    fixture->request.picture.layers = LAYER_BITS_SEEN | LAYER_BITS_CRYPTO;
     assert_ahead_is_as_waiting(fixture, "all layers");
-    fixture->request.layers = LAYER_BITS_SEEN | LAYER_BITS_LIGHT;
-    fixture->request.integrator = INTEGRATOR_PATH;
+    fixture->request.picture.layers = LAYER_BITS_SEEN | LAYER_BITS_LIGHT;
+    fixture->request.light.integrator = INTEGRATOR_PATH;
     assert_ahead_is_as_waiting(fixture, "layers of light");
 }
 
@@ -111,9 +111,9 @@ TEST_LONG(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
 {
     struct fixture *fixture = *state;
     build(fixture);
-    fixture->request.width = 48;
-    fixture->request.height = 36;
-    fixture->request.tracer = TRACER_RAYSPACE;
+    fixture->request.picture.width = 48;
+    fixture->request.picture.height = 36;
+    fixture->request.tracing.tracer = TRACER_RAYSPACE;
     static const char *const kinds[RAY_COUNT] = {"primary", "secondary", "shadow"};
     for (uint32_t mode = RAYSPACE_MODE_JOINT; mode <= RAYSPACE_MODE_FLAT; mode++) {
         fixture->request.tracer_options.rayspace.mode = mode;
@@ -133,7 +133,7 @@ TEST_LONG(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
         frame_result_finish(&waiting);
         frame_result_finish(&ahead);
     }
-    fixture->request.primary = PRIMARY_RASTER;
+    fixture->request.tracing.primary = PRIMARY_RASTER;
     struct frame_result rasterised = render(fixture, true);
     assert_int_equal(structure_row(&rasterised.structure, "primary/waves").number, 0);
     assert_in_range(structure_row(&rasterised.structure, "shadow/waves").number, 1, 1000);
@@ -145,7 +145,7 @@ TEST(a_slice_that_overflows_on_the_device_is_done_again_in_order)
     struct fixture *fixture = *state;
     build(fixture);
     for (unsigned samples = 1; samples <= 3; samples += 2) {
-        fixture->request.samples = samples;
+        fixture->request.sampling.samples = samples;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);
         struct frame_result whole = render(fixture, false);
         frame_renderer_set_capacity(fixture->renderer, 128, 128);
@@ -163,8 +163,8 @@ TEST(one_pixel_that_overflows_gets_larger_buffers)
 {
     struct fixture *fixture = *state;
     build(fixture);
-    fixture->request.width = 6;
-    fixture->request.height = 4;
+    fixture->request.picture.width = 6;
+    fixture->request.picture.height = 4;
     struct frame_result whole = render(fixture, false);
     frame_renderer_set_capacity(fixture->renderer, 1, 1);
     struct frame_result grown = render(fixture, true);
@@ -186,10 +186,10 @@ TEST(rays_behind_the_last_queued_wave_are_not_lost)
         fixture_square(fixture, 1.0f, pane->base.id, at);
     }
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
-    fixture->request.depth = 1;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.integrator = INTEGRATOR_RAYCAST;
-    fixture->request.layer_opacity = 0.1f;
+    fixture->request.light.depth = 1;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.light.integrator = INTEGRATOR_RAYCAST;
+    fixture->request.light.layer_opacity = 0.1f;
     struct frame_result waiting = render(fixture, false), ahead = render(fixture, true);
     assert_same_picture(&waiting, &ahead);
     assert_int_equal(ahead.secondary_rays, waiting.secondary_rays);
@@ -242,11 +242,11 @@ TEST_LONG(slices_are_as_large_as_the_device_can_do_in_a_step)
     struct frame_result large = {0}, small = {0};
     fixture_mixture(fixture);
     fixture_commit(fixture);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.integrator = INTEGRATOR_RAYCAST;
-    fixture->request.depth = 0;
-    fixture->request.width = 512;
-    fixture->request.height = 512;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.light.integrator = INTEGRATOR_RAYCAST;
+    fixture->request.light.depth = 0;
+    fixture->request.picture.width = 512;
+    fixture->request.picture.height = 512;
     unsigned few = 0, many = 0;
     for (int i = 0; i < 2; i++) /* learnt from picture to picture */
         many = steps_of(fixture, 1, &small);
@@ -285,7 +285,7 @@ TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
 static uint32_t dispatches_of(struct fixture *fixture, enum integrator_kind integrator)
 {
     struct frame_result result = {0};
-    fixture->request.integrator = integrator;
+    fixture->request.light.integrator = integrator;
     for (int i = 0; i < 3; i++)
         (void)steps_of(fixture, 4000000000u, &result);
     const uint32_t dispatches = result.dispatches;
@@ -302,8 +302,8 @@ TEST_LONG(a_slice_has_no_dispatches_but_those_of_its_passes)
     struct fixture *fixture = *state;
     build(fixture);
     fixture_commit(fixture);
-    fixture->request.width = fixture->request.height = 512;
-    fixture->request.depth = BOUNCES;
+    fixture->request.picture.width = fixture->request.picture.height = 512;
+    fixture->request.light.depth = BOUNCES;
     const uint32_t whitted = dispatches_of(fixture, INTEGRATOR_WHITTED);
     const uint32_t path = dispatches_of(fixture, INTEGRATOR_PATH); /* which goes straight on as often, too */
     if (whitted > PASSES_A_WAVE * (1 + BOUNCES) || path > PASSES_A_WAVE * (1 + 2 * BOUNCES))
@@ -325,8 +325,8 @@ TEST(slices_are_no_larger_than_the_device_has_memory_and_texels_for)
                 {"no more texels than OpenGL promises", (uint64_t)8 << 30, 1u << 16, 1u << 13},
                 {"hardly any memory", 1 << 20, 1u << 27, 1u << 12}};
     build(fixture);
-    fixture->request.width = fixture->request.height = 128;
-    fixture->request.depth = 0;
+    fixture->request.picture.width = fixture->request.picture.height = 128;
+    fixture->request.light.depth = 0;
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         device->facts.memory.bytes = rows[i].memory_bytes;
         device->facts.texture_buffer_texels_max = rows[i].texels;

@@ -79,17 +79,17 @@ static struct frame_request view_request(struct fixture *fixture, uint32_t view)
         {INTEGRATOR_WHITTED, PRIMARY_TRACE, TRACER_BVH, 80, 60, 1, 0, false, true},
     };
     struct frame_request request = fixture->request;
-    request.integrator = views[view].integrator;
-    request.primary = views[view].primary;
-    request.tracer = views[view].tracer;
-    request.width = views[view].width;
-    request.height = views[view].height;
-    request.samples = views[view].samples;
-    request.layers = views[view].layers;
-    request.accumulate = views[view].accumulate;
-    request.compare = views[view].compare;
-    request.compare_with = TRACER_NAIVE;
-    request.seed = view;
+    request.light.integrator = views[view].integrator;
+    request.tracing.primary = views[view].primary;
+    request.tracing.tracer = views[view].tracer;
+    request.picture.width = views[view].width;
+    request.picture.height = views[view].height;
+    request.sampling.samples = views[view].samples;
+    request.picture.layers = views[view].layers;
+    request.sampling.accumulate = views[view].accumulate;
+    request.comparison.compare = views[view].compare;
+    request.comparison.compare_with = TRACER_NAIVE;
+    request.sampling.seed = view;
     request.tracer_options.ldc.resolution = 64;
     const float eye[3] = {(float)view - 2.5f, 0.5f, 5.0f}, target[3] = {0}, up[3] = {0, 1, 0};
     assert_true(frame_camera_look_at(&request.camera, eye, target, up, 0.6f));
@@ -242,8 +242,8 @@ TEST(tracers_in_use_stay)
     for (uint32_t i = 0; i < 6; i++) {
         renderers[i] = another_renderer(fixture);
         requests[i] = fixture->request;
-        requests[i].tracer = TRACER_LDC;
-        requests[i].primary = PRIMARY_TRACE;
+        requests[i].tracing.tracer = TRACER_LDC;
+        requests[i].tracing.primary = PRIMARY_TRACE;
         requests[i].tracer_options.ldc.resolution = 32 + 16 * (i % 5);
     }
     for (uint32_t i = 0; i < 4; i++)
@@ -261,8 +261,8 @@ TEST(tracers_in_use_stay)
     /* Two at once need two. */
     for (uint32_t i = 1; i < 4; i++)
         begin(fixture, renderers[i], &requests[i]);
-    requests[0].compare = true;
-    requests[0].compare_with = TRACER_NAIVE;
+    requests[0].comparison.compare = true;
+    requests[0].comparison.compare_with = TRACER_NAIVE;
     assert_false(frame_may_begin(renderers[0], fixture->scene, NULL, &requests[0]));
     frame_abandon(renderers[1]);
     begin(fixture, renderers[0], &requests[0]);
@@ -294,7 +294,7 @@ TEST(samples_are_not_added_to_those_from_before_others_moved_something)
     struct scene_pose pose = {.nodes = &place, .node_count = 1};
     const struct scene_motion motion = {.poses = &pose, .pose_count = 1};
     struct frame_request request = fixture->request;
-    request.accumulate = true;
+    request.sampling.accumulate = true;
     static const uint32_t held[] = {1, 2, 1, 2};
     for (int i = 0; i < 4; i++) {
         begin(fixture, fixture->renderer, &request);
@@ -329,11 +329,11 @@ TEST_LONG(pictures_that_are_read_back_beside_others_are_the_same)
     build_scene(fixture);
     for (int i = 0; i < 3; i++) {
         struct frame_request request = fixture->request;
-        request.width = forms[i].width;
-        request.height = forms[i].height;
-        request.layers = forms[i].layers;
-        request.format = forms[i].format;
-        request.depth = 1;
+        request.picture.width = forms[i].width;
+        request.picture.height = forms[i].height;
+        request.picture.layers = forms[i].layers;
+        request.picture.format = forms[i].format;
+        request.light.depth = 1;
         begin(fixture, fixture->renderer, &request);
         alone[i] = finish(fixture->renderer);
         begin(fixture, fixture->renderer, &request);
@@ -364,9 +364,9 @@ TEST(a_renderer_without_a_frame_in_progress_holds_only_a_picture)
     struct fixture *fixture = *state;
     struct frame_renderer *renderers[WATCHERS];
     build_scene(fixture);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.width = 160;
-    fixture->request.height = 120;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.picture.width = 160;
+    fixture->request.picture.height = 120;
     begin(fixture, fixture->renderer, &fixture->request);
     struct frame_result result = finish(fixture->renderer);
     frame_result_finish(&result);

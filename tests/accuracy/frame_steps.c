@@ -72,7 +72,7 @@ static struct frame_result render_counted(struct fixture *fixture, unsigned trac
     counted[tracer] = *behind;
     counted[tracer].trace_range = count_rays;
     frame_renderer_stand_in(fixture->renderer, tracer, &counted[tracer]);
-    fixture->request.tracer = tracer;
+    fixture->request.tracing.tracer = tracer;
     *counts = (struct counts){0};
     if (!frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error))
         fail_msg("frame_begin: %s: %s", error.field, error.text);
@@ -132,14 +132,14 @@ TEST(no_step_is_long_where_rays_are_slow)
     };
     a_crowded_scene(fixture);
     fixture_commit(fixture);
-    fixture->request.width = 128;
-    fixture->request.height = 72;
+    fixture->request.picture.width = 128;
+    fixture->request.picture.height = 72;
     for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? sizeof(forms) / sizeof(forms[0]) : 1); i++) {
-        fixture->request.integrator = forms[i].integrator;
-        fixture->request.samples = forms[i].samples;
-        fixture->request.ao_rays = forms[i].ao_rays;
-        fixture->request.layers = forms[i].layers;
-        fixture->request.primary = forms[i].primary;
+        fixture->request.light.integrator = forms[i].integrator;
+        fixture->request.sampling.samples = forms[i].samples;
+        fixture->request.light.ao_rays = forms[i].ao_rays;
+        fixture->request.picture.layers = forms[i].layers;
+        fixture->request.tracing.primary = forms[i].primary;
         expect_short_steps(fixture, TRACER_BVH, forms[i].name);
     }
 }
@@ -149,11 +149,11 @@ TEST_LONG(every_tracer_finds_the_same_in_parts)
     struct fixture *fixture = *state;
     a_crowded_scene(fixture);
     fixture_commit(fixture);
-    fixture->request.width = 80;
-    fixture->request.height = 45;
-    fixture->request.samples = 2;
-    fixture->request.integrator = INTEGRATOR_PATH;
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.picture.width = 80;
+    fixture->request.picture.height = 45;
+    fixture->request.sampling.samples = 2;
+    fixture->request.light.integrator = INTEGRATOR_PATH;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 128;
     for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++)
         if (tracer_impl_by_number(tracer))
@@ -226,11 +226,11 @@ TEST(many_triangles_are_drawn_in_parts_and_none_is_left_out)
     fixture_sphere(fixture, -0.8f, 0.4f, 0.4f, 0.4f, ball->base.id); /* drawn after all triangles */
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);
     fixture_commit(fixture);
-    fixture->request.width = fixture->request.height = 64;
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.picture.width = fixture->request.picture.height = 64;
+    fixture->request.tracing.tracer = TRACER_BVH;
     struct frame_result drawn = {0}, traced = {0};
     uint32_t steps = count_steps(fixture, &drawn);
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     uint32_t steps_traced = count_steps(fixture, &traced);
     print_message("%u steps, traced %u\n", steps, steps_traced);
     /* Two instances: 480,000 triangles. */
@@ -257,8 +257,8 @@ static void a_field_and_a_ball(struct fixture *fixture)
     fixture_sphere(fixture, -0.8f, 0.4f, 0.4f, 0.4f, ball->base.id);
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);
     fixture_commit(fixture);
-    fixture->request.width = fixture->request.height = 64;
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.picture.width = fixture->request.picture.height = 64;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 128;
 }
 
@@ -331,7 +331,7 @@ enum { WAYS = sizeof(ways) / sizeof(ways[0]) };
 
 static bool take_way(struct fixture *fixture, const struct way *way)
 {
-    fixture->request.tracer = way->tracer;
+    fixture->request.tracing.tracer = way->tracer;
     fixture->request.tracer_options.ldc.form = way->ldc_form;
     return tracer_impl_by_number(way->tracer) != NULL;
 }

@@ -24,10 +24,10 @@ static void build_scene(struct fixture *fixture)
         fixture_sphere(fixture, 1.1f * cosf(angle), 1.1f * sinf(angle), 0.0f, 0.45f, glow->base.id);
     }
     fixture_commit(fixture);
-    fixture->request.format = PIXEL_FORMAT_RGBA8;
-    fixture->request.samples = 4;
-    fixture->request.depth = 2;
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA8;
+    fixture->request.sampling.samples = 4;
+    fixture->request.light.depth = 2;
+    fixture->request.tracing.tracer = TRACER_BVH;
 }
 
 static void assert_code(const char *plane, uint32_t x, uint32_t y, uint8_t code, double exact)
@@ -74,8 +74,8 @@ TEST(planes_are_those_of_the_pixels_at_any_size)
     const size_t count = sizeof(sizes) / sizeof(*sizes) - (getenv("FARLIGHT_TEST_LONG") ? 0 : 1);
     build_scene(fixture);
     for (size_t i = 0; i < count; i++) {
-        fixture->request.width = sizes[i][0];
-        fixture->request.height = sizes[i][1];
+        fixture->request.picture.width = sizes[i][0];
+        fixture->request.picture.height = sizes[i][1];
         struct frame_result pixels = fixture_render(fixture);
         assert_int_equal(pixels.ycbcr, YCBCR_NONE);
         for (enum ycbcr kind = YCBCR_VIDEO; kind <= YCBCR_JPEG; kind++) {
@@ -93,8 +93,8 @@ TEST(attachments_lie_behind_planes_as_behind_pixels)
     struct fixture *fixture = *state;
     const size_t bytes = (size_t)4 * 37 * 23;
     build_scene(fixture);
-    fixture->request.width = 37;
-    fixture->request.height = 23;
+    fixture->request.picture.width = 37;
+    fixture->request.picture.height = 23;
     fixture->request.attachments = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS;
     struct frame_result pixels = fixture_render(fixture), planes = convert(fixture, YCBCR_VIDEO);
     assert_planes(&planes, &(struct exact_picture){pixels.pixels, 37, 23, YCBCR_VIDEO});
@@ -111,7 +111,7 @@ TEST(frames_add_up_whatever_form_each_comes_in)
 {
     struct fixture *fixture = *state;
     build_scene(fixture);
-    fixture->request.accumulate = true;
+    fixture->request.sampling.accumulate = true;
     struct frame_result first = convert(fixture, YCBCR_JPEG), second = fixture_render(fixture);
     assert_int_equal(second.samples, 8);
     struct frame_result third = convert(fixture, YCBCR_VIDEO);
@@ -127,7 +127,7 @@ TEST(only_what_is_shown_in_8_bits_is_converted)
     struct error error = {0};
     build_scene(fixture);
     fixture->request.ycbcr = YCBCR_JPEG;
-    fixture->request.format = PIXEL_FORMAT_RGBA16F;
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA16F;
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "format");

@@ -20,11 +20,11 @@ static void begin(struct fixture *fixture, enum integrator_kind integrator)
     mirror->value.metallic = 1.0f;
     mirror->value.roughness = 0.0f;
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, (float)RADIUS, mirror->base.id);
-    fixture->request.width = fixture->request.height = EDGE;
-    fixture->request.filter = FILTER_BOX;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.integrator = integrator;
-    fixture->request.background = BACKGROUND_TRANSPARENT;
+    fixture->request.picture.width = fixture->request.picture.height = EDGE;
+    fixture->request.sampling.pixel_filter = FILTER_BOX;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.light.integrator = integrator;
+    fixture->request.picture.background = BACKGROUND_TRANSPARENT;
     fixture->request.ground = (struct frame_ground){
         .centre_world = {0.0f, (float)-HEIGHT, 0.0f}, .normal_world = {0.0f, 1.0f, 0.0f}, .radius = 40.0f};
     fixture_look(fixture, 0.0f, 2.0f, 4.5f, 0.7f);
@@ -74,8 +74,8 @@ TEST(a_sun_throws_the_shadow_of_a_sphere_and_elsewhere_nothing_is_seen)
         for (size_t t = 0; t < (is_long ? COUNT(tracers) : 1); t++) {
             begin(fixture, shading[i]);
             sun(fixture, 3.0f);
-            fixture->request.tracer = tracers[t];
-            fixture->request.primary = t == 0 ? PRIMARY_RASTER : PRIMARY_TRACE;
+            fixture->request.tracing.tracer = tracers[t];
+            fixture->request.tracing.primary = t == 0 ? PRIMARY_RASTER : PRIMARY_TRACE;
             fixture->request.tracer_options.ldc.resolution = 256;
             struct frame_result result = fixture_render(fixture);
             uint32_t dark = 0, clear_ = 0;
@@ -107,7 +107,7 @@ TEST(light_without_shadows_is_left_in_a_shadow)
     begin(fixture, INTEGRATOR_WHITTED);
     sun(fixture, 3.0f);
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
-    fixture->request.background = BACKGROUND_ENVIRONMENT;
+    fixture->request.picture.background = BACKGROUND_ENVIRONMENT;
     struct frame_result result = fixture_render(fixture);
     const double left = 0.5 / (0.5 + 3.0 / PI);
     uint32_t dark = 0;
@@ -135,9 +135,9 @@ TEST(a_sphere_takes_its_form_factor_of_an_even_sky)
     for (size_t i = 0; i < COUNT(open_); i++) {
         begin(fixture, open_[i]);
         fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
-        fixture->request.samples = SAMPLES;
-        fixture->request.ao_distance = 1000.0f;
-        fixture->request.ao_rays = 4;
+        fixture->request.sampling.samples = SAMPLES;
+        fixture->request.light.ao_distance = 1000.0f;
+        fixture->request.light.ao_rays = 4;
         struct frame_result result = fixture_render(fixture);
         double off = 0.0, darkest = 0.0;
         uint32_t count = 0;
@@ -167,7 +167,7 @@ TEST(what_is_above_the_ground_looks_the_same_without_it)
         begin(fixture, shading[i]);
         sun(fixture, 3.0f);
         fixture_environment(fixture, 0.3f, 0.5f, 0.7f);
-        fixture->request.samples = 4;
+        fixture->request.sampling.samples = 4;
         struct frame_result with = fixture_render(fixture);
         fixture->request.ground.radius = 0.0f;
         struct frame_result without = fixture_render(fixture);

@@ -28,8 +28,8 @@ static void set_up(struct fixture *fixture, double plate_half, double plate)
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, -0.5f, 10.0f);
     fixture_look(fixture, 0.0f, 0.0f, 1.0f, (float)(2.0 * atan(EDGE / 2.0 / FOCAL)));
     struct frame_request *request = &fixture->request;
-    request->width = request->height = EDGE;
-    request->integrator = INTEGRATOR_WHITTED;
+    request->picture.width = request->picture.height = EDGE;
+    request->light.integrator = INTEGRATOR_WHITTED;
     request->attachments = 1u << ATTACHMENT_DEPTH;
     request->hidden_radius = (float)RADIUS;
     fixture_commit(fixture);
@@ -141,10 +141,10 @@ TEST(hidden_layers_that_cannot_be_are_refused)
         struct error error = {0};
         *request = good;
         request->hidden_layer = i == 0 ? 3 : 1;
-        request->accumulate = i == 1;
+        request->sampling.accumulate = i == 1;
         request->aperture = i == 2 ? 0.1f : 0.0f;
-        request->view_source = i == 3 ? VIEW_SOURCE_LAYERS : VIEW_SOURCE_RAYS;
-        request->views_across = i == 4 ? 2 : 0;
+        request->picture.view_source = i == 3 ? VIEW_SOURCE_LAYERS : VIEW_SOURCE_RAYS;
+        request->picture.views_across = i == 4 ? 2 : 0;
         assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, request, &error));
         assert_string_equal(error.field, "hidden_layers");
     }

@@ -21,7 +21,7 @@ static const float *pixel_of(const struct frame_result *result, enum layer layer
 
 static struct frame_result render(struct fixture *fixture, uint32_t layers)
 {
-    fixture->request.layers = layers;
+    fixture->request.picture.layers = layers;
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.layers, layers ? layers : BIT(LAYER_BEAUTY));
     assert_int_equal(result.size_bytes,
@@ -39,9 +39,10 @@ static void ray_of(const struct fixture *fixture, uint32_t x, uint32_t y, double
 {
     const struct frame_request *request = &fixture->request;
     const float *m = request->camera.world_from_view;
-    double half = tan((double)request->camera.fov_y / 2), aspect = (double)request->width / request->height;
-    double view[3] = {((x + 0.5) / request->width * 2 - 1) * half * aspect,
-                      (1 - (y + 0.5) / request->height * 2) * half, -1};
+    double half = tan((double)request->camera.fov_y / 2),
+           aspect = (double)request->picture.width / request->picture.height;
+    double view[3] = {((x + 0.5) / request->picture.width * 2 - 1) * half * aspect,
+                      (1 - (y + 0.5) / request->picture.height * 2) * half, -1};
     double length = sqrt(view[0] * view[0] + view[1] * view[1] + 1);
     for (int i = 0; i < 3; i++) {
         origin[i] = (double)m[4 * i + 3];
@@ -99,10 +100,10 @@ TEST(planes_are_where_they_are_and_look_to_the_eye)
             fixture->edits[0].set.node.value.kind = NODE_MESH;
             fixture->edits[0].set.node.value.object = node - 1;
         }
-        fixture->request.primary = way % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
+        fixture->request.tracing.primary = way % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
         for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? sizeof(tracers) / sizeof(tracers[0]) : 1); i++) {
             struct error none = {0};
-            fixture->request.tracer = tracers[i];
+            fixture->request.tracing.tracer = tracers[i];
             if (tracer_find(tracers[i], "", &none))
                 expect_plane(fixture, normal, middle, ROUNDING_METRES);
         }
@@ -134,10 +135,10 @@ TEST_LONG(sampled_structures_have_layers_too)
     memcpy(red->value.base_colour, (float[4]){0.5f, 0.25f, 0.125f, 1}, sizeof(red->value.base_colour));
     uint32_t material = red->base.id;
     fixture_square(fixture, 5, material, at);
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 256;
     for (unsigned tracer = TRACER_LDC; tracer <= TRACER_ABUFFER; tracer++) {
-        fixture->request.tracer = tracer;
+        fixture->request.tracing.tracer = tracer;
         expect_plane(fixture, normal, middle, 10.0 / 256); /* a cell */
         struct frame_result result = render(fixture, BIT(LAYER_ALBEDO) | BIT(LAYER_ID));
         float node = tracer == TRACER_ABUFFER ? (float)(fixture->next_id - 1) : 0; /* cubes do not know it */
@@ -170,7 +171,7 @@ TEST(albedo_is_the_textures_colour_and_covers_what_is_seen)
     use_texture(material, MATERIAL_BASE_COLOUR, image);
     fixture_square(fixture, 1, material->base.id, NULL);
     for (uint32_t samples = 1; samples <= 16; samples *= 16) {
-        fixture->request.samples = samples;
+        fixture->request.sampling.samples = samples;
         struct frame_result result = render(fixture, BIT(LAYER_ALBEDO));
         /* The square is 2 of 3.09 m: pixels 6 to 26, whose neighbours a sample's filter reaches. */
         for (uint32_t quarter = 0; quarter < 4; quarter++) {
@@ -238,14 +239,14 @@ TEST(identifiers_are_the_clients)
     fixture_commit(fixture);
     const unsigned tracers[] = {TRACER_BVH, TRACER_NAIVE, TRACER_BVH};
     for (int i = 0; i < 3; i++) {
-        fixture->request.tracer = tracers[i];
-        fixture->request.primary = i == 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
-        fixture->request.samples = i == 2 ? 4 : 1;
+        fixture->request.tracing.tracer = tracers[i];
+        fixture->request.tracing.primary = i == 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
+        fixture->request.sampling.samples = i == 2 ? 4 : 1;
         struct frame_result result = render(fixture, BIT(LAYER_ID));
         expect_id(&result, 5, square_node, materials[0], 1);
         expect_id(&result, 16, sphere_node, materials[1], 1);
         expect_id(&result, 26, 0, materials[2], 1);
-        if (fixture->request.samples == 1)
+        if (fixture->request.sampling.samples == 1)
             expect_id(&result, 31, 0, 0, 0);
         frame_result_finish(&result);
     }
@@ -276,13 +277,13 @@ TEST_LONG(openness_is_that_of_the_integrator_ao)
     fixture_square(fixture, 3, 0, floor);
     fixture_sphere(fixture, 0, 0, 0, 0.5f, 0);
     fixture_look(fixture, 0, 2, 4, 0.7f);
-    fixture->request.samples = 2;
-    fixture->request.ao_distance = 1.5f;
-    fixture->request.ao_rays = 24;
+    fixture->request.sampling.samples = 2;
+    fixture->request.light.ao_distance = 1.5f;
+    fixture->request.light.ao_rays = 24;
     for (int falloff = 0; falloff < 2; falloff++) {
-        fixture->request.tracer = TRACER_BVH;
-        fixture->request.ao_falloff = (float)falloff;
-        fixture->request.integrator = INTEGRATOR_AO;
+        fixture->request.tracing.tracer = TRACER_BVH;
+        fixture->request.light.ao_falloff = (float)falloff;
+        fixture->request.light.integrator = INTEGRATOR_AO;
         struct frame_result result = render(fixture, BIT(LAYER_BEAUTY) | BIT(LAYER_AO));
         double minimum = 1, sum = 0;
         uint32_t compared = 0;
@@ -301,7 +302,7 @@ TEST_LONG(openness_is_that_of_the_integrator_ao)
         assert_true(minimum < 0.5 && sum / compared > 0.7); /* dark below the ball, open elsewhere */
         frame_result_finish(&result);
     }
-    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
     struct frame_result result = render(fixture, BIT(LAYER_AO));
     assert_true(pixel_of(&result, LAYER_AO, 16, 0)[3] == 0); /* nothing is seen there, and it is not open either */
     assert_true(pixel_of(&result, LAYER_AO, 16, 0)[0] == 0);
@@ -334,12 +335,12 @@ TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is)
     struct fixture *fixture = *state;
     add_glass(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.samples = 3;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.sampling.samples = 3;
     struct frame_result layers = render(fixture, BIT(LAYER_NORMAL) | BIT(LAYER_DEPTH));
-    fixture->request.layers = 0;
+    fixture->request.picture.layers = 0;
     for (int format = PIXEL_FORMAT_RGBA8; format <= PIXEL_FORMAT_RGBA32F; format++) {
-        fixture->request.format = (enum pixel_format)format;
+        fixture->request.picture.format = (enum pixel_format)format;
         fixture->request.attachments = 0;
         struct frame_result alone = fixture_render(fixture);
         for (uint32_t attachments = 1; attachments <= 3; attachments++) {
@@ -355,8 +356,8 @@ TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is)
         frame_result_finish(&alone);
     }
     /* The first sample's depth stays where others are added. */
-    fixture->request.accumulate = true;
-    fixture->request.samples = 1;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 1;
     for (int pass = 0; pass < 3; pass++) {
         struct frame_result result = fixture_render(fixture);
         assert_int_equal(result.samples, pass + 1);
@@ -375,10 +376,10 @@ TEST_LONG(neither_the_picture_nor_the_layers_depend_on_each_other)
     const size_t plane_bytes = 32 * 32 * 16;
     add_glass(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    fixture->request.samples = 3;
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.sampling.samples = 3;
+    fixture->request.tracing.tracer = TRACER_BVH;
     for (int integrator = INTEGRATOR_WHITTED; integrator <= INTEGRATOR_PATH; integrator++) {
-        fixture->request.integrator = (enum integrator_kind)integrator;
+        fixture->request.light.integrator = (enum integrator_kind)integrator;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);
         struct frame_result alone = render(fixture, 0), together = render(fixture, ALL);
         struct frame_result beside = render(fixture, ALL & ~BIT(LAYER_BEAUTY));
@@ -404,15 +405,15 @@ TEST_LONG(frames_that_go_on_hold_what_one_of_all_samples_does)
     struct fixture *fixture = *state;
     add_mirrors(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.accumulate = true;
-    fixture->request.samples = 6;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 6;
     struct frame_result at_once = render(fixture, ALL), last = {0};
     assert_int_equal(at_once.samples, 6);
-    fixture->request.seed = 1; /* begins anew */
+    fixture->request.sampling.seed = 1; /* begins anew */
     struct frame_result other = render(fixture, ALL);
-    fixture->request.seed = 0;
-    fixture->request.samples = 2;
+    fixture->request.sampling.seed = 0;
+    fixture->request.sampling.samples = 2;
     for (int i = 0; i < 3; i++) {
         frame_result_finish(&last);
         last = render(fixture, ALL);
@@ -433,8 +434,8 @@ TEST(places_agree_with_depths_through_a_lens)
     struct fixture *fixture = *state;
     add_mirrors(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.samples = 8;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.sampling.samples = 8;
     fixture->request.aperture = 0.2f;
     struct frame_result result = render(fixture, BIT(LAYER_DEPTH) | BIT(LAYER_POSITION));
     const float *m = fixture->request.camera.world_from_view;
@@ -457,12 +458,12 @@ TEST(places_agree_with_depths_through_a_lens)
 TEST(layers_that_there_are_not_or_no_pixel_holds_are_refused)
 {
     struct fixture *fixture = *state;
-    fixture->request.layers = BIT(15);
+    fixture->request.picture.layers = BIT(15);
     fixture_expect_no_layers(fixture, "number 15");
-    fixture->request.layers = BIT(LAYER_DEPTH);
-    fixture->request.format = PIXEL_FORMAT_RGBA16F;
+    fixture->request.picture.layers = BIT(LAYER_DEPTH);
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA16F;
     fixture_expect_no_layers(fixture, "rgba32f");
-    fixture->request.layers = BIT(LAYER_BEAUTY);
+    fixture->request.picture.layers = BIT(LAYER_BEAUTY);
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.size_bytes, 32 * 32 * 8);
     frame_result_finish(&result);

@@ -20,7 +20,7 @@ static void request_cubes(struct fixture *fixture)
 static struct frame_result render(struct fixture *fixture, unsigned tracer, const char *name)
 {
     char kept[128];
-    fixture->request.tracer = tracer;
+    fixture->request.tracing.tracer = tracer;
     struct frame_result result = fixture_render(fixture);
     snprintf(kept, sizeof(kept), "ldc_%s_%s", name, tracer == TRACER_LDC ? "ldc" : "exact");
     fixture_keep(&result, kept);
@@ -86,9 +86,9 @@ static void add_facets(struct fixture *fixture)
     fixture_light(fixture, LIGHT_POINT, 2.5f, 4, 3, 300);
 }
 
-static double share(uint64_t part, const struct wave_comparison *wave)
+static double share(uint64_t part, const struct record_wave_comparison *wave)
 {
-    const uint64_t hits = wave->kind == RAY_SHADOW ? wave->rays : wave->both_hit + wave->only_second;
+    const uint64_t hits = wave->kind == RAY_SHADOW ? wave->rays : wave->both_hit + wave->only_reference;
     assert_true(hits > 5000);
     return (double)part / (double)hits;
 }
@@ -100,25 +100,25 @@ TEST_LONG(first_hits_are_those_of_triangles)
     struct fixture *fixture = *state;
     add_facets(fixture);
     request_cubes(fixture);
-    fixture->request.width = fixture->request.height = 256;
-    fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.tracer = TRACER_LDC;
-    fixture->request.compare = true;
-    fixture->request.compare_with = exact_tracer();
+    fixture->request.picture.width = fixture->request.picture.height = 256;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
+    fixture->request.tracing.tracer = TRACER_LDC;
+    fixture->request.comparison.compare = true;
+    fixture->request.comparison.compare_with = exact_tracer();
     struct frame_result result = fixture_render(fixture);
     assert_true(result.comparison_count >= 2);
     for (uint32_t i = 0; i < result.comparison_count; i++) {
-        const struct wave_comparison *wave = &result.comparisons[i];
+        const struct record_wave_comparison *wave = &result.comparisons[i];
         const bool is_shadow = wave->kind == RAY_SHADOW;
         printf("wave %u %s: %.3f %% only ldc, %.3f %% only the reference, %.3f %% far, %.3f %% normals\n",
-               wave->wave, is_shadow ? "shadow" : "hits", 100 * share(wave->only_first, wave),
-               100 * share(wave->only_second, wave), 100 * share(wave->far, wave),
+               wave->wave, is_shadow ? "shadow" : "hits", 100 * share(wave->only_tracer, wave),
+               100 * share(wave->only_reference, wave), 100 * share(wave->far, wave),
                100 * share(wave->other_surface, wave));
-        assert_true(share(wave->only_second, wave) < 0.002);
+        assert_true(share(wave->only_reference, wave) < 0.002);
         assert_true(is_shadow || (share(wave->far, wave) < 0.0005 && share(wave->other_surface, wave) < 0.002));
     }
     frame_result_finish(&result);
-    fixture->request.compare = false;
+    fixture->request.comparison.compare = false;
     expect_like_the_reference(fixture, "facets, all traced", PSNR_MIN);
 }
 
@@ -149,8 +149,8 @@ TEST(a_picture_of_other_cubes_begins_anew)
 {
     struct fixture *fixture = *state;
     add_mirrors(fixture);
-    fixture->request.tracer = TRACER_LDC;
-    fixture->request.accumulate = true;
+    fixture->request.tracing.tracer = TRACER_LDC;
+    fixture->request.sampling.accumulate = true;
     fixture->request.tracer_options.ldc.resolution = 64;
     for (uint32_t i = 1; i <= 2; i++) {
         struct frame_result result = fixture_render(fixture);
@@ -180,9 +180,9 @@ TEST(what_moves_while_the_shutter_is_open_is_refused_at_once)
     fixture->request.tracer_options.ldc.resolution = 64;
     for (int compare = 0; compare < 2; compare++) {
         struct error error = {0};
-        fixture->request.tracer = compare ? TRACER_BVH : TRACER_LDC;
-        fixture->request.compare = compare;
-        fixture->request.compare_with = TRACER_LDC;
+        fixture->request.tracing.tracer = compare ? TRACER_BVH : TRACER_LDC;
+        fixture->request.comparison.compare = (uint32_t)compare;
+        fixture->request.comparison.compare_with = TRACER_LDC;
         assert_false(frame_begin(fixture->renderer, fixture->scene, &open, &fixture->request, &error));
         assert_int_equal(error.kind, ERROR_UNSUPPORTED);
         assert_string_equal(error.field, "shutter");

@@ -20,8 +20,8 @@ static const float *pixel_of(const struct frame_result *result, enum layer layer
 
 static struct frame_result render(struct fixture *fixture, unsigned integrator)
 {
-    fixture->request.integrator = integrator;
-    fixture->request.layers = ALL;
+    fixture->request.light.integrator = integrator;
+    fixture->request.picture.layers = ALL;
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.layers, ALL);
     return result;
@@ -48,11 +48,11 @@ static void build_mixture(struct fixture *fixture)
     glow->value.emission[0] = glow->value.emission[1] = glow->value.emission[2] = 3.0f;
     fixture_square(fixture, 0.5f, glow->base.id, above);
     fixture_mixture(fixture);
-    fixture->request.width = 24;
-    fixture->request.height = 18;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.depth = 4;
-    fixture->request.samples = 4;
+    fixture->request.picture.width = 24;
+    fixture->request.picture.height = 18;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.light.depth = 4;
+    fixture->request.sampling.samples = 4;
 }
 
 TEST(layers_of_light_add_up_to_the_beauty)
@@ -61,8 +61,8 @@ TEST(layers_of_light_add_up_to_the_beauty)
     build_mixture(fixture);
     for (unsigned integrator = INTEGRATOR_DISTRIBUTED; integrator <= INTEGRATOR_PATH;
          integrator += INTEGRATOR_PATH - INTEGRATOR_DISTRIBUTED) {
-        fixture->request.layers = 0;
-        fixture->request.integrator = integrator;
+        fixture->request.picture.layers = 0;
+        fixture->request.light.integrator = integrator;
         struct frame_result alone = fixture_render(fixture), result = render(fixture, integrator);
         assert_memory_equal(result.pixels, alone.pixels, alone.size_bytes); /* noting changes nothing */
         expect_sum(&result);
@@ -76,20 +76,20 @@ TEST_LONG(layers_of_light_add_up_however_the_beauty_is_made)
 {
     struct fixture *fixture = *state;
     build_mixture(fixture);
-    fixture->request.exposure_stops = 1.5f;
-    fixture->request.background = BACKGROUND_COLOUR;
-    fixture->request.background_colour[0] = 0.25f;
+    fixture->request.picture.exposure_stops = 1.5f;
+    fixture->request.picture.background = BACKGROUND_COLOUR;
+    fixture->request.picture.background_colour[0] = 0.25f;
     fixture->request.ground =
         (struct frame_ground){.centre_world = {0, -0.7f, 0}, .normal_world = {0, 1, 0}, .radius = 9};
     fixture->request.tracer_options.ldc.resolution = 64;
     for (unsigned integrator = INTEGRATOR_DISTRIBUTED; integrator <= INTEGRATOR_PATH;
          integrator += INTEGRATOR_PATH - INTEGRATOR_DISTRIBUTED)
         for (int way = 0; way < 4; way++) {
-            fixture->request.background = way ? BACKGROUND_ENVIRONMENT : BACKGROUND_COLOUR;
-            fixture->request.noise = way == 1 ? 0.2f : 0.0f;
-            fixture->request.samples = way == 1 ? 64 : 3;
-            fixture->request.tracer = way == 2 ? TRACER_LDC : TRACER_BVH;
-            fixture->request.clamp = way == 3 ? 0.1f : 0.0f;
+            fixture->request.picture.background = way ? BACKGROUND_ENVIRONMENT : BACKGROUND_COLOUR;
+            fixture->request.sampling.noise = way == 1 ? 0.2f : 0.0f;
+            fixture->request.sampling.samples = way == 1 ? 64 : 3;
+            fixture->request.tracing.tracer = way == 2 ? TRACER_LDC : TRACER_BVH;
+            fixture->request.light.clamp = way == 3 ? 0.1f : 0.0f;
             struct frame_result result = render(fixture, integrator);
             expect_sum(&result);
             frame_result_finish(&result);
@@ -129,10 +129,10 @@ static void build_things(struct fixture *fixture)
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
     fixture_look(fixture, 0, 0, 5, 0);
     fixture->request.camera.ortho_height = 2;
-    fixture->request.width = 8 * THINGS;
-    fixture->request.height = 8;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.samples = 16;
+    fixture->request.picture.width = 8 * THINGS;
+    fixture->request.picture.height = 8;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.sampling.samples = 16;
 }
 
 /* The middle of one. */
@@ -218,10 +218,10 @@ TEST(light_groups_add_up_to_the_beauty)
     put_into_groups(fixture);
     for (unsigned integrator = INTEGRATOR_DISTRIBUTED; integrator <= INTEGRATOR_PATH;
          integrator += INTEGRATOR_PATH - INTEGRATOR_DISTRIBUTED) {
-        fixture->request.integrator = integrator;
-        fixture->request.layers = 0;
+        fixture->request.light.integrator = integrator;
+        fixture->request.picture.layers = 0;
         struct frame_result alone = fixture_render(fixture);
-        fixture->request.layers = GROUPS;
+        fixture->request.picture.layers = GROUPS;
         struct frame_result result = fixture_render(fixture);
         assert_memory_equal(result.pixels, alone.pixels, alone.size_bytes); /* noting changes nothing */
         expect_sum_of_groups(&result);
@@ -240,19 +240,19 @@ TEST_LONG(light_groups_add_up_however_the_beauty_is_made)
     struct fixture *fixture = *state;
     build_mixture(fixture);
     put_into_groups(fixture);
-    fixture->request.exposure_stops = 1.5f;
-    fixture->request.background_colour[0] = 0.25f;
+    fixture->request.picture.exposure_stops = 1.5f;
+    fixture->request.picture.background_colour[0] = 0.25f;
     fixture->request.ground =
         (struct frame_ground){.centre_world = {0, -0.7f, 0}, .normal_world = {0, 1, 0}, .radius = 9};
     for (unsigned integrator = INTEGRATOR_DISTRIBUTED; integrator <= INTEGRATOR_PATH;
          integrator += INTEGRATOR_PATH - INTEGRATOR_DISTRIBUTED)
         for (int way = 0; way < 3; way++) {
-            fixture->request.background = way ? BACKGROUND_ENVIRONMENT : BACKGROUND_COLOUR;
-            fixture->request.noise = way == 1 ? 0.2f : 0.0f;
-            fixture->request.samples = way == 1 ? 64 : 3;
-            fixture->request.clamp = way == 2 ? 0.1f : 0.0f;
-            fixture->request.integrator = integrator;
-            fixture->request.layers = ALL | GROUPS;
+            fixture->request.picture.background = way ? BACKGROUND_ENVIRONMENT : BACKGROUND_COLOUR;
+            fixture->request.sampling.noise = way == 1 ? 0.2f : 0.0f;
+            fixture->request.sampling.samples = way == 1 ? 64 : 3;
+            fixture->request.light.clamp = way == 2 ? 0.1f : 0.0f;
+            fixture->request.light.integrator = integrator;
+            fixture->request.picture.layers = ALL | GROUPS;
             struct frame_result result = fixture_render(fixture);
             expect_sum(&result);
             expect_sum_of_groups(&result);
@@ -294,9 +294,9 @@ TEST_LONG(a_light_group_is_the_picture_with_the_other_lights_off)
                 put_into_groups(fixture);
                 if (off)
                     leave_group(fixture, group);
-                fixture->request.integrator = integrator;
-                fixture->request.samples = 64;
-                fixture->request.layers = GROUPS;
+                fixture->request.light.integrator = integrator;
+                fixture->request.sampling.samples = 64;
+                fixture->request.picture.layers = GROUPS;
                 struct frame_result result = fixture_render(fixture);
                 const enum layer layer = off ? LAYER_BEAUTY : (enum layer)(LAYER_LIGHT_REST + group);
                 means[off] = mean_of_layer(&result, layer);
@@ -312,10 +312,10 @@ TEST(stored_samples_do_not_tell_which_node_glows)
     struct fixture *fixture = *state;
     build_mixture(fixture);
     put_into_groups(fixture);
-    fixture->request.tracer = TRACER_LDC;
+    fixture->request.tracing.tracer = TRACER_LDC;
     fixture->request.tracer_options.ldc.resolution = 64;
-    fixture->request.integrator = INTEGRATOR_PATH;
-    fixture->request.layers = GROUPS;
+    fixture->request.light.integrator = INTEGRATOR_PATH;
+    fixture->request.picture.layers = GROUPS;
     fixture_commit(fixture);
     fixture_expect_no_layers(fixture, "do not tell which node glows");
 }
@@ -330,11 +330,11 @@ TEST(light_that_does_not_add_up_has_no_layers)
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment.value.display_values = true;
     fixture_commit(fixture);
-    fixture->request.layers = ALL;
-    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.picture.layers = ALL;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
     fixture_expect_no_layers(fixture, "the integrator whitted");
-    fixture->request.integrator = INTEGRATOR_PATH;
+    fixture->request.light.integrator = INTEGRATOR_PATH;
     fixture_expect_no_layers(fixture, "a display's values");
-    fixture->request.view_source = VIEW_SOURCE_LAYERS;
+    fixture->request.picture.view_source = VIEW_SOURCE_LAYERS;
     fixture_expect_no_layers(fixture, "depth layers");
 }

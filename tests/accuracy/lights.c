@@ -177,9 +177,9 @@ static void expect_form(struct fixture *fixture, enum kind kind, unsigned integr
     path_begin(fixture, tracer, depth);
     a_floor(fixture, 1.0f);
     add_light(fixture, kind);
-    fixture->request.integrator = integrator;
-    fixture->request.layer_opacity = 1.0f;
-    fixture->request.samples = 16;
+    fixture->request.light.integrator = integrator;
+    fixture->request.light.layer_opacity = 1.0f;
+    fixture->request.sampling.samples = 16;
     closed_form = rows[kind].form;
     struct mean mean = mean_of_seeds(fixture, off_the_form);
     print_message("%s, integrator %u, tracer %u, depth %u: off by %+.1e, standard error %.1e\n", rows[kind].name,
@@ -201,7 +201,7 @@ TEST(lights_of_every_kind_illuminate_a_floor_as_their_closed_forms_say)
         path_begin(fixture, TRACER_BVH, 1);
         a_floor(fixture, 1.0f);
         add_light(fixture, kind);
-        fixture->request.integrator = INTEGRATOR_WHITTED;
+        fixture->request.light.integrator = INTEGRATOR_WHITTED;
         struct frame_result result = fixture_render(fixture);
         for (uint32_t i = 0; i < PIXELS; i++) {
             double place[2];
@@ -249,7 +249,7 @@ TEST(lights_are_visible_in_mirrors_and_not_directly)
 TEST(lights_are_shadowed_end_at_their_range_and_come_in_batches)
 {
     struct fixture *fixture = *state;
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.tracing.tracer = TRACER_BVH;
     struct scene_material *material = a_floor(fixture, 5.0f);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 2.0f, 7.0f)->value.range = 1.5f;
     fixture_light(fixture, LIGHT_POINT, 6.0f, 0.0f, 4.0f, 20.0f);
@@ -260,7 +260,7 @@ TEST(lights_are_shadowed_end_at_their_range_and_come_in_batches)
     assert_true(fixture_pixel(&result, 16, 1)[0] > 0.01f);
     frame_result_finish(&result);
     fixture_clear(state);
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.tracing.tracer = TRACER_BVH;
     a_floor(fixture, 5.0f);
     for (int i = 0; i < 23; i++)
         fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 0.25f);
@@ -288,7 +288,7 @@ TEST_LONG(light_through_glass_is_not_counted_twice)
                 glass->value.base_colour[c] = 0.8f;
             fixture_square(fixture, 2000.0f, glass->base.id, roof);
             add_light(fixture, kinds[k]);
-            fixture->request.samples = 16;
+            fixture->request.sampling.samples = 16;
             closed_form = rows[kinds[k]].form;
             struct mean mean = mean_of_seeds(fixture, off_the_form);
             print_message("through glass, %s, side %d: %.5f (%.0e)\n", rows[kinds[k]].name, side, mean.value,
@@ -359,7 +359,7 @@ TEST_LONG(a_small_bright_sun_of_an_image_is_found_with_little_noise)
     path_begin(fixture, TRACER_BVH, 1);
     a_floor(fixture, 1.0f);
     an_image(fixture, GREY, 4, 12, SUN);
-    fixture->request.samples = SAMPLES;
+    fixture->request.sampling.samples = SAMPLES;
     relative_deviation = 0.0;
     struct mean mean = mean_of_seeds(fixture, deviation_and_mean);
     print_message("off by %+.1e (standard error %.0e), pixels by %.3f\n", mean.value, mean.error,
@@ -384,8 +384,8 @@ TEST_LONG(the_default_sky_brings_what_its_harmonics_say)
         fixture_look(fixture, 0.0f, 5.0f, 0.0f, 0.0f);
         fixture->request.camera.ortho_height = VIEW;
         if (!path) /* its ambient term is the irradiance of the sky; the default light is in both */
-            fixture->request.integrator = INTEGRATOR_WHITTED;
-        fixture->request.samples = 16;
+            fixture->request.light.integrator = INTEGRATOR_WHITTED;
+        fixture->request.sampling.samples = 16;
         means[path] = mean_of_seeds(fixture, whole);
     }
     /* Harmonics of order 2 leave out up to 1 % of an irradiance (Ramamoorthi and Hanrahan 2001). */
@@ -520,7 +520,7 @@ static void expect_as_met(struct fixture *fixture, enum inside inside, unsigned 
         path_begin(fixture, tracer, 3);
         fixture->request.tracer_options.ldc.resolution = 256;
         a_box(fixture, inside, sampled);
-        fixture->request.samples = sampled ? 4 : 12;
+        fixture->request.sampling.samples = sampled ? 4 : 12;
         means[sampled] = mean_of_seeds(fixture, whole);
     }
     print_message("%s, tracer %u: met alone %.5f (%.0e), sampled %.5f (%.0e) of a third of the samples\n",
@@ -550,7 +550,7 @@ TEST(a_lamp_that_moves_or_is_switched_lights_from_where_it_is)
     for (int edited = 0; edited < 2; edited++) {
         path_begin(fixture, TRACER_BVH, 2);
         a_box(fixture, MANY, true);
-        fixture->request.samples = 4;
+        fixture->request.sampling.samples = 4;
         if (edited) {
             struct frame_result before = fixture_render(fixture);
             frame_result_finish(&before);
@@ -585,7 +585,7 @@ TEST_LONG(a_lamp_lights_along_its_way_while_the_shutter_is_open)
     for (int sampled = 0; sampled < 2; sampled++) {
         path_begin(fixture, tracers[sampled], 2);
         a_box(fixture, PLAIN, sampled);
-        fixture->request.samples = sampled ? 8 : 32;
+        fixture->request.sampling.samples = sampled ? 8 : 32;
         struct pose_node open = {.node = fixture->next_id - 1}, close = open;
         facing_down(-0.7f, 0.5f, 0.0f, open.parent_from_node);
         facing_down(0.7f, 0.5f, 0.5f, close.parent_from_node);
@@ -593,7 +593,7 @@ TEST_LONG(a_lamp_lights_along_its_way_while_the_shutter_is_open)
         const struct scene_motion motion = {.poses = poses, .pose_count = 2};
         double values[SEEDS];
         for (uint64_t seed = 0; seed < SEEDS; seed++) {
-            fixture->request.seed = seed;
+            fixture->request.sampling.seed = seed;
             struct frame_result result = fixture_render_motion(fixture, &motion);
             values[seed] = whole(&result);
             frame_result_finish(&result);
@@ -614,7 +614,7 @@ TEST(emission_that_is_seen_only_shows_in_mirrors_and_lights_nothing)
             double means[3]; /* dark, seen only, glowing */
             for (int i = 0; i < 3; i++) {
                 path_begin(fixture, TRACER_BVH, 3);
-                fixture->request.integrator = integrator ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_PATH;
+                fixture->request.light.integrator = integrator ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_PATH;
                 struct scene_material *floor = a_floor(fixture, 0.5f);
                 floor->value.metallic = (float)mirror;
                 floor->value.roughness = 1.0f - (float)mirror;
@@ -622,7 +622,7 @@ TEST(emission_that_is_seen_only_shows_in_mirrors_and_lights_nothing)
                 fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 0.9f, 1.0f);
                 struct scene_material *glow = a_glow(fixture, 1.0f, i == 0 ? 0.0f : 2.0f, true, above);
                 glow->value.emission_seen_only = i == 1;
-                fixture->request.samples = 4;
+                fixture->request.sampling.samples = 4;
                 struct frame_result result = fixture_render(fixture);
                 means[i] = whole(&result);
                 frame_result_finish(&result);
@@ -650,7 +650,7 @@ TEST(a_scene_that_a_lamp_lights_has_no_sky_where_lamps_are_lights)
     facing_down(0.0f, 0.0f, 0.0f, place);
     for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? COUNT(cases) : 2); i++) {
         path_begin(fixture, TRACER_BVH, 2);
-        fixture->request.integrator = cases[i].integrator;
+        fixture->request.light.integrator = cases[i].integrator;
         a_glow(fixture, 0.1f, cases[i].radiance, true, place);
         fixture_look(fixture, 0.0f, 0.0f, 3.5f, 0.6f);
         struct frame_result result = fixture_render(fixture);
@@ -682,7 +682,7 @@ static void a_rough_mirror(struct fixture *fixture, unsigned integrator, enum mi
     static const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, HEIGHT},
                        below[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.5f};
     path_begin(fixture, TRACER_BVH, what == LAMP_BEHIND_GLASS ? 2 : 1);
-    fixture->request.integrator = integrator;
+    fixture->request.light.integrator = integrator;
     struct scene_material *floor = a_floor(fixture, 1.0f);
     floor->value.roughness = look[0];
     floor->value.metallic = look[1];
@@ -740,7 +740,7 @@ TEST_LONG(rough_mirrors_show_as_much_of_lights_however_they_are_found)
                            : way == DECLARED ? RECTANGLE_LIGHT
                                              : cases[i].what,
                            HALF, cases[i].look);
-            fixture->request.samples = way == MET ? 32 : 16;
+            fixture->request.sampling.samples = way == MET ? 32 : 16;
             ways[way] = mean_of_seeds(fixture, whole);
         }
         for (size_t way = 0; way < way_count; way++) {
@@ -854,7 +854,7 @@ TEST_LONG(a_panel_close_above_a_floor_has_little_noise)
     a_floor(fixture, 0.05f);
     a_glow(fixture, 1.0f, 1.0f, true, above);
     fixture->request.camera.ortho_height = 0.5f;
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED; /* shadow rays alone find it */
+    fixture->request.light.integrator = INTEGRATOR_DISTRIBUTED; /* shadow rays alone find it */
     float *one = path_render_pixels(fixture, SAMPLES, 1), *other = path_render_pixels(fixture, SAMPLES, 2);
     double mean = 0.0, squares = 0.0;
     for (uint32_t i = 0; i < PIXELS; i++) {

@@ -102,8 +102,8 @@ static void all_materials(struct fixture *fixture, float roughness, float base, 
     }
     fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.0f);
     fixture->request.camera.ortho_height = (float)SIDE;
-    fixture->request.width = fixture->request.height = WIDTH;
-    fixture->request.layer_opacity = 1.0f; /* raycast shows what it meets first, as the others */
+    fixture->request.picture.width = fixture->request.picture.height = WIDTH;
+    fixture->request.light.layer_opacity = 1.0f; /* raycast shows what it meets first, as the others */
 }
 
 /* Means of the tiles. Errors are those of blocks of three by three pixels, which share no sample. */
@@ -111,9 +111,9 @@ static void render_tiles(struct fixture *fixture, const struct way *way, uint32_
                          struct mean tiles[KINDS])
 {
     enum { BLOCK = 3, ACROSS = TILE / BLOCK };
-    fixture->request.integrator = way->integrator;
-    fixture->request.brdf = way->brdf;
-    fixture->request.samples = samples;
+    fixture->request.light.integrator = way->integrator;
+    fixture->request.light.brdf = way->brdf;
+    fixture->request.sampling.samples = samples;
     struct frame_result result = fixture_render(fixture);
     for (uint32_t i = 0; i < KINDS; i++) {
         double blocks[ACROSS * ACROSS] = {0};
@@ -179,7 +179,7 @@ static void expect_agreement(struct fixture *fixture, float roughness)
 {
     struct mean tiles[WAYS][KINDS];
     all_materials(fixture, roughness, 0.7f, false);
-    fixture->request.depth = 4;
+    fixture->request.light.depth = 4;
     fixture_environment(fixture, 1e-9f, 1e-9f, 1e-9f); /* the programs of the furnace serve path here too */
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 2.0f);
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 1.0f);
@@ -218,7 +218,7 @@ TEST_LONG(the_integrator_ao_sees_balls_that_stand_alone_as_open)
     const struct way ao = {"ao", INTEGRATOR_AO, BRDF_GGX};
     struct mean tiles[KINDS];
     all_materials(fixture, 0.4f, 0.7f, false);
-    fixture->request.ao_distance = 5.0f;
+    fixture->request.light.ao_distance = 5.0f;
     render_tiles(fixture, &ao, 1, tiles);
     for (int i = 0; i < KINDS; i++)
         assert_near(tiles[i].value, 1.0, 1e-6);
@@ -283,7 +283,7 @@ TEST_LONG(normals_that_lean_lose_no_light)
                 material->textures[MATERIAL_NORMAL] = (struct record_texture_use){
                     texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
                 fixture_square(fixture, 100.0f, material->base.id, NULL);
-                fixture->request.width = fixture->request.height = 3;
+                fixture->request.picture.width = fixture->request.picture.height = 3;
                 fixture_look(fixture, (float)(5.0 * sin(from)), 0.0f, (float)(5.0 * cos(from)), 0.01f);
                 struct frame_result result = fixture_render(fixture);
                 for (uint32_t i = 0; i < 9; i++) {
@@ -300,10 +300,10 @@ TEST_LONG(normals_that_lean_lose_no_light)
 static struct mean colour_by(struct fixture *fixture, const struct way *way, int channel)
 {
     double values[PIXELS];
-    fixture->request.integrator = way->integrator;
-    fixture->request.brdf = way->brdf;
-    fixture->request.layer_opacity = 1.0f;
-    fixture->request.samples = 64;
+    fixture->request.light.integrator = way->integrator;
+    fixture->request.light.brdf = way->brdf;
+    fixture->request.light.layer_opacity = 1.0f;
+    fixture->request.sampling.samples = 64;
     struct frame_result result = fixture_render(fixture);
     for (uint32_t i = 0; i < PIXELS; i++)
         values[i] = (double)fixture_pixel(&result, i % EDGE, i / EDGE)[channel];

@@ -50,7 +50,7 @@ TEST(a_node_moves_what_it_shows_by_the_pixels_that_it_moves)
     struct scene_motion motion;
     fixture_square(fixture, 5, 0, NULL);
     const uint32_t node = fixture->next_id - 1;
-    fixture->request.layers = 1u << LAYER_MOTION;
+    fixture->request.picture.layers = 1u << LAYER_MOTION;
     for (uint32_t poses = 1; poses <= 2; poses++) {
         test_motion_init(&motion, poses);
         motion.has_neighbours = true;
@@ -59,8 +59,8 @@ TEST(a_node_moves_what_it_shows_by_the_pixels_that_it_moves)
             pose_shift(&motion.poses[i], node, 0.1f * (float)i, 0);
         pose_shift(&motion.later, node, 0.3f, 0.1f);
         for (uint32_t way = 0; way < 2; way++) {
-            fixture->request.primary = way ? PRIMARY_TRACE : PRIMARY_RASTER;
-            fixture->request.samples = 1 + 3 * way;
+            fixture->request.tracing.primary = way ? PRIMARY_TRACE : PRIMARY_RASTER;
+            fixture->request.sampling.samples = 1 + 3 * way;
             expect_shift(fixture, &motion, (double[4]){0.3, 0.1, -0.2, 0.05});
         }
         scene_motion_finish(&motion);
@@ -82,7 +82,7 @@ TEST(morph_targets_move_each_point_of_a_triangle)
     test_pose_weights(&motion.earlier, node, &weights[0], 1);
     test_pose_weights(&motion.poses[0], node, &weights[1], 1);
     test_pose_weights(&motion.later, node, &weights[2], 1);
-    fixture->request.layers = 1u << LAYER_MOTION;
+    fixture->request.picture.layers = 1u << LAYER_MOTION;
     struct frame_result result = fixture_render_motion(fixture, &motion);
     for (uint32_t y = 0; y < 32; y++) {
         const double share = ((15.5 - y) / SCALE + 2) / 4;
@@ -116,7 +116,7 @@ TEST(joints_move_a_skin)
     pose_shift(&motion.earlier, joint, 0, -0.1f);
     pose_shift(&motion.poses[0], joint, 0, 0);
     pose_shift(&motion.later, joint, 0.25f, 0.2f);
-    fixture->request.layers = 1u << LAYER_MOTION;
+    fixture->request.picture.layers = 1u << LAYER_MOTION;
     expect_shift(fixture, &motion, (double[4]){0.25, 0.2, 0, -0.1});
     scene_motion_finish(&motion);
 }
@@ -129,7 +129,7 @@ TEST(a_camera_that_turns_moves_surfaces_and_what_lies_behind_them)
     const double angle = 0.05, pixels = 16 / tan(0.3);
     fixture_square(fixture, 0.5f, 0, NULL);
     struct frame_request *request = &fixture->request;
-    request->layers = 1u << LAYER_MOTION;
+    request->picture.layers = 1u << LAYER_MOTION;
     request->has_neighbours = true;
     request->camera_earlier = request->camera_later = request->camera;
     const float c = (float)cos(angle), s = (float)sin(angle), left[9] = {c, 0, s, 0, 1, 0, -s, 0, c};
@@ -151,14 +151,14 @@ TEST(parallel_views_and_those_of_several_eyes_have_their_own_motion)
     struct fixture *fixture = *state;
     struct frame_request *request = &fixture->request;
     fixture_square(fixture, 5, 0, NULL);
-    request->layers = 1u << LAYER_MOTION;
+    request->picture.layers = 1u << LAYER_MOTION;
     request->has_neighbours = true;
     request->camera_earlier = request->camera_later = request->camera;
     request->camera_later.world_from_view[3] = 0.5f;
     request->camera_later.world_from_view[11] = 4; /* a metre nearer */
-    request->width = 64;
-    request->views_across = 2;
-    request->baseline = 0.2f;
+    request->picture.width = 64;
+    request->picture.views_across = 2;
+    request->picture.baseline = 0.2f;
     struct frame_result result = fixture_render(fixture);
     for (uint32_t x = 0; x < 64; x++) {
         const double now = (x % 32) - 15.5, near = 5.0 / 4.0;
@@ -166,12 +166,12 @@ TEST(parallel_views_and_those_of_several_eyes_have_their_own_motion)
                       ROUNDING_PIXELS);
     }
     frame_result_finish(&result);
-    *request = (struct frame_request){.width = 32,
-                                      .height = 32,
-                                      .samples = 1,
-                                      .tracer = TRACER_BVH,
-                                      .format = PIXEL_FORMAT_RGBA32F,
-                                      .layers = 1u << LAYER_MOTION,
+    *request = (struct frame_request){.picture.width = 32,
+                                      .picture.height = 32,
+                                      .sampling.samples = 1,
+                                      .tracing.tracer = TRACER_BVH,
+                                      .picture.format = PIXEL_FORMAT_RGBA32F,
+                                      .picture.layers = 1u << LAYER_MOTION,
                                       .has_neighbours = true,
                                       .camera = request->camera,
                                       .camera_earlier = request->camera,
@@ -191,7 +191,7 @@ TEST(what_stands_still_or_is_behind_the_camera_has_no_motion)
     struct fixture *fixture = *state;
     struct frame_request *request = &fixture->request;
     fixture_square(fixture, 0.5f, 0, NULL);
-    request->layers = 1u << LAYER_MOTION;
+    request->picture.layers = 1u << LAYER_MOTION;
     for (int way = 0; way < 3; way++) {
         request->has_neighbours = way > 0;
         request->camera_earlier = request->camera_later = request->camera;
@@ -210,8 +210,8 @@ TEST(frames_with_other_neighbours_do_not_add_up)
     struct fixture *fixture = *state;
     struct frame_request *request = &fixture->request;
     fixture_square(fixture, 5, 0, NULL);
-    request->layers = 1u << LAYER_MOTION;
-    request->accumulate = request->has_neighbours = true;
+    request->picture.layers = 1u << LAYER_MOTION;
+    request->sampling.accumulate = request->has_neighbours = true;
     for (int way = 0; way < 3; way++) {
         request->camera_earlier = request->camera_later = request->camera;
         request->camera_later.world_from_view[3] = way == 2 ? -0.5f : -0.25f;
@@ -227,15 +227,15 @@ TEST(motion_that_is_not_known_is_refused)
 {
     struct fixture *fixture = *state;
     fixture_square(fixture, 5, 0, NULL);
-    fixture->request.layers = 1u << LAYER_MOTION;
+    fixture->request.picture.layers = 1u << LAYER_MOTION;
     fixture_commit(fixture);
-    fixture->request.views_across = 2;
-    fixture->request.view_source = VIEW_SOURCE_LAYERS;
+    fixture->request.picture.views_across = 2;
+    fixture->request.picture.view_source = VIEW_SOURCE_LAYERS;
     fixture_expect_no_layers(fixture, "depth layers have no motion");
-    fixture->request.views_across = 0;
-    fixture->request.view_source = VIEW_SOURCE_RAYS;
-    fixture->request.tracer = TRACER_LDC;
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.picture.views_across = 0;
+    fixture->request.picture.view_source = VIEW_SOURCE_RAYS;
+    fixture->request.tracing.tracer = TRACER_LDC;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     struct scene_motion motion;
     test_motion_init(&motion, 1);
     motion.has_neighbours = true;

@@ -45,7 +45,7 @@ TEST(a_room_that_glows_has_the_sum_of_its_reflections)
             for (uint32_t depth = 0; depth <= 3; depth++) { /* as far as no path is ended by chance */
                 path_begin(fixture, tracers[t], depth);
                 a_glowing_room(fixture, albedos[a]);
-                fixture->request.samples = 4;
+                fixture->request.sampling.samples = 4;
                 struct frame_result result = fixture_render(fixture);
                 double radiance = albedos[a] == 1.0f ? depth + 1.0 : room_radiance((double)albedos[a], depth);
                 for (uint32_t i = 0; i < PIXELS; i++) /* every path brings just that; roundings */
@@ -61,7 +61,7 @@ TEST(paths_that_end_by_chance_bring_as_much_in_the_mean)
     for (size_t a = 0; a < COUNT(albedos); a++) {
         path_begin(fixture, TRACER_BVH, 32);
         a_glowing_room(fixture, albedos[a]);
-        fixture->request.samples = 16;
+        fixture->request.sampling.samples = 16;
         struct frame_result result = fixture_render(fixture);
         struct mean mean = mean_of_picture(&result);
         double radiance = room_radiance((double)albedos[a], 32);
@@ -83,7 +83,7 @@ TEST(a_path_that_carries_nothing_has_no_ray)
         for (int black = 0; black < 2; black++) {
             path_begin(fixture, TRACER_BVH, 3);
             a_glowing_room(fixture, black ? 0.0f : 0.8f); /* no path is ended by chance */
-            fixture->request.integrator = integrators[k];
+            fixture->request.light.integrator = integrators[k];
             struct frame_result result = fixture_render(fixture);
             /* Scattered rays are of paths alone. */
             const uint32_t bounces = !black && integrators[k] == INTEGRATOR_PATH ? 3 : 0;
@@ -113,7 +113,7 @@ TEST(waves_are_sorted_where_their_directions_differ_and_the_picture_stays_the_sa
         struct scene_material *material = &fixture->edits[0].set.material;
         material->value.metallic = (float)mirrors;
         material->value.roughness = mirrors ? 0.0f : 1.0f;
-        fixture->request.width = fixture->request.height = 64;
+        fixture->request.picture.width = fixture->request.picture.height = 64;
         struct frame_result whole = fixture_render(fixture);
         frame_renderer_queue_ahead(fixture->renderer, true);
         struct frame_result ahead = fixture_render(fixture);

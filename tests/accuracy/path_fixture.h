@@ -13,12 +13,12 @@ enum { EDGE = 32, PIXELS = EDGE * EDGE };
 static inline void path_begin(struct fixture *fixture, unsigned tracer, uint32_t depth)
 {
     fixture_clear((void **)&fixture);
-    fixture->request.width = fixture->request.height = EDGE;
-    fixture->request.integrator = INTEGRATOR_PATH;
-    fixture->request.filter = FILTER_BOX;
-    fixture->request.tracer = tracer;
-    fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.depth = depth;
+    fixture->request.picture.width = fixture->request.picture.height = EDGE;
+    fixture->request.light.integrator = INTEGRATOR_PATH;
+    fixture->request.sampling.pixel_filter = FILTER_BOX;
+    fixture->request.tracing.tracer = tracer;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
+    fixture->request.light.depth = depth;
 }
 
 struct mean {
@@ -41,8 +41,8 @@ static inline float *path_render_pixels(struct fixture *fixture, uint32_t sample
 {
     float *pixels = malloc(PIXELS * sizeof(*pixels));
     assert_non_null(pixels);
-    fixture->request.samples = samples;
-    fixture->request.seed = seed;
+    fixture->request.sampling.samples = samples;
+    fixture->request.sampling.seed = seed;
     struct frame_result result = fixture_render(fixture);
     for (uint32_t i = 0; i < PIXELS; i++)
         pixels[i] = fixture_pixel(&result, i % EDGE, i / EDGE)[1];
@@ -67,7 +67,7 @@ static inline struct mean mean_of_seeds(struct fixture *fixture, measure *of)
 {
     double values[SEEDS];
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
-        fixture->request.seed = seed;
+        fixture->request.sampling.seed = seed;
         struct frame_result result = fixture_render(fixture);
         values[seed] = of(&result);
         frame_result_finish(&result);

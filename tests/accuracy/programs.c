@@ -53,13 +53,13 @@ TEST(a_second_frame_compiles_nothing_and_no_program_that_no_frame_needs_is_compi
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.width = fixture->request.height = 128;
+    fixture->request.picture.width = fixture->request.picture.height = 128;
     const size_t count = getenv("FARLIGHT_TEST_LONG") ? sizeof(forms) / sizeof(forms[0]) : FORMS_SHORT;
     for (size_t i = 0; i < count; i++) {
-        fixture->request.tracer = forms[i].tracer;
-        fixture->request.integrator = forms[i].integrator;
-        fixture->request.depth = forms[i].depth;
-        fixture->request.samples = 1;
+        fixture->request.tracing.tracer = forms[i].tracer;
+        fixture->request.light.integrator = forms[i].integrator;
+        fixture->request.light.depth = forms[i].depth;
+        fixture->request.sampling.samples = 1;
         struct frame_result first = fixture_render(fixture);
         const size_t after_first = count_programs();
         assert_int_equal(gpu_ahead_left(device->ahead), 0);
@@ -78,9 +78,9 @@ TEST(a_frame_on_a_gpu_compiles_no_program_that_it_does_not_need)
     struct fixture *fixture = *state;
     const struct gpu_facts facts = device->facts;
     fixture_mixture(fixture);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.integrator = INTEGRATOR_WHITTED;
-    fixture->request.depth = 4;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.depth = 4;
     gpu_facts_choose(&device->facts, false);
     device->facts.compiles_at_dispatch = false;
     frame_renderer_queue_ahead(fixture->renderer, true);

@@ -14,8 +14,8 @@ static struct frame_result render_by(struct fixture *fixture, struct frame_rende
 {
     struct frame_renderer *own = fixture->renderer;
     fixture->renderer = renderer;
-    fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.tracer = tracer;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
+    fixture->request.tracing.tracer = tracer;
     fixture->request.tracer_options.quadtree = (struct quadtree_settings){.faces = QUADTREE_FACES_VIEW};
     struct frame_result result = fixture_render_motion(fixture, motion);
     fixture->renderer = own;
@@ -57,7 +57,7 @@ static uint32_t add_scene(struct fixture *fixture)
     const uint32_t square = fixture_square(fixture, 1.0f, material, NULL)->base.id;
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 10.0f);
     fixture_sphere(fixture, 0.5f, 0.2f, 0.8f, 0.3f, fixture_material(fixture)->base.id);
-    fixture->request.width = fixture->request.height = 96;
+    fixture->request.picture.width = fixture->request.picture.height = 96;
     return square;
 }
 
@@ -106,7 +106,7 @@ TEST(a_moved_camera_outdates_the_structure_and_an_unmoved_one_does_not)
     fixture_look(fixture, 0.4f, 0.1f, 4.5f, 0.6f);
     assert_true(shows_what_is_there(fixture, fixture->renderer, NULL));
     assert_false(shows_what_is_there(fixture, fixture->renderer, NULL));
-    fixture->request.width = 80;
+    fixture->request.picture.width = 80;
     assert_true(shows_what_is_there(fixture, fixture->renderer, NULL));
     assert_false(shows_what_is_there(fixture, fixture->renderer, NULL));
 }

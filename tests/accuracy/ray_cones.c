@@ -292,14 +292,14 @@ static void checkered_floor(struct fixture *fixture, float metallic, float rough
     ball->value.ior = 1.5f;
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.2f, ball->base.id);
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
-    fixture->request.width = fixture->request.height = 64;
+    fixture->request.picture.width = fixture->request.picture.height = 64;
     fixture_look(fixture, 0.0f, 0.8f, 7.0f, 0.34f);
 }
 
 static struct frame_result render_samples(struct fixture *fixture, uint32_t samples, uint64_t seed, float x)
 {
-    fixture->request.samples = samples;
-    fixture->request.seed = seed;
+    fixture->request.sampling.samples = samples;
+    fixture->request.sampling.seed = seed;
     fixture_look(fixture, x, 0.8f, 7.0f, 0.34f);
     return fixture_render(fixture);
 }
@@ -354,7 +354,7 @@ static void expect_balls(struct fixture *fixture, size_t first, size_t end)
     for (size_t i = first; i < end; i++) {
         fixture_clear((void **)&fixture);
         checkered_floor(fixture, balls[i].metallic, balls[i].roughness, balls[i].transmission);
-        fixture->request.integrator = balls[i].integrator;
+        fixture->request.light.integrator = balls[i].integrator;
         EXPECT_QUALITY(balls[i].name, quality(fixture, 64), balls[i].minimum);
     }
 }
@@ -401,7 +401,7 @@ static void grazing_floor(struct fixture *fixture, bool glass)
     pane->value.ior = 1.5f;
     fixture_square(fixture, 4.0f, pane->base.id, NULL);
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
-    fixture->request.width = fixture->request.height = 64;
+    fixture->request.picture.width = fixture->request.picture.height = 64;
 }
 
 /* What is seen at a grazing angle has a footprint that is much longer than wide. */

@@ -21,11 +21,11 @@ static size_t tracer_count(void)
 static void begin(struct fixture *fixture, unsigned tracer)
 {
     fixture_clear((void **)&fixture);
-    fixture->request.width = fixture->request.height = EDGE;
-    fixture->request.integrator = INTEGRATOR_RAYCAST;
-    fixture->request.tracer = tracer;
-    fixture->request.primary = tracer == TRACER_NAIVE ? PRIMARY_RASTER : PRIMARY_TRACE;
-    fixture->request.depth = 0;                           /* no layer is a bounce */
+    fixture->request.picture.width = fixture->request.picture.height = EDGE;
+    fixture->request.light.integrator = INTEGRATOR_RAYCAST;
+    fixture->request.tracing.tracer = tracer;
+    fixture->request.tracing.primary = tracer == TRACER_NAIVE ? PRIMARY_RASTER : PRIMARY_TRACE;
+    fixture->request.light.depth = 0;                     /* no layer is a bounce */
     fixture->request.tracer_options.ldc.resolution = 256; /* images along z hold planes exactly, however coarse */
 }
 
@@ -87,7 +87,7 @@ TEST(layers_are_blended_front_to_back)
                     left = left >= (double)PATH_WEIGHT_MIN ? left * (1.0 - opacity) : 0.0;
                 }
                 left = left >= (double)PATH_WEIGHT_MIN ? left : 0.0;
-                fixture->request.layer_opacity = opacities[o];
+                fixture->request.light.layer_opacity = opacities[o];
                 /* samples keep colours in eight bits of sRGB */
                 assert_pixels(fixture, radiance + (has_environment ? left * (double)0.3f : 0.0),
                               has_environment ? 1.0 : 1.0 - left, tracers[t] == TRACER_LDC ? 0.003 : 1e-5);
@@ -106,7 +106,7 @@ TEST(faint_layers_go_on_until_nothing_is_left)
         radiance += left * 0.05 * (double)grey_of(i);
     }
     no_light(fixture);
-    fixture->request.layer_opacity = 0.05f;
+    fixture->request.light.layer_opacity = 0.05f;
     assert_pixels(fixture, radiance, 1.0 - left, 1e-5);
 }
 
@@ -121,7 +121,7 @@ TEST(translucent_surfaces_transmit_their_transmittance)
     pane->value.base_colour[3] = 0.25f;
     glass->value.transmission = 0.75f;
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
-    fixture->request.layer_opacity = 0.6f;
+    fixture->request.light.layer_opacity = 0.6f;
     double behind = 0.6 * 0.9 + 0.4 * 0.5;
     double expected = 0.25 * 0.4 + 0.75 * (0.25 * 0.8 + 0.75 * 0.8 * behind);
     struct frame_result result = fixture_render(fixture);
@@ -158,7 +158,7 @@ TEST(no_shadow_ray_is_traced_and_every_layer_is_one_more)
     assert_int_equal(result.shadow_rays, 0);
     assert_int_equal(result.secondary_rays, 3 * EDGE * EDGE);
     frame_result_finish(&result);
-    fixture->request.layer_opacity = 1.0f;
+    fixture->request.light.layer_opacity = 1.0f;
     result = fixture_render(fixture);
     assert_int_equal(result.secondary_rays, 0);
     frame_result_finish(&result);

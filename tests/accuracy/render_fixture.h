@@ -86,8 +86,12 @@ static inline int fixture_clear(void **state)
     fixture->edit_count = 0;
     fixture->next_id = 1;
     fixture->device->facts.packet_rays = 1; /* else rounding at edges follows the slices */
-    fixture->request = (struct frame_request){
-        .width = 32, .height = 32, .samples = 1, .depth = 4, .tracer = TRACER_BVH, .format = PIXEL_FORMAT_RGBA32F};
+    fixture->request = (struct frame_request){.picture.width = 32,
+                                              .picture.height = 32,
+                                              .sampling.samples = 1,
+                                              .light.depth = 4,
+                                              .tracing.tracer = TRACER_BVH,
+                                              .picture.format = PIXEL_FORMAT_RGBA32F};
     fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.6f);
     return 0;
 }
@@ -218,8 +222,8 @@ static inline void fixture_mixture(struct fixture *fixture)
     fixture_light(fixture, LIGHT_POINT, -2.0f, 3.0f, 3.0f, 20.0f);
     struct scene_light *sphere = fixture_light(fixture, LIGHT_SPHERE, 2.0f, 2.0f, 2.0f, 10.0f);
     sphere->value.size[0] = 0.4f;
-    fixture->request.width = 96;
-    fixture->request.height = 72;
+    fixture->request.picture.width = 96;
+    fixture->request.picture.height = 72;
     fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
 }
 

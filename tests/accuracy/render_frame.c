@@ -7,9 +7,9 @@
 
 static void primary_hits_agree_however_they_are_found(struct fixture *fixture, double share_allowed)
 {
-    fixture->request.primary = PRIMARY_RASTER;
+    fixture->request.tracing.primary = PRIMARY_RASTER;
     struct frame_result raster = fixture_render(fixture);
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     struct frame_result trace = fixture_render(fixture);
     uint32_t differing = 0, pixels = raster.width * raster.height;
     for (uint32_t i = 0; i < pixels; i++) {
@@ -103,13 +103,13 @@ TEST(the_same_seed_gives_the_same_bytes)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.samples = 3;
-    fixture->request.seed = 77;
+    fixture->request.sampling.samples = 3;
+    fixture->request.sampling.seed = 77;
     struct frame_result first = fixture_render(fixture);
     struct frame_result second = fixture_render(fixture);
     assert_same_picture(&first, &second);
     frame_result_finish(&second);
-    fixture->request.seed = 78;
+    fixture->request.sampling.seed = 78;
     second = fixture_render(fixture);
     assert_memory_not_equal(first.pixels, second.pixels, first.size_bytes);
     frame_result_finish(&first);
@@ -120,7 +120,7 @@ TEST(a_wave_that_overflows_splits_its_slice_and_loses_nothing)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.depth = 6;
+    fixture->request.light.depth = 6;
     struct frame_result large = fixture_render(fixture);
     assert_int_equal(large.splits, 0);
     frame_renderer_set_capacity(fixture->renderer, 512, 512);
@@ -131,8 +131,8 @@ TEST(a_wave_that_overflows_splits_its_slice_and_loses_nothing)
     assert_int_equal(large.shadow_rays, small.shadow_rays);
     frame_result_finish(&small);
     frame_renderer_set_capacity(fixture->renderer, 1, 1); /* less than one pixel needs: the wave must grow */
-    fixture->request.width = 8;
-    fixture->request.height = 6;
+    fixture->request.picture.width = 8;
+    fixture->request.picture.height = 6;
     small = fixture_render(fixture);
     assert_true(small.splits > 0);
     frame_result_finish(&large);
@@ -147,12 +147,12 @@ TEST(formats_say_the_same)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.exposure_stops = 1.0f;
+    fixture->request.picture.exposure_stops = 1.0f;
     struct frame_result floats = fixture_render(fixture);
-    fixture->request.format = PIXEL_FORMAT_RGBA16F;
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA16F;
     struct frame_result halves = fixture_render(fixture);
-    fixture->request.format = PIXEL_FORMAT_RGBA8;
-    fixture->request.tone_map = TONE_NONE;
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA8;
+    fixture->request.picture.tone_map = TONE_NONE;
     struct frame_result bytes = fixture_render(fixture);
     fixture_keep(&bytes, "mixture");
     assert_int_equal(floats.size_bytes, 96 * 72 * 16);
@@ -169,8 +169,8 @@ TEST(formats_say_the_same)
         double srgb = clamped <= 0.0031308 ? 12.92 * clamped : 1.055 * pow(clamped, 1 / 2.4) - 0.055;
         assert_near(bytes.pixels[i * 4], srgb * 255.0, 0.6);
     }
-    fixture->request.format = PIXEL_FORMAT_RGBA32F;
-    fixture->request.exposure_stops = 0.0f;
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA32F;
+    fixture->request.picture.exposure_stops = 0.0f;
     struct frame_result plain = fixture_render(fixture);
     assert_near(fixture_pixel(&floats, 50, 40)[1], 2.0f * fixture_pixel(&plain, 50, 40)[1], 1e-6);
     frame_result_finish(&plain);
@@ -241,8 +241,8 @@ TEST(an_empty_scene_and_a_single_pixel_are_pictures_too)
 {
     struct fixture *fixture = *state;
     for (uint32_t width = 1; width <= 17; width += 8) {
-        fixture->request.width = width;
-        fixture->request.height = 18 - width;
+        fixture->request.picture.width = width;
+        fixture->request.picture.height = 18 - width;
         struct frame_result result = fixture_render(fixture);
         assert_int_equal(result.size_bytes, width * (18 - width) * 16);
         assert_true(fixture_pixel(&result, width - 1, 17 - width)[2] >
@@ -254,9 +254,9 @@ TEST(an_empty_scene_and_a_single_pixel_are_pictures_too)
 TEST(a_picture_of_several_bands_has_no_seam)
 {
     struct fixture *fixture = *state;
-    fixture->request.width = 1024;
-    fixture->request.height = 300; /* bands hold 256 Ki pixels: 256 rows, and the rest */
-    fixture->request.format = PIXEL_FORMAT_RGBA8;
+    fixture->request.picture.width = 1024;
+    fixture->request.picture.height = 300; /* bands hold 256 Ki pixels: 256 rows, and the rest */
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA8;
     fixture->request.camera.fov_y = 0.84f; /* rows differ by two steps of the sky at most */
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.size_bytes, 1024 * 300 * 4);
@@ -275,12 +275,12 @@ TEST(impossible_requests_are_refused_with_the_field)
     struct fixture *fixture = *state;
     const struct frame_request good = fixture->request;
     struct error error = {0};
-    fixture->request.width = 0;
+    fixture->request.picture.width = 0;
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "width");
     error = (struct error){0};
     fixture->request = good;
-    fixture->request.tracer = 4711;
+    fixture->request.tracing.tracer = 4711;
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "tracer");
     error = (struct error){0};

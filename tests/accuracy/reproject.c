@@ -21,7 +21,7 @@ static void a_corner(struct fixture *fixture)
     fixture_sphere(fixture, 0.8f, 0.0f, 0.5f, 0.5f, dark);
     fixture_sphere(fixture, -0.8f, 0.0f, 0.5f, 0.5f, mirror->base.id);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-    fixture->request.denoise = DENOISE_AUTO;
+    fixture->request.picture.denoise = DENOISE_AUTO;
 }
 
 /* Aside by a pixel a frame, and by a part of one that is not the same in each. */
@@ -33,7 +33,7 @@ static void look(struct fixture *fixture, int frame)
 static struct frame_result rendered(struct fixture *fixture, enum frame_history history, uint32_t samples)
 {
     fixture->request.history = history;
-    fixture->request.samples = samples;
+    fixture->request.sampling.samples = samples;
     return fixture_render(fixture);
 }
 
@@ -71,7 +71,7 @@ TEST_LONG(moving_frames_have_less_noise_and_flicker_for_those_before_them)
         const int frame = i % FRAMES;
         struct quality ignored = {0}, *sum = i < FRAMES ? &alone : &following;
         look(fixture, frame);
-        fixture->request.seed = (uint64_t)frame;
+        fixture->request.sampling.seed = (uint64_t)frame;
         struct frame_result result = rendered(fixture, i < FRAMES ? HISTORY_NONE : HISTORY_MOVING, 1);
         add_frame(frame >= WARM ? sum : &ignored, &result, truths[frame],
                   i < FRAMES ? errors_alone : errors_following);
@@ -90,7 +90,7 @@ TEST(a_view_at_rest_ends_in_the_same_picture_however_it_moved)
     struct fixture *fixture = *state;
     a_corner(fixture);
     struct frame_result direct = rendered(fixture, HISTORY_KEPT, 4);
-    fixture->request.accumulate = true;
+    fixture->request.sampling.accumulate = true;
     for (int frame = 1; frame < 4; frame++) {
         look(fixture, frame - 3);
         struct frame_result moving = rendered(fixture, HISTORY_MOVING, 1);
@@ -108,7 +108,7 @@ TEST(a_view_at_rest_ends_in_the_same_picture_however_it_moved)
         truth[i] = fixture_pixel(&last, i % EDGE, i / EDGE)[1];
     memset(errors, 0, sizeof(errors));
     add_frame(&used, &first, truth, errors);
-    fixture->request.accumulate = false;
+    fixture->request.sampling.accumulate = false;
     struct frame_result plain = rendered(fixture, HISTORY_NONE, 1);
     add_frame(&alone, &plain, truth, errors);
     assert_true(used.squares < alone.squares);
@@ -140,7 +140,7 @@ TEST_LONG(a_frame_follows_frames_of_another_size)
         struct frame_result moving = rendered(fixture, HISTORY_MOVING, 1);
         frame_result_finish(&moving);
     }
-    fixture->request.width = fixture->request.height = 3 * EDGE / 4;
+    fixture->request.picture.width = fixture->request.picture.height = 3 * EDGE / 4;
     struct frame_result following = rendered(fixture, HISTORY_MOVING, 1),
                         alone = rendered(fixture, HISTORY_NONE, 1);
     struct frame_result truth = rendered(fixture, HISTORY_NONE, 128);
@@ -172,7 +172,7 @@ TEST(what_has_no_noise_does_not_follow_frames_before_it)
 {
     struct fixture *fixture = *state;
     a_corner(fixture);
-    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
     struct frame_result plain = rendered(fixture, HISTORY_NONE, 2);
     for (int frame = 1; frame >= 0; frame--) {
         look(fixture, frame);
@@ -200,8 +200,8 @@ static double error_beside_alone(struct fixture *fixture, float half, uint32_t m
     }
     for (int i = 0; i < 3 * FRAMES; i++) {
         const int frame = i % FRAMES, pass = i / FRAMES;
-        fixture->request.seed = pass == 0 ? 99 : (uint64_t)frame;
-        fixture->request.samples = pass == 0 ? 128 : 1;
+        fixture->request.sampling.seed = pass == 0 ? 99 : (uint64_t)frame;
+        fixture->request.sampling.samples = pass == 0 ? 128 : 1;
         fixture->request.history = pass == 2 ? HISTORY_MOVING : HISTORY_NONE;
         struct frame_result result = fixture_render_motion(fixture, &motions[frame]);
         if (pass == 0) {
@@ -240,7 +240,7 @@ TEST_LONG(what_moves_is_followed)
     const uint32_t white = fixture_material(fixture)->base.id;
     fixture_sphere(fixture, 0.8f, 0.0f, 0.5f, 0.5f, white);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-    fixture->request.denoise = DENOISE_AUTO;
+    fixture->request.picture.denoise = DENOISE_AUTO;
     look(fixture, 0);
     const double left = error_beside_alone(fixture, 4.0f, white, 0.0f);
     print_message("error %.2f\n", left);

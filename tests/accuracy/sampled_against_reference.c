@@ -31,7 +31,7 @@ static struct frame_result render(struct fixture *fixture, unsigned tracer, cons
                                   const char *name)
 {
     char kept[128];
-    fixture->request.tracer = tracer;
+    fixture->request.tracing.tracer = tracer;
     fixture->request.tracer_options = row->options;
     struct frame_result result = fixture_render(fixture);
     snprintf(kept, sizeof(kept), "%s_%s", name, tracer == row->tracer ? row->name : "exact");
@@ -79,7 +79,7 @@ static void expect_scenes_like_the_references(struct fixture *fixture, size_t fi
         fixture_clear((void **)&fixture);
         scenes[i].add(fixture);
         request_picture(fixture, 5);
-        fixture->request.samples = scenes[i].samples;
+        fixture->request.sampling.samples = scenes[i].samples;
         expect_like_the_reference(fixture, scenes[i].name, scenes[i].kind);
     }
 }
@@ -100,11 +100,11 @@ static void expect_occlusion_like_the_references(struct fixture *fixture, const 
 {
     struct frame_request *request = &fixture->request;
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    request->width = request->height = SIDE / 2;
-    request->format = PIXEL_FORMAT_RGBA8;
-    request->integrator = INTEGRATOR_AO;
-    request->samples = 1;
-    request->ao_rays = AO_RAYS;
+    request->picture.width = request->picture.height = SIDE / 2;
+    request->picture.format = PIXEL_FORMAT_RGBA8;
+    request->light.integrator = INTEGRATOR_AO;
+    request->sampling.samples = 1;
+    request->light.ao_rays = AO_RAYS;
     expect_like_the_reference(fixture, name, OCCLUSION);
 }
 

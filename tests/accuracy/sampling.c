@@ -72,8 +72,8 @@ static double an_edge(struct fixture *fixture)
     const float right[12] = {1, 0, 0, 50, 0, 1, 0, 0, 0, 0, 1, 0};
     fixture_square(fixture, 50.0f, material->base.id, right);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 1.0f); /* so that there is no default sky */
-    fixture->request.width = 16;
-    fixture->request.height = 64;
+    fixture->request.picture.width = 16;
+    fixture->request.picture.height = 64;
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 64.0f * 0.1f;
     return 0.1;
@@ -92,9 +92,9 @@ TEST(samples_are_as_dense_as_the_filter_is_high)
     an_edge(fixture);
     for (enum pixel_filter filter = FILTER_BLACKMAN_HARRIS; filter <= FILTER_BOX; filter++)
         for (int traced = 0; traced < (getenv("FARLIGHT_TEST_LONG") ? 2 : 1); traced++) {
-            fixture->request.filter = filter;
-            fixture->request.primary = traced ? PRIMARY_TRACE : PRIMARY_RASTER;
-            fixture->request.samples = 256;
+            fixture->request.sampling.pixel_filter = filter;
+            fixture->request.tracing.primary = traced ? PRIMARY_TRACE : PRIMARY_RASTER;
+            fixture->request.sampling.samples = 256;
             struct frame_result result = fixture_render(fixture);
             double maximum = 0.0;
             for (uint32_t x = 0; x < 16; x++) {
@@ -182,11 +182,11 @@ static void a_mixture(struct fixture *fixture)
     fixture_light(fixture, LIGHT_SPHERE, 1.0f, 2.0f, 3.0f, 5.0f);
     fixture_light(fixture, LIGHT_RECTANGLE, -2.0f, 1.0f, 3.0f, 4.0f);
     fixture_environment(fixture, 0.2f, 0.3f, 0.4f);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.width = WIDTH;
-    fixture->request.height = HEIGHT;
-    fixture->request.samples = 21; /* together: 16, 4, 1 */
-    fixture->request.seed = 5;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.picture.width = WIDTH;
+    fixture->request.picture.height = HEIGHT;
+    fixture->request.sampling.samples = 21; /* together: 16, 4, 1 */
+    fixture->request.sampling.seed = 5;
 }
 
 static void assert_same_floats(const struct frame_result *a, const struct frame_result *b)
@@ -217,8 +217,8 @@ enum { FORMS = sizeof(forms) / sizeof(forms[0]), FORMS_SHORT = 2 };
 static void take_form(struct fixture *fixture, const struct form *form)
 {
     print_message("%s\n", form->name);
-    fixture->request.integrator = form->integrator;
-    fixture->request.primary = form->primary;
+    fixture->request.light.integrator = form->integrator;
+    fixture->request.tracing.primary = form->primary;
     fixture->request.aperture = form->aperture;
 }
 
@@ -247,18 +247,18 @@ static void expect_same_in_slices(struct fixture *fixture, const struct form *fo
 static void expect_same_in_frames(struct fixture *fixture, const struct form *form)
 {
     take_form(fixture, form);
-    fixture->request.samples = 21;
+    fixture->request.sampling.samples = 21;
     struct frame_result whole = fixture_render(fixture);
     assert_int_equal(whole.samples, 21);
-    fixture->request.seed++; /* something else in between */
-    fixture->request.samples = 1;
+    fixture->request.sampling.seed++; /* something else in between */
+    fixture->request.sampling.samples = 1;
     struct frame_result other = fixture_render(fixture);
     assert_int_equal(other.samples, 1);
     frame_result_finish(&other);
-    fixture->request.seed--;
+    fixture->request.sampling.seed--;
     uint32_t sum = 0;
     for (uint32_t samples = 1; samples <= 6; samples++) {
-        fixture->request.samples = samples;
+        fixture->request.sampling.samples = samples;
         struct frame_result part = fixture_render(fixture);
         sum += samples;
         assert_int_equal(part.samples, sum);
@@ -275,7 +275,7 @@ static void expect_same_sums(struct fixture *fixture, const struct form *begin, 
     a_mixture(fixture);
     for (const struct form *form = begin; form < end; form++)
         expect_same_in_slices(fixture, form);
-    fixture->request.accumulate = true;
+    fixture->request.sampling.accumulate = true;
     for (const struct form *form = begin; form < end; form++)
         expect_same_in_frames(fixture, form);
 }
@@ -297,11 +297,11 @@ TEST(rasterised_samples_of_a_pixel_share_their_waves)
     const struct scene_material *material = fixture_material(fixture);
     fixture_square(fixture, 3.0f, material->base.id, NULL);
     fixture_light(fixture, LIGHT_SPHERE, 1.0f, 2.0f, 3.0f, 5.0f);
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
-    fixture->request.depth = 0;
+    fixture->request.light.integrator = INTEGRATOR_DISTRIBUTED;
+    fixture->request.light.depth = 0;
     uint32_t waits[2];
     for (int i = 0; i < 2; i++) {
-        fixture->request.samples = i ? 16 : 1;
+        fixture->request.sampling.samples = i ? 16 : 1;
         struct frame_result first = fixture_render(fixture); /* compiles, and brings the scene to the device */
         frame_result_finish(&first);
         struct frame_result result = fixture_render(fixture);
@@ -317,10 +317,10 @@ TEST(a_slice_of_less_than_a_pixels_samples_is_the_same_picture_too)
     struct fixture *fixture = *state;
     a_mixture(fixture);
     fixture->request.aperture = 0.1f;
-    fixture->request.width = fixture->request.height = 8;
+    fixture->request.picture.width = fixture->request.picture.height = 8;
     for (int i = 0; i < 2; i++) {
-        fixture->request.integrator = i ? INTEGRATOR_PATH : INTEGRATOR_WHITTED;
-        fixture->request.primary = PRIMARY_TRACE;
+        fixture->request.light.integrator = i ? INTEGRATOR_PATH : INTEGRATOR_WHITTED;
+        fixture->request.tracing.primary = PRIMARY_TRACE;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);
         struct frame_result whole = fixture_render(fixture);
         frame_renderer_set_capacity(fixture->renderer, 3, 3); /* two samples of one pixel, one of three */
@@ -335,8 +335,8 @@ TEST(a_picture_that_has_all_its_samples_is_handed_out_again)
 {
     struct fixture *fixture = *state;
     a_mixture(fixture);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 3;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 3;
     fixture->request.samples_max = 5;
     static const uint32_t held[] = {3, 5, 5};
     static const uint64_t traced[] = {3, 2, 0};
@@ -369,29 +369,29 @@ TEST(what_shows_something_else_begins_from_new)
 {
     struct fixture *fixture = *state;
     a_mixture(fixture);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 2;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 2;
     const struct frame_request first = fixture->request;
     expect_from_new(fixture, 2, "the first frame");
     expect_from_new(fixture, 4, "the second");
-    fixture->request.exposure_stops = 1.0f; /* of what is done with the sum */
+    fixture->request.picture.exposure_stops = 1.0f; /* of what is done with the sum */
     expect_from_new(fixture, 6, "another exposure");
     fixture->request.camera.world_from_view[3] += 0.01f;
     expect_from_new(fixture, 2, "another camera");
     fixture->request = first;
     expect_from_new(fixture, 2, "back again");
-    fixture->request.filter = FILTER_BOX;
+    fixture->request.sampling.pixel_filter = FILTER_BOX;
     expect_from_new(fixture, 2, "another filter");
     fixture->request.aperture = 0.1f;
     expect_from_new(fixture, 2, "another lens");
-    fixture->request.depth = 2;
+    fixture->request.light.depth = 2;
     expect_from_new(fixture, 2, "another depth");
     expect_from_new(fixture, 4, "the same");
     fixture_environment(fixture, 0.5f, 0.3f, 0.4f); /* an edit */
     expect_from_new(fixture, 2, "another environment");
-    fixture->request.accumulate = false;
+    fixture->request.sampling.accumulate = false;
     expect_from_new(fixture, 2, "not asked to go on");
-    fixture->request.accumulate = true;
+    fixture->request.sampling.accumulate = true;
     expect_from_new(fixture, 2, "after one that was not asked to");
 }
 
@@ -401,34 +401,12 @@ TEST(an_abandoned_frame_is_not_gone_on_from)
     struct error error = {0};
     struct frame_result dropped = {0};
     a_mixture(fixture);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 2;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 2;
     expect_from_new(fixture, 2, "the first frame");
     assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     for (int i = 0; i < 4; i++)
         assert_int_equal(frame_step(fixture->renderer, &dropped, &error), FRAME_MORE);
     frame_abandon(fixture->renderer);
     expect_from_new(fixture, 2, "the one after it");
-}
-
-TEST(impossible_lenses_and_filters_are_refused_with_the_field)
-{
-    struct fixture *fixture = *state;
-    struct error error = {0};
-    a_mixture(fixture);
-    fixture_commit(fixture);
-    const struct frame_request good = fixture->request;
-    fixture->request.aperture = -1.0f;
-    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
-    assert_string_equal(error.field, "aperture");
-    fixture->request = good;
-    fixture->request.focus = INFINITY;
-    error = (struct error){0};
-    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
-    assert_string_equal(error.field, "focus");
-    fixture->request = good;
-    fixture->request.filter = (enum pixel_filter)17;
-    error = (struct error){0};
-    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
-    assert_string_equal(error.field, "pixel_filter");
 }

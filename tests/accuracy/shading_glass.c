@@ -56,7 +56,7 @@ TEST(glass_at_a_slant_follows_fresnels_equations)
     glass->value.base_colour[0] = glass->value.base_colour[1] = glass->value.base_colour[2] = 0.0f;
     fixture_square(fixture, 100.0f, glass->base.id, NULL);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-    fixture->request.width = fixture->request.height = 9;
+    fixture->request.picture.width = fixture->request.picture.height = 9;
     fixture_look(fixture, 5.0f * (float)sin(1.2), 0.0f, 5.0f * (float)cos(1.2), 0.01f);
     struct frame_result result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 4, 4)[0], fresnel(cos(1.2), 1.5), NORMAL_TOLERANCE);
@@ -77,7 +77,7 @@ TEST(a_mirror_may_be_weaker_and_coloured)
         memcpy(glass->value.specular_colour, colour, sizeof(colour));
         fixture_square(fixture, 100.0f, glass->base.id, NULL);
         fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-        fixture->request.width = fixture->request.height = 9;
+        fixture->request.picture.width = fixture->request.picture.height = 9;
         fixture_look(fixture, 5.0f * (float)sin(angle), 0.0f, 5.0f * (float)cos(angle), 0.01f);
         struct frame_result result = fixture_render(fixture);
         double rise = (fresnel(cos(angle), 1.5) - 0.04) / 0.96;
@@ -107,8 +107,8 @@ TEST(a_body_takes_light_by_the_way_through_it)
             fixture_square(fixture, 1000.0f, smoke->base.id, NULL);
             fixture_square(fixture, 1000.0f, smoke->base.id, turned);
             fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-            fixture->request.integrator = integrators[i];
-            fixture->request.width = fixture->request.height = 3;
+            fixture->request.light.integrator = integrators[i];
+            fixture->request.picture.width = fixture->request.picture.height = 3;
             fixture_look(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
             struct frame_result result = fixture_render(fixture);
             for (int channel = 0; channel < 3; channel++)
@@ -144,7 +144,7 @@ static float lit_through(struct fixture *fixture, float metallic, bool has_textu
     light->value.kind = LIGHT_DIRECTIONAL;
     light->value.colour[0] = light->value.colour[1] = light->value.colour[2] = (float)PI;
     fixture_node(fixture, NODE_LIGHT, light->base.id, down);
-    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
     fixture_look(fixture, 0.0f, 0.0f, 1.0f, 0.5f);
     struct frame_result result = fixture_render(fixture);
     const float value = fixture_pixel(&result, 16, 16)[0];
@@ -166,7 +166,7 @@ TEST(light_is_totally_reflected_inside_glass)
     struct scene_material *glass = clear_glass(fixture, 1.5);
     fixture_square(fixture, 100.0f, glass->base.id, NULL);
     fixture_environment(fixture, 1.0f, 0.5f, 0.25f);
-    fixture->request.width = fixture->request.height = 9;
+    fixture->request.picture.width = fixture->request.picture.height = 9;
     /* from behind the square, which is inside; the critical angle is 41.8 degrees */
     fixture_look(fixture, 5.0f * (float)sin(0.9), 0.0f, -5.0f * (float)cos(0.9), 0.01f);
     struct frame_result result = fixture_render(fixture);
@@ -194,7 +194,7 @@ static void expect_bent(struct fixture *fixture, double n, double before, double
     double x = -2.0 * sin(after), z = -2.0 * side * cos(after);
     fixture_sphere(fixture, (float)x, 0.0f, (float)z, 0.0035f, light_material(fixture));
     no_sky(fixture);
-    fixture->request.width = fixture->request.height = 9;
+    fixture->request.picture.width = fixture->request.picture.height = 9;
     fixture_look(fixture, (float)(4.0 * sin(before)), 0.0f, (float)(4.0 * side * cos(before)), 0.001f);
     struct frame_result result = fixture_render(fixture);
     double share = 1.0 - fresnel(cos(side > 0 ? before : after), n);
@@ -243,8 +243,8 @@ TEST(a_pane_of_glass_shares_light_out_as_the_series_of_its_reflections)
                 fixture_square(fixture, 1000.0f, glass, turned);
                 fixture_square(fixture, 1000.0f, light_material(fixture), light);
                 no_sky(fixture);
-                fixture->request.width = fixture->request.height = 3;
-                fixture->request.depth = depth;
+                fixture->request.picture.width = fixture->request.picture.height = 3;
+                fixture->request.light.depth = depth;
                 double angle = slant * PI / 180.0;
                 fixture_look(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
                 struct frame_result result = fixture_render(fixture);

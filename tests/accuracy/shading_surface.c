@@ -76,7 +76,7 @@ TEST(an_environment_image_stands_the_right_way_round)
     environment->value.width = WIDTH;
     environment->value.height = HEIGHT;
     environment->texels = fixture_blob(texels, sizeof(texels));
-    fixture->request.width = fixture->request.height = 9;
+    fixture->request.picture.width = fixture->request.picture.height = 9;
     fixture_look(fixture, -3.0f, -3.0f, 3.0f, 0.01f); /* towards +x, +y, -z: the middle of a green column */
     struct frame_result result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 4, 4)[0], 0.0, 0.01);
@@ -105,7 +105,7 @@ TEST(blended_layers_let_through_what_alpha_leaves)
         fixture_square(fixture, 10.0f, material->base.id, transform);
     }
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 1.0f); /* so that there is no default sky */
-    fixture->request.depth = 0;                                  /* going straight on is no bounce */
+    fixture->request.light.depth = 0;                            /* going straight on is no bounce */
     struct frame_result result = fixture_render(fixture);
     const float *pixel = fixture_pixel(&result, 16, 16);
     assert_near(pixel[0], 0.25, 1e-6);
@@ -159,7 +159,7 @@ TEST(depth_counts_the_bounces_after_the_first_hit)
     fixture_square(fixture, 100.0f, mirror->base.id, behind);
     fixture->request.camera.fov_y = 0.01f;
     for (uint32_t depth = 0; depth < 9; depth += 4) {
-        fixture->request.depth = depth;
+        fixture->request.light.depth = depth;
         struct frame_result result = fixture_render(fixture);
         assert_near(fixture_pixel(&result, 16, 16)[0], 1.0 + depth, 1e-3);
         assert_int_equal(result.secondary_rays, depth * 32 * 32);
@@ -171,8 +171,8 @@ static void render_grey(struct fixture *fixture, const float radiance[3], enum t
 {
     fixture_clear((void **)&fixture);
     fixture_environment(fixture, radiance[0], radiance[1], radiance[2]);
-    fixture->request.format = PIXEL_FORMAT_RGBA8;
-    fixture->request.tone_map = tone_map;
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA8;
+    fixture->request.picture.tone_map = tone_map;
     struct frame_result result = fixture_render(fixture);
     memcpy(pixel, result.pixels, 4);
     frame_result_finish(&result);

@@ -213,8 +213,8 @@ static void expect_turned_grain(struct fixture *fixture, unsigned integrator, do
         }
         fixture_square(fixture, 10.0f, brushed->base.id, NULL);
         light_from(fixture, 0.3f, 0.1f);
-        fixture->request.integrator = integrator;
-        fixture->request.depth = 1;
+        fixture->request.light.integrator = integrator;
+        fixture->request.light.depth = 1;
         struct frame_result result = fixture_render(fixture);
         for (uint32_t i = 0; i < 32 * 32; i++)
             seen[way][i] = fixture_pixel(&result, i % 32, i / 32)[1];

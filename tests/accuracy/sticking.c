@@ -41,9 +41,9 @@ static void set_up(struct fixture *fixture, float power)
     fixture_environment(fixture, 0.2f, 0.2f, 0.2f);
     if (power > 0)
         fixture_light(fixture, LIGHT_POINT, light_place[0], light_place[1], light_place[2], power);
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.width = WIDTH;
-    fixture->request.height = HEIGHT;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.picture.width = WIDTH;
+    fixture->request.picture.height = HEIGHT;
     fixture->request.attachments = 1u << ATTACHMENT_STICKING;
     fixture_look(fixture, 0.0f, 0.0f, (float)EYE_Z, FOV_Y);
     fixture_commit(fixture);
@@ -115,10 +115,10 @@ TEST(mirror_and_glass_stick_and_a_rough_body_does_not)
     struct fixture *fixture = *state;
     set_up(fixture, 20.0f);
     for (size_t i = 0; i < count; i++) {
-        fixture->request.integrator = kinds[i];
-        fixture->request.samples = 1 + 3 * (i == 2); /* a mean of samples, too */
+        fixture->request.light.integrator = kinds[i];
+        fixture->request.sampling.samples = 1 + 3 * (i == 2); /* a mean of samples, too */
         struct frame_result result = fixture_render(fixture);
-        if (fixture->request.samples == 1)
+        if (fixture->request.sampling.samples == 1)
             each_pixel(&result, expect_by_material);
         assert_true(share_at(&result, WIDTH / 2, 1) == 0 && share_at(&result, 0, 0) == 0); /* the environment */
         assert_true(share_at(&result, 45, HEIGHT / 2) >= 254 && share_at(&result, WIDTH / 2, HEIGHT / 2) == 0);
@@ -162,7 +162,7 @@ TEST(in_even_light_a_dielectric_sticks_by_what_it_mirrors)
 {
     struct fixture *fixture = *state;
     set_up(fixture, 0.0f);
-    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
     struct frame_result result = fixture_render(fixture);
     each_pixel(&result, expect_fresnel);
     frame_result_finish(&result);
@@ -210,7 +210,7 @@ TEST(a_highlight_sticks)
 {
     struct fixture *fixture = *state;
     set_up(fixture, 20.0f);
-    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
     struct frame_result result = fixture_render(fixture);
     brightest = 0;
     each_pixel(&result, expect_highlight);
@@ -224,7 +224,7 @@ TEST_LONG(nothing_sticks_where_no_ray_leaves_the_straight_way)
     struct fixture *fixture = *state;
     set_up(fixture, 20.0f);
     for (size_t i = 0; i < sizeof(kinds) / sizeof(kinds[0]); i++) {
-        fixture->request.integrator = kinds[i];
+        fixture->request.light.integrator = kinds[i];
         struct frame_result result = fixture_render(fixture);
         for (uint32_t k = 0; k < WIDTH * HEIGHT; k++)
             assert_int_equal(share_at(&result, k % WIDTH, k / WIDTH), 0);
@@ -236,7 +236,7 @@ TEST(it_is_the_same_beside_other_attachments)
 {
     struct fixture *fixture = *state;
     set_up(fixture, 20.0f);
-    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
     struct frame_result alone = fixture_render(fixture);
     fixture->request.attachments |= 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS;
     struct frame_result beside = fixture_render(fixture);

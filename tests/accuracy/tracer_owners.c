@@ -120,7 +120,7 @@ static void stand_in(struct fixture *fixture, struct frame_renderer *renderer, c
         impl.trace_step = batches_step;
     }
     frame_renderer_stand_in(renderer, number, &impl);
-    fixture->request.tracer = number;
+    fixture->request.tracing.tracer = number;
 }
 
 static int clear_all(void **state)
@@ -230,15 +230,15 @@ TEST(an_edit_reaches_a_tracer_that_was_not_in_use)
     const struct ids ids = build_scene(fixture);
     stand_in(fixture, fixture->renderer, &tracer_bvh_impl, TRACER_BVH, 0, false);
     updates_for(fixture, fixture->renderer);
-    fixture->request.tracer = TRACER_NAIVE;
+    fixture->request.tracing.tracer = TRACER_NAIVE;
     for (int i = 0; i < 2; i++) {
         move_node(fixture, ids.square_node, NODE_MESH, ids.square, 0.25f * (float)(i + 1));
         assert_int_equal(updates_for(fixture, fixture->renderer), 0);
     }
     assert_int_equal(updates_for(fixture, fixture->renderer), 0);
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     struct frame_result expected = fixture_render(fixture);
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.tracing.tracer = TRACER_BVH;
     count_anew();
     struct frame_result got = fixture_render(fixture);
     assert_int_equal(counts.changed, CHANGED_INSTANCES);
@@ -290,7 +290,7 @@ TEST(each_viewer_has_a_structure_of_its_view)
     fixture_look(fixture, 0.0f, 0.5f, 5.0f, 0.6f);
     assert_int_equal(updates_for(fixture, fixture->renderer), 1);
     assert_int_equal(counts.changed, CHANGED_VIEW);
-    fixture->request.width = 40;
+    fixture->request.picture.width = 40;
     assert_int_equal(updates_for(fixture, fixture->renderer), 1);
     assert_int_equal(counts.changed, CHANGED_VIEW);
     /* An edit reaches both, each with its next frame. */
@@ -310,8 +310,8 @@ TEST(each_frame_in_progress_has_a_state_of_its_waves)
     struct fixture *fixture = *state;
     struct error error = {0};
     build_scene(fixture);
-    fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.width = 80;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
+    fixture->request.picture.width = 80;
     struct frame_result expected = fixture_render(fixture);
     struct frame_renderer *renderers[2] = {fixture->renderer, another_renderer(fixture)};
     for (int i = 0; i < 2; i++) {
@@ -361,7 +361,7 @@ TEST(a_wave_may_be_dropped_in_the_middle)
     struct error error = {0};
     struct frame_result ignored;
     build_scene(fixture);
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     struct frame_result expected = fixture_render(fixture);
     stand_in(fixture, fixture->renderer, &tracer_naive_impl, TRACER_NAIVE, 0, true);
     assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));

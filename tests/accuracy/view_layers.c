@@ -73,7 +73,7 @@ EACH_TEST(clear, NULL)
 
 static struct frame_result render_from(struct fixture *fixture, enum view_source source)
 {
-    fixture->request.view_source = source;
+    fixture->request.picture.view_source = source;
     return fixture_render(fixture);
 }
 
@@ -155,12 +155,12 @@ static double psnr_known(const struct frame_result *made, const struct frame_res
 
 static void expect_like_from_aside(struct fixture *fixture, double least_db, double most_unknown)
 {
-    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    fixture->request.picture.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
     struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
-    fixture->request.layers = 0;
+    fixture->request.picture.layers = 0;
     struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
     const double likeness = psnr_known(&made, &rendered), unknown = unknown_of(&made);
-    print_message("%u samples, lens %g: %.1f dB where known, %.2f %% unknown\n", fixture->request.samples,
+    print_message("%u samples, lens %g: %.1f dB where known, %.2f %% unknown\n", fixture->request.sampling.samples,
                   (double)fixture->request.aperture, likeness, 100 * unknown);
     assert_true(likeness >= least_db);
     assert_true(unknown <= most_unknown); /* behind edges */
@@ -174,13 +174,13 @@ TEST(an_eye_aside_is_like_the_rendered_one_where_the_key_view_knows)
 {
     struct fixture *fixture = *state;
     mix(fixture, true);
-    fixture->request.width = 320;
-    fixture->request.height = 240;
+    fixture->request.picture.width = 320;
+    fixture->request.picture.height = 240;
     step_aside(fixture, 0.065f);
     expect_like_from_aside(fixture, 40, 0.005);
     if (!getenv("FARLIGHT_TEST_LONG"))
         return;
-    fixture->request.samples = 16;
+    fixture->request.sampling.samples = 16;
     expect_like_from_aside(fixture, 40, 0.005);
     fixture->request.aperture = 0.05f;
     expect_like_from_aside(fixture, 40, 0.005);
@@ -191,13 +191,13 @@ TEST_LONG(views_side_by_side_are_those_of_eyes_side_by_side)
 {
     struct fixture *fixture = *state;
     mix(fixture, true);
-    fixture->request.views_across = 3;
-    fixture->request.views_down = 2;
-    fixture->request.baseline = 0.05f;
-    fixture->request.width = 3 * 320;
-    fixture->request.height = 2 * 240;
+    fixture->request.picture.views_across = 3;
+    fixture->request.picture.views_down = 2;
+    fixture->request.picture.baseline = 0.05f;
+    fixture->request.picture.width = 3 * 320;
+    fixture->request.picture.height = 2 * 240;
     struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
-    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    fixture->request.picture.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
     struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
     const double likeness = psnr_known(&made, &rendered);
     print_message("%.1f dB where known, %.2f %% unknown\n", likeness, 100 * unknown_of(&made));
@@ -221,11 +221,11 @@ TEST(layers_are_rendered_once_for_all_eyes_of_a_key_view)
     assert_int_equal(again.shadow_rays, 0);
     assert_same_picture(&first, &again);
     frame_result_finish(&again);
-    fixture->request.depth = 1; /* they would be others */
+    fixture->request.light.depth = 1; /* they would be others */
     again = render_from(fixture, VIEW_SOURCE_LAYERS);
     assert_true(layer_passes > passes);
     frame_result_finish(&again);
-    fixture->request.depth = 4;
+    fixture->request.light.depth = 4;
     const unsigned before = layer_passes;
     fixture_environment(fixture, 1.0f, 0.0f, 0.0f); /* the scene is another one */
     again = render_from(fixture, VIEW_SOURCE_LAYERS);
@@ -239,16 +239,16 @@ TEST(a_frame_cut_into_small_slices_is_the_same)
     struct fixture *fixture = *state;
     mix(fixture, false);
     step_aside(fixture, 0.05f);
-    fixture->request.samples = 2;
-    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    fixture->request.sampling.samples = 2;
+    fixture->request.picture.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
     struct frame_result whole = render_from(fixture, VIEW_SOURCE_LAYERS);
     for (int ahead = 0; ahead < 2; ahead++) {
-        fixture->request.seed++; /* lights are points: the layers are rendered again, and the same */
-        fixture->request.seed %= 2;
+        fixture->request.sampling.seed++; /* lights are points: the layers are rendered again, and the same */
+        fixture->request.sampling.seed %= 2;
         frame_renderer_set_capacity(fixture->renderer, 500, 2000);
         frame_renderer_queue_ahead(fixture->renderer, ahead);
         struct frame_result cut = render_from(fixture, VIEW_SOURCE_LAYERS);
-        if (fixture->request.seed == 0)
+        if (fixture->request.sampling.seed == 0)
             assert_same_picture(&whole, &cut);
         frame_result_finish(&cut);
     }
@@ -261,10 +261,10 @@ TEST(samples_of_eyes_add_up_from_frame_to_frame)
     struct fixture *fixture = *state;
     mix(fixture, false);
     step_aside(fixture, 0.05f);
-    fixture->request.accumulate = true;
-    fixture->request.samples = 4;
+    fixture->request.sampling.accumulate = true;
+    fixture->request.sampling.samples = 4;
     struct frame_result at_once = render_from(fixture, VIEW_SOURCE_LAYERS);
-    fixture->request.samples = 2;
+    fixture->request.sampling.samples = 2;
     fixture->request.key_camera.world_from_view[3] += 0.01f; /* another key view: it begins anew */
     struct frame_result result = render_from(fixture, VIEW_SOURCE_LAYERS);
     assert_int_equal(result.samples, 2);
@@ -286,9 +286,9 @@ TEST(other_layers_of_a_made_picture_are_those_of_the_rendered_one)
     struct fixture *fixture = *state;
     const uint32_t others = 1u << LAYER_ALBEDO | 1u << LAYER_NORMAL | 1u << LAYER_DEPTH | 1u << LAYER_ID;
     mix(fixture, false);
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     step_aside(fixture, 0.05f);
-    fixture->request.layers = others;
+    fixture->request.picture.layers = others;
     struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
     struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
     assert_same_picture(&made, &rendered);
@@ -302,11 +302,11 @@ TEST(what_cannot_be_made_from_layers_is_refused_by_name)
     struct error error = {0};
     mix(fixture, false);
     fixture_commit(fixture);
-    fixture->request.view_source = VIEW_SOURCE_LAYERS;
-    fixture->request.compare = true;
+    fixture->request.picture.view_source = VIEW_SOURCE_LAYERS;
+    fixture->request.comparison.compare = true;
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "compare");
-    fixture->request.compare = false;
+    fixture->request.comparison.compare = false;
     all_knowing.texel_view = NULL;
     error = (struct error){0};
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
@@ -338,8 +338,8 @@ static void panels(struct fixture *fixture)
     }
     fixture_light(fixture, LIGHT_POINT, -2.0f, 3.0f, 3.0f, 60.0f);
     fixture_environment(fixture, 0.3f, 0.4f, 0.5f);
-    fixture->request.width = 320;
-    fixture->request.height = 240;
+    fixture->request.picture.width = 320;
+    fixture->request.picture.height = 240;
     fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
 }
 
@@ -348,13 +348,13 @@ TEST_LONG(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
     struct fixture *fixture = *state;
     panels(fixture);
     frame_renderer_stand_in(fixture->renderer, 0, NULL);
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.tracing.tracer = TRACER_BVH;
     struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
-    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    fixture->request.picture.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
     struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
     print_message("own view: %.1f dB, %.2f %%\n", psnr_known(&made, &rendered), 100 * unknown_of(&made));
     assert_true(psnr_known(&made, &rendered) >= 80); /* texels' centres are pixels' */
-    fixture->request.layers = 0;
+    fixture->request.picture.layers = 0;
     frame_result_finish(&rendered);
     frame_result_finish(&made);
     step_aside(fixture, 0.065f);
@@ -368,7 +368,7 @@ TEST_LONG(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
         fixture->request.tracer_options.quadtree.layers = layers;
         expect_like_from_aside(fixture, 35, outside + (layers == 1 ? 0.006 : 0.001));
     }
-    fixture->request.format = PIXEL_FORMAT_RGBA8;
+    fixture->request.picture.format = PIXEL_FORMAT_RGBA8;
     made = render_from(fixture, VIEW_SOURCE_LAYERS);
     fixture_keep(&made, "panels from layers");
     frame_result_finish(&made);
@@ -397,13 +397,13 @@ TEST_LONG(a_lens_over_layers_has_less_noise_than_as_many_traced_samples)
     panels(fixture);
     squares_on_the_wall(fixture);
     frame_renderer_stand_in(fixture->renderer, 0, NULL);
-    fixture->request.tracer = TRACER_BVH;
+    fixture->request.tracing.tracer = TRACER_BVH;
     fixture->request.aperture = 0.1f;
     fixture->request.focus = 4.0f;
-    fixture->request.samples = 64;
+    fixture->request.sampling.samples = 64;
     struct frame_result truth = render_from(fixture, VIEW_SOURCE_RAYS);
-    fixture->request.samples = 4;
-    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    fixture->request.sampling.samples = 4;
+    fixture->request.picture.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
     struct frame_result traced = render_from(fixture, VIEW_SOURCE_RAYS);
     struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
     const double traced_db = psnr_known(&traced, &truth), made_db = psnr_known(&made, &truth);

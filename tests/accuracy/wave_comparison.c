@@ -117,11 +117,11 @@ static void build_scene(struct fixture *fixture)
     mirror->value.metallic = 1.0f;
     mirror->value.roughness = 0.0f;
     fixture_square(fixture, 3.0f, mirror->base.id, mirror_transform);
-    fixture->request.width = 84; /* not a multiple of the tiles' 8: some slots are dead */
-    fixture->request.height = 60;
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.compare = true;
-    fixture->request.compare_with = TRACER_NAIVE;
+    fixture->request.picture.width = 84; /* not a multiple of the tiles' 8: some slots are dead */
+    fixture->request.picture.height = 60;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.comparison.compare = true;
+    fixture->request.comparison.compare_with = TRACER_NAIVE;
 }
 
 /* The wrong tracer under examination, in place of bvh. */
@@ -138,12 +138,13 @@ static void examine_wrong(struct fixture *fixture, enum wrong_way way, enum ray_
     frame_renderer_stand_in(fixture->renderer, TRACER_BVH, &impl);
 }
 
-static uint64_t disagreeing(const struct wave_comparison *figures)
+static uint64_t disagreeing(const struct record_wave_comparison *figures)
 {
-    return figures->only_first + figures->only_second + figures->far + figures->other_surface;
+    return figures->only_tracer + figures->only_reference + figures->far + figures->other_surface;
 }
 
-static const struct wave_comparison *find(const struct frame_result *result, uint32_t wave, enum ray_kind kind)
+static const struct record_wave_comparison *find(const struct frame_result *result, uint32_t wave,
+                                                 enum ray_kind kind)
 {
     for (uint32_t i = 0; i < result->comparison_count; i++)
         if (result->comparisons[i].wave == wave && result->comparisons[i].kind == kind)
@@ -166,10 +167,10 @@ static void assert_complete(const struct frame_result *result)
 {
     assert_true(result->comparison_count > 0);
     for (uint32_t i = 0; i < result->comparison_count; i++) {
-        const struct wave_comparison *figures = &result->comparisons[i];
-        assert_int_equal(figures->rays,
-                         figures->both_hit + figures->both_missed + figures->only_first + figures->only_second);
-        assert_true(figures->first_ns > 0 && figures->second_ns > 0);
+        const struct record_wave_comparison *figures = &result->comparisons[i];
+        assert_int_equal(figures->rays, figures->both_hit + figures->both_missed + figures->only_tracer +
+                                            figures->only_reference);
+        assert_true(figures->tracer_ns > 0 && figures->reference_ns > 0);
         if (i > 0)
             assert_true(figures[-1].wave < figures->wave ||
                         (figures[-1].wave == figures->wave && figures[-1].kind < figures->kind));
@@ -180,8 +181,8 @@ static void assert_complete(const struct frame_result *result)
 }
 
 /* Only one kind of ray is found to be wrong; those of the wave `kind` is in are returned. */
-static const struct wave_comparison *assert_only_wrong(const struct frame_result *result, uint32_t wave,
-                                                       enum ray_kind kind)
+static const struct record_wave_comparison *assert_only_wrong(const struct frame_result *result, uint32_t wave,
+                                                              enum ray_kind kind)
 {
     assert_complete(result);
     for (uint32_t i = 0; i < result->comparison_count; i++)
@@ -200,13 +201,13 @@ TEST(bvh_and_brute_force_agree_on_every_ray_of_every_wave)
 {
     struct fixture *fixture = *state;
     build_scene(fixture);
-    fixture->request.samples = 2;
+    fixture->request.sampling.samples = 2;
     struct frame_result result = fixture_render(fixture);
     assert_complete(&result);
     assert_true(find(&result, 3, RAY_SECONDARY)->rays > 0);
     assert_true(find(&result, 1, RAY_SHADOW)->both_hit > 0);
     for (uint32_t i = 0; i < result.comparison_count; i++) {
-        const struct wave_comparison *figures = &result.comparisons[i];
+        const struct record_wave_comparison *figures = &result.comparisons[i];
         /* Both run the same intersection code on the same numbers: not a ray may differ, on edges neither. */
         assert_int_equal(disagreeing(figures), 0);
         assert_true(figures->distance_max == 0.0f && figures->normal_max == 0.0f);
@@ -219,8 +220,8 @@ TEST(comparing_changes_no_byte_of_the_picture)
     struct fixture *fixture = *state;
     build_scene(fixture);
     struct frame_result compared = fixture_render(fixture);
-    fixture->request.compare = false;
-    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.comparison.compare = false;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
     struct frame_result plain = fixture_render(fixture);
     assert_memory_equal(compared.pixels, plain.pixels, plain.size_bytes);
     assert_int_equal(plain.comparison_count, 0);
@@ -244,7 +245,7 @@ TEST(slices_that_overflow_are_counted_once)
     assert_complete(&split);
     assert_int_equal(whole.comparison_count, split.comparison_count);
     for (uint32_t i = 0; i < whole.comparison_count; i++) {
-        struct wave_comparison *a = &whole.comparisons[i], *b = &split.comparisons[i];
+        struct record_wave_comparison *a = &whole.comparisons[i], *b = &split.comparisons[i];
         assert_int_equal(a->rays, b->rays);
         assert_int_equal(a->both_hit, b->both_hit);
         /* Order and partition change nothing, not even in the last bit. */
@@ -288,12 +289,12 @@ TEST(what_a_tracer_has_wrong_is_caught_in_its_wave_and_class)
     for (size_t i = 0; i < sizeof(wrongs) / sizeof(wrongs[0]); i++) {
         examine_wrong(fixture, wrongs[i].way, wrongs[i].kind);
         struct frame_result result = fixture_render(fixture);
-        const struct wave_comparison *figures = assert_only_wrong(&result, wrongs[i].wave, wrongs[i].kind);
+        const struct record_wave_comparison *figures = assert_only_wrong(&result, wrongs[i].wave, wrongs[i].kind);
         const uint64_t both = figures->both_hit;
-        expect_share(wrongs[i].name, "of the first alone", figures->only_first,
-                     figures->both_missed + figures->only_first, wrongs[i].only_first);
-        expect_share(wrongs[i].name, "of the second alone", figures->only_second, both + figures->only_second,
-                     wrongs[i].only_second);
+        expect_share(wrongs[i].name, "of the first alone", figures->only_tracer,
+                     figures->both_missed + figures->only_tracer, wrongs[i].only_first);
+        expect_share(wrongs[i].name, "of the second alone", figures->only_reference,
+                     both + figures->only_reference, wrongs[i].only_second);
         expect_share(wrongs[i].name, "far apart", figures->far, both, wrongs[i].far);
         expect_share(wrongs[i].name, "other surfaces", figures->other_surface, both, wrongs[i].other_surface);
         assert_true(disagreeing(figures) > figures->rays / 50);
@@ -320,15 +321,15 @@ TEST(lost_hits_are_caught_where_things_move)
                                   {.node = node, .parent_from_node = {1, 0, 0, 8, 0, 1, 0, 0, 0, 0, 1, 0}}};
     struct scene_pose poses[2] = {{.nodes = &places[0], .node_count = 1}, {.nodes = &places[1], .node_count = 1}};
     const struct scene_motion motion = {.poses = poses, .pose_count = 2};
-    fixture->request.tracer = TRACER_BVH;
-    fixture->request.compare = true;
-    fixture->request.compare_with = TRACER_NAIVE;
-    fixture->request.samples = 4;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.comparison.compare = true;
+    fixture->request.comparison.compare_with = TRACER_NAIVE;
+    fixture->request.sampling.samples = 4;
     examine_wrong(fixture, WRONG_MISSES, RAY_PRIMARY);
     struct frame_result result = fixture_render_motion(fixture, &motion);
-    const struct wave_comparison *figures = assert_only_wrong(&result, 0, RAY_PRIMARY);
-    assert_true(figures->only_second > 100);
-    assert_true(figures->edges < figures->only_second / 20);
+    const struct record_wave_comparison *figures = assert_only_wrong(&result, 0, RAY_PRIMARY);
+    assert_true(figures->only_reference > 100);
+    assert_true(figures->edges < figures->only_reference / 20);
     frame_result_finish(&result);
 }
 
@@ -338,13 +339,13 @@ TEST(imprecise_distances_are_hits_with_an_error)
     build_scene(fixture);
     examine_wrong(fixture, WRONG_IMPRECISE, RAY_PRIMARY);
     struct frame_result result = fixture_render(fixture);
-    const struct wave_comparison *figures = find(&result, 0, RAY_PRIMARY);
+    const struct record_wave_comparison *figures = find(&result, 0, RAY_PRIMARY);
     assert_int_equal(disagreeing(figures), 0);
     /* 1/65536 is 256 steps of a float's last place: half of one step, and half a bin */
     assert_near(figures->relative_median * 65536.0f, 1.0, 1.0 / 512 + 1.0 / 256);
     assert_true(figures->distance_max > 0.0f && figures->distance_max < 1e-4f);
     frame_result_finish(&result);
-    fixture->request.compare_far_share = 1e-6f; /* to whom that is too far */
+    fixture->request.comparison.compare_far = 1e-6f; /* to whom that is too far */
     result = fixture_render(fixture);
     figures = find(&result, 0, RAY_PRIMARY);
     assert_int_equal(figures->far, figures->both_hit);
@@ -356,12 +357,12 @@ TEST(a_slow_reference_costs_the_frames_tracer_nothing)
     struct fixture *fixture = *state;
     build_scene(fixture);
     examine_wrong(fixture, WRONG_SLOW, RAY_PRIMARY);
-    fixture->request.tracer = TRACER_NAIVE;
-    fixture->request.compare_with = TRACER_BVH; /* whom the slow one stands in for */
+    fixture->request.tracing.tracer = TRACER_NAIVE;
+    fixture->request.comparison.compare_with = TRACER_BVH; /* whom the slow one stands in for */
     struct frame_result result = fixture_render(fixture);
     uint64_t slept_ns = wrong.waves * SLOW_NS, second_ns = 0;
     for (uint32_t i = 0; i < result.comparison_count; i++)
-        second_ns += result.comparisons[i].second_ns;
+        second_ns += result.comparisons[i].reference_ns;
     assert_true(second_ns >= result.comparison_count * (uint64_t)SLOW_NS);
     uint64_t compare_ns = stage_times_sum_ns(&result.times, STAGE_COMPARE, CLOCK_CPU);
     assert_true(compare_ns >= slept_ns);
@@ -380,11 +381,11 @@ TEST(an_edit_reaches_both_tracers)
     build_scene(fixture);
     struct frame_result result = fixture_render(fixture);
     frame_result_finish(&result);
-    fixture->request.compare = false; /* a frame in between that only one of them sees */
+    fixture->request.comparison.compare = false; /* a frame in between that only one of them sees */
     fixture_sphere(fixture, 0.0f, 0.5f, 1.5f, 0.3f, 0);
     result = fixture_render(fixture);
     frame_result_finish(&result);
-    fixture->request.compare = true;
+    fixture->request.comparison.compare = true;
     fixture_sphere(fixture, 0.5f, 0.5f, 1.5f, 0.2f, 0);
     result = fixture_render(fixture);
     assert_complete(&result);
@@ -396,14 +397,14 @@ TEST(an_edit_reaches_both_tracers)
 TEST(a_tracer_may_be_compared_with_itself_and_an_empty_scene_too)
 {
     struct fixture *fixture = *state;
-    fixture->request.tracer = fixture->request.compare_with = TRACER_BVH;
-    fixture->request.compare = true;
+    fixture->request.tracing.tracer = fixture->request.comparison.compare_with = TRACER_BVH;
+    fixture->request.comparison.compare = true;
     struct frame_result result = fixture_render(fixture);
     assert_complete(&result);
     assert_int_equal(result.comparisons[0].both_missed, 32 * 32);
     frame_result_finish(&result);
     build_scene(fixture);
-    fixture->request.compare_with = TRACER_BVH;
+    fixture->request.comparison.compare_with = TRACER_BVH;
     result = fixture_render(fixture);
     assert_complete(&result);
     assert_int_equal(disagreeing(&result.comparisons[0]), 0);
@@ -416,11 +417,11 @@ TEST(an_unknown_reference_is_refused_by_name)
     struct error error = {0};
     build_scene(fixture);
     fixture_commit(fixture);
-    fixture->request.compare_with = 60;
+    fixture->request.comparison.compare_with = 60;
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "compare_with");
-    fixture->request.compare = false; /* nobody asks for it */
+    fixture->request.comparison.compare = false; /* nobody asks for it */
     assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     frame_abandon(fixture->renderer);
 }

@@ -48,10 +48,10 @@ static bool render(struct bench *bench, const struct form *form, struct frame_re
 {
     struct frame_request request;
     paper_scene_request(&request);
-    request.width = bench->width;
-    request.height = bench->height;
-    request.integrator = form->integrator;
-    request.samples = form->samples;
+    request.picture.width = bench->width;
+    request.picture.height = bench->height;
+    request.light.integrator = form->integrator;
+    request.sampling.samples = form->samples;
     request.aperture = form->aperture;
     if (!frame_begin(bench->renderer, bench->scene, form->moves ? &bench->motion : NULL, &request, error))
         return false;

@@ -284,15 +284,15 @@ static bool come(struct viewer *viewer, struct fl_error *error)
 static bool begin_view(struct viewer *viewer, struct fl_error *error)
 {
     struct message_render terms = fl_view_defaults();
-    terms.width = options.width;
-    terms.height = options.height;
-    terms.samples = 1;
-    terms.depth = DEPTH;
+    terms.picture.width = options.width;
+    terms.picture.height = options.height;
+    terms.sampling.samples = 1;
+    terms.light.depth = DEPTH;
     terms.encoding = (enum protocol_encoding)options.encoding;
     terms.frames_per_second = (float)options.rate;
-    terms.still_encoding = terms.encoding;
+    terms.view.still_encoding = terms.encoding;
     terms.weight = options.weight;
-    terms.adapt = options.adapt;
+    terms.view.adapt = options.adapt;
     struct fl_scene_bounds bounds;
     viewer->view = fl_view_start(viewer->scene, &terms, error);
     struct fl_frame *frame = viewer->view ? fl_view_next(viewer->view, FIRST_MS, error) : NULL;
@@ -313,9 +313,9 @@ static bool begin_view(struct viewer *viewer, struct fl_error *error)
 static struct fl_job *begin_batch(struct viewer *beside, struct fl_error *error)
 {
     struct message_render job = fl_render_defaults();
-    job.width = 640;
-    job.height = 480;
-    job.samples = job.depth = 4;
+    job.picture.width = 640;
+    job.picture.height = 480;
+    job.sampling.samples = job.light.depth = 4;
     job.last_frame = 1000000;
     job.encoding = PROTOCOL_ENCODING_JPEG;
     beside->connection =

@@ -179,7 +179,8 @@ struct scene *paper_scene_create(void)
 void paper_scene_request(struct frame_request *request)
 {
     const float eye[3] = {-1.5f, 3.4f, 9.0f}, look_at[3] = {0.3f, 1.2f, 0.0f}, up[3] = {0.0f, 1.0f, 0.0f};
-    *request = (struct frame_request){.width = 640, .height = 480, .samples = 1, .depth = 4};
+    *request = (struct frame_request){
+        .picture.width = 640, .picture.height = 480, .sampling.samples = 1, .light.depth = 4};
     frame_camera_look_at(&request->camera, eye, look_at, up, 0.65f);
     request->focus = 9.2f;
 }

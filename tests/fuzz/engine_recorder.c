@@ -236,8 +236,8 @@ static void say_frame(struct recorded_job *job, uint32_t samples, const struct v
     struct engine_event *event = port_frame(job->client, job->request, (uint32_t)job->next,
                                             large ? RECORDER_LARGE_FRAME_BYTES : RECORDER_FRAME_BYTES);
     struct engine_frame *frame = event->frame;
-    frame->request.width = job->width;
-    frame->request.height = job->height;
+    frame->request.picture.width = job->width;
+    frame->request.picture.height = job->height;
     frame->result.samples = samples;
     frame->result.revision = job->reference->scene->scene->revision;
     frame->encoding = camera && !camera->moving ? job->still_encoding : job->encoding;
@@ -295,7 +295,7 @@ static void start_job(struct engine_command *command, struct recorded_reference 
 {
     const struct engine_job *asked = &command->job;
     struct recorded_job *job = find_job(0, 0);
-    FUZZ_REQUIRE(job && asked->frame_step > 0 && asked->pass_samples > 0);
+    FUZZ_REQUIRE(job && asked->frame_step > 0 && asked->view.pass_samples > 0);
     FUZZ_REQUIRE((asked->kind == JOB_VIEW) == (asked->wishes != NULL));
     uint64_t first = asked->first_frame;
     for (size_t i = 0; asked->wishes && i < JOBS_MAX; i++) {
@@ -311,12 +311,12 @@ static void start_job(struct engine_command *command, struct recorded_reference 
         .request = command->request,
         .reference = reference,
         .kind = asked->kind,
-        .width = asked->frame.width,
-        .height = asked->frame.height,
-        .samples = asked->frame.samples,
-        .pass_samples = asked->pass_samples,
+        .width = asked->frame.picture.width,
+        .height = asked->frame.picture.height,
+        .samples = asked->frame.sampling.samples,
+        .pass_samples = asked->view.pass_samples,
         .encoding = asked->encoding,
-        .still_encoding = asked->still_encoding,
+        .still_encoding = asked->view.still_encoding,
         .next = first,
         .last = asked->last_frame,
         .step = asked->frame_step,

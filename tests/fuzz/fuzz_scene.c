@@ -206,11 +206,12 @@ static void check_pose(const struct scene *scene, const struct scene_pose *pose)
 
 static void play(const struct scene *scene, struct input *input)
 {
-    struct clip_use uses[3];
+    struct record_clip_use uses[3];
     uint32_t use_count = 0;
     for (uint32_t clip = 1; clip <= IDS && use_count < 3; clip++) {
         if (scene_clip(scene, clip))
-            uses[use_count++] = (struct clip_use){clip, (float)(take(input) % 4) / 8, 1, take(input) % 2 == 1};
+            uses[use_count++] =
+                (struct record_clip_use){clip, (float)(take(input) % 4) / 8, 1, take(input) % 2 == 1};
     }
     struct scene_motion motion;
     double open_s = (double)take(input) / 32;

@@ -127,8 +127,8 @@ static struct message_render *begin_render(struct talk *talk, enum protocol_job_
     render->kind = kind;
     render->channel = kind == PROTOCOL_JOB_VIEW ? VIEW_CHANNEL : BATCH_CHANNEL;
     render->credit = 2;
-    render->width = render->height = 2;
-    render->samples = 4;
+    render->picture.width = render->picture.height = 2;
+    render->sampling.samples = 4;
     render->last_frame = 2;
     return render;
 }
@@ -193,7 +193,7 @@ void recorded_session(recorded_say_fn *say, void *context)
     begin_render(&talk, PROTOCOL_JOB_BATCH);
     end(&talk, 10);
     give_credit(&talk, BATCH_CHANNEL, 3);
-    begin_render(&talk, PROTOCOL_JOB_VIEW)->pass_samples = 2;
+    begin_render(&talk, PROTOCOL_JOB_VIEW)->view.pass_samples = 2;
     end(&talk, 11);
     acknowledge(&talk, 0);
     look(&talk, 1, true);
@@ -202,7 +202,7 @@ void recorded_session(recorded_say_fn *say, void *context)
     look(&talk, 3, false);
     struct message_render *render = begin_render(&talk, PROTOCOL_JOB_VIEW);
     render->credit = 9;
-    render->width = 3;
+    render->picture.width = 3;
     end(&talk, 12);
     acknowledge(&talk, 2);
     ask(&talk, 13, MESSAGE_STATS);
@@ -230,7 +230,7 @@ void recorded_onlooker(recorded_say_fn *say, void *context)
     message->object_get.scene = 1;
     message->object_get.kind = PROTOCOL_OBJECT_MATERIAL;
     end(&talk, 9);
-    begin_render(&talk, PROTOCOL_JOB_VIEW)->adapt = 1;
+    begin_render(&talk, PROTOCOL_JOB_VIEW)->view.adapt = 1;
     end(&talk, 4);
     look(&talk, 7, true);
     acknowledge(&talk, 0);
@@ -270,7 +270,7 @@ void recorded_blunders(recorded_say_fn *say, void *context)
     end(&talk, 10);
     begin_render(&talk, PROTOCOL_JOB_BATCH)->last_frame = 0;
     end(&talk, 11);
-    begin_render(&talk, PROTOCOL_JOB_BATCH)->width = 8192;
+    begin_render(&talk, PROTOCOL_JOB_BATCH)->picture.width = 8192;
     end(&talk, 12);
     cancel(&talk, 13, 11);
     cancel(&talk, 14, 13);

@@ -3,8 +3,10 @@
 import atexit
 import json
 import contextlib
+import functools
 import os
 import pathlib
+import re
 import shutil
 import signal
 import struct
@@ -29,6 +31,40 @@ os.environ.setdefault("FARLIGHT_SAMPLES", "1")
 # A shell's background commands ignore SIGINT, and so would all programs that tests start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+@functools.cache
+def protocol_fields(name):
+    """The fixed fields of a message or record by protocol.md: name -> (offset, letter of struct, default). A record
+    stands as its size, "picture.bytes", and its fields."""
+    text = (BIN / "protocol.md").read_text()
+    table = text[re.search(rf"^### (0x[0-9a-f]+ )?{name}$", text, re.M).end():]
+    table = table[:table.index("\n### ")]
+    fields = {}
+    for offset, field, kind, allowed in re.findall(r"^\| (\d+) \| `(\w+)` \| (.*?) \| (.*?) \|", table, re.M):
+        offset = int(offset)
+        if nested := re.fullmatch(r"u16 (\d+), then (\w+)", kind):
+            fields[field + ".bytes"] = offset, "H", int(nested[1])
+            fields.update({inner: (offset + 2 + place, letter, default)
+                           for inner, (place, letter, default) in protocol_fields(nested[2]).items()})
+            continue
+        letter = {"u8": "B", "u16": "H", "u64": "Q", "f32": "f"}.get(kind.split()[0], "I")
+        count = int(kind.split()[2]) if " x " in kind else 1
+        given, lowest = re.search(r"default ([-+.\de]+)$", allowed), re.match(r"([-+.\de]+) \.\.", allowed)
+        default = float(given[1] if given else lowest[1] if lowest and float(lowest[1]) > 0 else 0)
+        for i in range(count):
+            fields[field + f"[{i}]" * (count > 1)] = offset + 4 * i, letter, default if letter == "f" else int(default)
+    return fields
+
+
+def fixed_part(message, **values):
+    """The fixed part of a message; fields that are not given have their defaults."""
+    fields = protocol_fields(message)
+    assert values.keys() <= fields.keys(), values.keys() - fields.keys()
+    fixed = bytearray(max(offset + struct.calcsize("<" + letter) for offset, letter, _ in fields.values()) - 2)
+    for name, (offset, letter, default) in fields.items():
+        struct.pack_into("<" + letter, fixed, offset - 2, values.get(name, default))
+    return bytes(fixed)
+
 
 _bundled = None
 

@@ -48,30 +48,6 @@ def document():
     return (farlight_test.BIN / "protocol.md").read_text()
 
 
-def fields_of(message):
-    """name: (offset, struct's letter, default), by the document; without the counted ones."""
-    text = document()
-    table = text[re.search(rf"^### 0x[0-9a-f]+ {message}$", text, re.M).end():]
-    table = table[:table.index("\n### ")]
-    letters = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "f32": "f"}
-    fields = {}
-    for offset, name, kind, allowed in re.findall(r"^\| (\d+) \| `(\w+)` \| (.*?) \| (.*?) \|", table, re.M):
-        given = re.search(r"default ([-+.\de]+)$", allowed)
-        lowest = re.match(r"([-+.\de]+) \.\.", allowed)
-        default = float(given[1] if given else lowest[1] if lowest and float(lowest[1]) > 0 else 0)
-        letter = letters.get(kind.split()[0], "I")
-        fields[name] = int(offset), letter, default if letter == "f" else int(default)
-    return fields
-
-
-def fixed_part(message, **values):
-    fields = fields_of(message)
-    fixed = bytearray(max(offset + struct.calcsize("<" + letter) for offset, letter, _ in fields.values()) - 2)
-    for name, (offset, letter, default) in fields.items():
-        struct.pack_into("<" + letter, fixed, offset - 2, values.get(name, default))
-    return bytes(fixed)
-
-
 def unpack_zstd(data, size):
     library = ctypes.CDLL("libzstd.so.1")
     library.ZSTD_decompress.restype = ctypes.c_size_t
@@ -295,7 +271,7 @@ class Session(Case):
     def test_inverse_depths_are_what_the_document_says(self):
         """The triangle is the plane z = 0, seen by cameras at z = 5: 1 / depth of a pixel follows from its ray."""
         client, (width, height) = self.connect(tiny_client.triangle()), (32, 24)
-        fixed = fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, attachments=1, depth_form=1,
+        fixed = farlight_test.fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, attachments=1, depth_form=1,
                            depth_pixels=0.5, depth_radius=0.2, margin=0.25, camera_path=tiny_client.CAMERA_PATH_KEYS, credit=9)
         client.acknowledged.add(2)
         client.ask(tiny_client.RENDER, tiny_client.payload(
@@ -306,7 +282,7 @@ class Session(Case):
         while frame.command != 1:
             frame = client.next_frame()
         begin = {name: struct.unpack_from("<" + letter, frame.fixed, offset - 2)[0]
-                 for name, (offset, letter, _) in fields_of("frame_begin").items()}
+                 for name, (offset, letter, _) in farlight_test.protocol_fields("frame_begin").items()}
         self.assertEqual((begin["margin_x"], begin["margin_y"], frame.width, frame.height), (8, 6, 48, 36))
         focal = height / (2 * math.tan(LEFT[3] / 2))
         self.assertAlmostEqual(frame.height / (2 * math.tan(begin["fov_y"] / 2)), focal, delta=1e-4)
@@ -341,7 +317,7 @@ class Session(Case):
     def test_every_prefix_of_parts_is_what_the_document_says(self):
         """The link seems to take long for each frame, so that they come in parts."""
         client, (width, height) = self.connect(grid_scene()), (96, 64)
-        fixed = fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, encoding=JPEG, quality=75,
+        fixed = farlight_test.fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, encoding=JPEG, quality=75,
                            still_encoding=JPEG, attachments=3, depth_form=1, depth_pixels=0.5, depth_radius=0.2, parts=1,
                            camera_path=tiny_client.CAMERA_PATH_KEYS, credit=99)
         client.acknowledged.add(2)
@@ -385,14 +361,14 @@ class Session(Case):
             blobs, edits = tiny_client.triangle()
             mirror = tiny_client.set_material(1, (0.9, 0.9, 0.9), metallic=metallic, roughness=roughness)
             client, (width, height) = self.connect((blobs, [mirror] + edits[1:])), (30, 21)
-            fixed = fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, attachments=4,
+            fixed = farlight_test.fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, attachments=4,
                                camera_path=tiny_client.CAMERA_PATH_KEYS, credit=1)
             client.acknowledged.add(2)
             client.ask(tiny_client.RENDER, tiny_client.payload(
                 fixed, tiny_client.array([struct.pack("<f", 0) + tiny_client.camera_bytes(STRAIGHT)]), tiny_client.array([])))
             frame = client.next_frame()
             begin = {name: struct.unpack_from("<" + letter, frame.fixed, offset - 2)[0]
-                     for name, (offset, letter, _) in fields_of("frame_begin").items()}
+                     for name, (offset, letter, _) in farlight_test.protocol_fields("frame_begin").items()}
             across, down = -(-width // 4), -(-height // 4)
             packed = bytes(frame.pixels[frame.size_bytes:])
             self.assertEqual((begin["attachments"], begin["sticking_bytes"]), (4, len(packed)))

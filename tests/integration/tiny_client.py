@@ -258,13 +258,14 @@ class Client:
     # ---- pictures
 
     def render(self, scene, channel, size, camera, kind=BATCH, samples=1, depth=8, credit=1):
-        """camera: eye, point looked at, upward direction, vertical field of view. Fields behind `camera_path` are left to
-        their defaults: as an older client would send it."""
+        """camera: eye, point looked at, upward direction, vertical field of view. The last fields of each record are
+        left to their defaults, as an older client would send it."""
         if kind == VIEW:
             self.acknowledged.add(channel)
-        fixed = struct.pack("<8I", scene, kind, channel, 0, 1, 0, 0, 0)
-        fixed += struct.pack("<5IQ3IfI", credit, *size, samples, depth, 0, 0, 0, 1, 24, 0)
-        fixed += struct.pack("<4If4I", 0, 0, 0, 0, 0, 0, 0, 1, CAMERA_PATH_KEYS)
+        fixed = struct.pack("<8If3I", scene, kind, channel, 0, credit, 0, 0, 1, 24, 0, 0, 1)
+        picture, shot, sampling, lighting = (*size,), (CAMERA_PATH_KEYS,), (samples,), (0, depth)
+        for values in (picture, shot, sampling, lighting, (), (), ()):  # view, comparison and tracing: defaults
+            fixed += record(struct.pack(f"<{len(values)}I", *values))
         return self.ask(RENDER, payload(fixed, array([struct.pack("<f", 0) + camera_bytes(camera)]), array([])))
 
     def look(self, channel, command, camera, moving=False):

@@ -3,7 +3,6 @@
 each run the same."""
 import array
 import dataclasses
-import functools
 import math
 import random
 import re
@@ -12,6 +11,7 @@ import struct
 
 import farlight_test
 import tiny_client
+from farlight_test import fixed_part
 from tiny_client import BATCH, KEPT, PRIVATE, SHARED, VIEW, Client
 
 SIZE = (32, 24)  # of a frame, pixels: what a frame costs beside its pixels is what may leak
@@ -42,29 +42,6 @@ class Mix:
 
 # Without what takes seconds to compile, in software, when it is first used.
 SHORT = Mix(frames=25, cycle=1, sides=(1, 8, 30), tracers=(BVH,), integrators=(WHITTED,))
-
-
-@functools.cache
-def layout(message):
-    """Of the fixed part of a message, as the document of the protocol has it: field -> (offset, format, minimum)."""
-    document = (farlight_test.BIN / "protocol.md").read_text()
-    rows = re.search(rf"^### 0x\w+ {message}\n(.*?)^### ", document, re.M | re.S)[1]
-    formats = {"u32": "<I", "u64": "<Q", "f32": "<f"}
-    row = r"^\| (\d+) \| `(\w+)` \| ([^|]+) \| ([\d.e+-]*)(?: \.\.)?"
-    return {name: (int(offset) - 2, formats.get(kind, "<I"), max(float(minimum or 0), 0))  # 2: the size of the part
-            for offset, name, kind, minimum in re.findall(row, rows, re.M)}
-
-
-def fixed_part(message, **fields):
-    """Fields that are not given have their minimum, or 0."""
-    fixed = bytearray()
-    places = layout(message)
-    assert set(fields) <= set(places), set(fields) - set(places)
-    for name, (offset, kind, minimum) in places.items():
-        value = fields.get(name, minimum)
-        assert offset == len(fixed), name
-        fixed += struct.pack(kind, value if kind == "<f" else int(value))
-    return bytes(fixed)
 
 
 def sheet(side, unique):

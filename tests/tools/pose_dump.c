@@ -83,7 +83,7 @@ static bool print_node(const struct scene *scene, const struct scene_pose *pose,
 
 static bool print_time(const struct scene *scene, uint32_t clip, const char *time, struct error *error)
 {
-    const struct clip_use use = {.clip = clip, .speed = 1};
+    const struct record_clip_use use = {.clip = clip, .speed = 1};
     struct scene_pose pose = {0};
     struct scene_instance *instances = NULL;
     size_t count = 0;

@@ -172,7 +172,7 @@ bool cli_pair_compare(struct cli_pair *pair, uint32_t frame, const char *picture
     images.b = compared;
     images.picture = picture;
     images.layout = PROTOCOL_COMPARISON_LAYOUT_SIDE;
-    images.tone_map = pair->job.options.tone_map;
+    images.tone_map = pair->job.options.picture.tone_map;
     images.label_a = pair->labels[CLI_PAIR_REFERENCE];
     images.label_b = pair->labels[CLI_PAIR_COMPARED];
     images.interrupt_fd = cli_interrupt_fd();

@@ -108,8 +108,8 @@ static bool complete(struct tracer_comparison *comparison)
     if (!cli_pair_complete(&comparison->pair, false) ||
         !cli_check_error_picture(comparison->pair.images.picture, inputs, 2, &job->error))
         return false;
-    job->options.primary = PROTOCOL_PRIMARY_TRACE;
-    job->options.compare_far = (float)comparison->far_share;
+    job->options.tracing.primary = PROTOCOL_PRIMARY_TRACE;
+    job->options.comparison.compare_far = (float)comparison->far_share;
     comparison->pair.labels[CLI_PAIR_REFERENCE] = protocol_tracer_text(comparison->reference);
     comparison->pair.labels[CLI_PAIR_COMPARED] = protocol_tracer_text(comparison->tracer);
     return true;
@@ -123,9 +123,9 @@ static struct fl_frame *render(struct tracer_comparison *comparison, enum cli_pa
 {
     struct cli_pair *pair = &comparison->pair;
     struct message_render *wanted = &pair->job.options;
-    wanted->compare = side == CLI_PAIR_COMPARED;
-    wanted->tracer = wanted->compare ? comparison->tracer : comparison->reference;
-    wanted->compare_with = comparison->reference;
+    wanted->comparison.compare = side == CLI_PAIR_COMPARED;
+    wanted->tracing.tracer = wanted->comparison.compare ? comparison->tracer : comparison->reference;
+    wanted->comparison.compare_with = comparison->reference;
     struct fl_frame *frame = cli_pair_render(pair, side, error) ? cli_pair_next(pair, error) : NULL;
     if (frame)
         cli_structure_warn(frame, warned, &pair->progress);

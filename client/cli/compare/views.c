@@ -96,7 +96,7 @@ static bool complete(struct views_comparison *comparison)
 {
     struct cli_pair *pair = &comparison->pair;
     struct cli_job *job = &pair->job;
-    comparison->is_series = job->options.upsample > 1;
+    comparison->is_series = job->options.picture.upsample > 1;
     if (!comparison->is_series && (job->series.has_range || job->camera.is_orbit || job->camera.keys_file)) {
         cli_usage(job,
                   job->series.has_range  ? "--frames"
@@ -107,7 +107,7 @@ static bool complete(struct views_comparison *comparison)
     }
     if (!cli_pair_complete(pair, comparison->is_series))
         return false;
-    if (job->options.view_source != PROTOCOL_VIEW_SOURCE_LAYERS) {
+    if (job->options.picture.view_source != PROTOCOL_VIEW_SOURCE_LAYERS) {
         cli_usage(job, job->views.has_lens ? "--lens" : "--views", "no picture is made from depth layers");
         return fl_error_remedy(&job->error,
                                "use the source quadtree: the rendered picture is compared with it anyway");
@@ -175,8 +175,8 @@ static bool run(struct views_comparison *comparison, struct fl_error *error)
         fl_error_set(error, FL_ERROR_ARGUMENT, "--lens", "this camera has no lens: the picture is rendered");
         return fl_error_remedy(error, "choose a camera with perspective");
     }
-    wanted->view_source = PROTOCOL_VIEW_SOURCE_RAYS;
-    wanted->upsample = 1;
+    wanted->picture.view_source = PROTOCOL_VIEW_SOURCE_RAYS;
+    wanted->picture.upsample = 1;
     if (!cli_pair_render(pair, CLI_PAIR_REFERENCE, error))
         return false;
     for (uint32_t i = 0; i < comparison->frame_count; i++) {
@@ -239,13 +239,13 @@ static void print_text(const struct views_comparison *comparison)
     const struct message_render *wanted = &comparison->pair.job.options;
     const struct total total = total_of(comparison);
     cli_print_name(comparison->pair.job.input.model);
-    if (wanted->views_across * wanted->views_down > 1)
-        printf(", %ux%u views of", wanted->views_across, wanted->views_down);
+    if (wanted->picture.views_across * wanted->picture.views_down > 1)
+        printf(", %ux%u views of", wanted->picture.views_across, wanted->picture.views_down);
     else
         putchar(',');
-    printf(" %ux%u, %u sample%s a pixel, %s: rendered, and made from depth layers\n", wanted->width,
-           wanted->height, wanted->samples, wanted->samples == 1 ? "" : "s",
-           protocol_integrator_text(wanted->integrator));
+    printf(" %ux%u, %u sample%s a pixel, %s: rendered, and made from depth layers\n", wanted->picture.width,
+           wanted->picture.height, wanted->sampling.samples, wanted->sampling.samples == 1 ? "" : "s",
+           protocol_integrator_text(wanted->light.integrator));
     for (uint32_t i = 0; i < comparison->frame_count; i++)
         print_frame(comparison, &comparison->frames[i]);
     if (!comparison->is_series)
@@ -272,11 +272,12 @@ static void print_json(const struct views_comparison *comparison)
         json_array_append_new(frames, frame_json(comparison, &comparison->frames[i]));
     fl_text_utf8(comparison->pair.job.input.model, model, sizeof(model));
     json_t *object = json_pack(
-        "{s:s, s:i, s:i, s:i, s:i, s:i, s:s, s:o, s:f, s:o, s:b}", "model", model, "width", (int)wanted->width,
-        "height", (int)wanted->height, "views_across", (int)wanted->views_across, "views_down",
-        (int)wanted->views_down, "samples", (int)wanted->samples, "integrator",
-        protocol_integrator_text(wanted->integrator), "frames", frames, "unknown", total.unknown, "psnr",
-        isfinite(total.psnr_db) ? json_real(total.psnr_db) : json_null(), "within", is_within(comparison) ? 1 : 0);
+        "{s:s, s:i, s:i, s:i, s:i, s:i, s:s, s:o, s:f, s:o, s:b}", "model", model, "width",
+        (int)wanted->picture.width, "height", (int)wanted->picture.height, "views_across",
+        (int)wanted->picture.views_across, "views_down", (int)wanted->picture.views_down, "samples",
+        (int)wanted->sampling.samples, "integrator", protocol_integrator_text(wanted->light.integrator), "frames",
+        frames, "unknown", total.unknown, "psnr", isfinite(total.psnr_db) ? json_real(total.psnr_db) : json_null(),
+        "within", is_within(comparison) ? 1 : 0);
     json_dumpf(object, stdout, CLI_JSON | JSON_REAL_PRECISION(9));
     putchar('\n');
     json_decref(object);

@@ -29,13 +29,14 @@ static const char *find_conflict(const struct cli_job *job, const char **why)
     } conflicts[] = {
         {job->input.scene, "--scene", "whose contents may change between two parts"},
         {cli_has_input(job), "a model from standard input", "which no other part can read"},
-        {wanted->crop_width > 0, "--crop", "which is a part already"},
+        {wanted->picture.crop_width > 0, "--crop", "which is a part already"},
         {job->sampling.is_auto, "--samples auto", "which reads neighbouring pixels"},
-        {wanted->noise > 0.0f, "--noise", "which reads neighbouring pixels"},
-        {wanted->denoise != PROTOCOL_DENOISE_OFF, "--denoise", "which reads neighbouring pixels"},
+        {wanted->sampling.noise > 0.0f, "--noise", "which reads neighbouring pixels"},
+        {wanted->picture.denoise != PROTOCOL_DENOISE_OFF, "--denoise", "which reads neighbouring pixels"},
         {job->views.has_stereo, "--stereo", "whose picture is of several views"},
         {job->views.has_light_field, "--light-field", "whose picture is of several views"},
-        {wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS, "--lens quadtree", "which reads neighbouring pixels"},
+        {wanted->picture.view_source == PROTOCOL_VIEW_SOURCE_LAYERS, "--lens quadtree",
+         "which reads neighbouring pixels"},
         {job->sampling.progressive, "--progressive", "which shows the whole picture"},
         {job->input.watch, "--watch", "which shows the whole picture"},
         {job->output.dwaa, "--exr-compression dwaa", "which loses something of each part"},
@@ -68,16 +69,16 @@ bool cli_picture_part_complete(struct cli_job *job)
         cli_usage(job, "--part", "cannot be combined with %s, %s", other, why);
         return fl_error_remedy(&job->error, "leave out one of them");
     }
-    const struct squares squares = squares_of(wanted->width, wanted->height, job->part.count);
+    const struct squares squares = squares_of(wanted->picture.width, wanted->picture.height, job->part.count);
     const uint32_t most = squares.count < SQUARES_PARTS_MAX ? squares.count : SQUARES_PARTS_MAX;
     if (job->part.count > most) {
         cli_usage(job, "--part", "%u parts are more than a picture of %ux%u can have", job->part.count,
-                  wanted->width, wanted->height);
+                  wanted->picture.width, wanted->picture.height);
         return fl_error_remedy(&job->error, "divide it into at most %u", most);
     }
     /* `auto` would choose by the device, and a rasteriser would draw the whole picture for each square */
-    if (wanted->primary == PROTOCOL_PRIMARY_AUTO)
-        wanted->primary = PROTOCOL_PRIMARY_TRACE;
+    if (wanted->tracing.primary == PROTOCOL_PRIMARY_AUTO)
+        wanted->tracing.primary = PROTOCOL_PRIMARY_TRACE;
     return true;
 }
 
@@ -152,7 +153,7 @@ bool cli_picture_part_begin(struct cli_picture_part *part, struct cli_job *job, 
     if (strcmp(name, part->name) == 0)
         return true;
     cli_picture_part_finish(part);
-    part->squares = squares_of(job->options.width, job->options.height, job->part.count);
+    part->squares = squares_of(job->options.picture.width, job->options.picture.height, job->part.count);
     part->first = part->next = squares_first(&part->squares, job->part.number - 1, job->part.count);
     part->end = squares_first(&part->squares, job->part.number, job->part.count);
     memcpy(part->name, name, sizeof(part->name));
@@ -181,10 +182,10 @@ bool cli_picture_part_next(const struct cli_picture_part *part, struct message_r
     if (part->next == part->end)
         return false;
     const struct square square = squares_at(&part->squares, part->next);
-    render->crop_x = square.x;
-    render->crop_y = square.y;
-    render->crop_width = square.width;
-    render->crop_height = square.height;
+    render->picture.crop_x = square.x;
+    render->picture.crop_y = square.y;
+    render->picture.crop_width = square.width;
+    render->picture.crop_height = square.height;
     return true;
 }
 

@@ -30,7 +30,7 @@ static error_t set_option(struct cli_job *job, int key, const char *value)
 {
     struct cli_series *series = &job->series;
     double real = (double)job->options.frames_per_second;
-    uint64_t whole = job->options.upsample;
+    uint64_t whole = job->options.picture.upsample;
     bool good = true;
     switch (key) {
     case KEY_FRAMES:
@@ -50,7 +50,7 @@ static error_t set_option(struct cli_job *job, int key, const char *value)
         break;
     case KEY_UPSAMPLE:
         good = fl_text_integer(value, 1, 64, &whole, &job->error);
-        job->options.upsample = (uint32_t)whole;
+        job->options.picture.upsample = (uint32_t)whole;
         break;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -87,7 +87,7 @@ static bool load_keys(struct cli_job *job)
     size_t count = 0;
     if (!fl_camera_keys_load(job->camera.keys_file, &job->series.keys, &count, &job->error))
         return false;
-    job->options.camera_path = PROTOCOL_CAMERA_KEYS;
+    job->options.camera.camera_path = PROTOCOL_CAMERA_KEYS;
     job->options.keys = job->series.keys;
     job->options.keys_count = (uint32_t)count;
     return true;
@@ -111,7 +111,7 @@ bool cli_series_complete(struct cli_job *job)
     /* Without motion of the camera or anything else, all frames would be equal. */
     job->camera.is_orbit = job->camera.is_orbit || (!job->camera.name && !job->script && job->clips.count == 0);
     if (job->camera.is_orbit)
-        job->options.camera_path = PROTOCOL_CAMERA_ORBIT;
+        job->options.camera.camera_path = PROTOCOL_CAMERA_ORBIT;
     return true;
 }
 

@@ -28,7 +28,7 @@ static void add_export(struct cli_session *session, int64_t frame, uint64_t begi
 static bool is_enough(const struct cli_session *session, float noise, uint32_t samples)
 {
     const struct message_render *options = &session->job->options;
-    return noise <= options->noise || samples >= options->samples;
+    return noise <= options->sampling.noise || samples >= options->sampling.samples;
 }
 
 /* True for a frame that has to be written, not a step on the way to a picture. */
@@ -168,13 +168,13 @@ static bool render_passes(struct cli_session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
     struct message_render options = job->options;
-    const uint32_t total = job->sampling.endless ? UINT32_MAX : options.samples;
+    const uint32_t total = job->sampling.endless ? UINT32_MAX : options.sampling.samples;
     const struct fl_frame_run still = {.step = 1};
     uint64_t pass_ns = 0;
-    options.accumulate = PROTOCOL_ACCUMULATION_ON;
-    for (uint32_t held = 0; held < total; held += options.samples) {
+    options.sampling.accumulate = PROTOCOL_ACCUMULATION_ON;
+    for (uint32_t held = 0; held < total; held += options.sampling.samples) {
         const uint64_t begin_ns = monotonic_now_ns();
-        options.samples = pass_samples(job, held, total, options.samples, pass_ns);
+        options.sampling.samples = pass_samples(job, held, total, options.sampling.samples, pass_ns);
         session->rendering = fl_render_start(session->loading.scene, &options, error);
         if (!session->rendering || !take_frames(session, &still, error))
             return end_passes(session, error);
@@ -182,12 +182,13 @@ static bool render_passes(struct cli_session *session, struct fl_error *error)
         session->rendering = NULL;
         pass_ns = monotonic_now_ns() - begin_ns;
         if (!job->sampling.by_error) {
-            cli_progress_samples(&session->progress, held + options.samples, job->sampling.endless ? 0 : total);
+            cli_progress_samples(&session->progress, held + options.sampling.samples,
+                                 job->sampling.endless ? 0 : total);
             continue;
         }
         cli_progress_noise(&session->progress, &(struct cli_noise){.error = session->noise,
-                                                                   .wanted = options.noise,
-                                                                   .held = held + options.samples,
+                                                                   .wanted = options.sampling.noise,
+                                                                   .held = held + options.sampling.samples,
                                                                    .total = total});
         if (is_enough(session, session->noise, 0))
             break;

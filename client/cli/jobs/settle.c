@@ -139,8 +139,9 @@ static void settle_camera(struct cli_job *job)
     const uint32_t frames = fl_frame_run_count(&series->range);
     wanted->time_origin_frame = series->range.first;
     if (job->camera.is_orbit) {
-        wanted->orbit_turn = (float)(series->orbit_degrees * RADIANS_PER_DEGREE);
-        wanted->orbit_seconds = (float)(series->orbit_seconds > 0 ? series->orbit_seconds : frames * step_s);
+        wanted->camera.orbit_turn = (float)(series->orbit_degrees * RADIANS_PER_DEGREE);
+        wanted->camera.orbit_seconds =
+            (float)(series->orbit_seconds > 0 ? series->orbit_seconds : frames * step_s);
     }
     if (series->dolly_times)
         series->dolly_times[1] = (float)(series->dolly_seconds > 0 ? series->dolly_seconds

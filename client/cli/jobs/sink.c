@@ -202,7 +202,8 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
         .frames_per_second = sink->is_series ? job->options.frames_per_second : 0,
         .interrupt_fd = job->sampling.progressive ? 0 : cli_interrupt_fd(),
         .format = cli_image_name(sink->output.image),
-        .window = {wanted->crop_x, wanted->crop_y, wanted->crop_width > 0 ? wanted->width : 0, wanted->height}};
+        .window = {wanted->picture.crop_x, wanted->picture.crop_y,
+                   wanted->picture.crop_width > 0 ? wanted->picture.width : 0, wanted->picture.height}};
     sink->exporter = fl_exporter_start(&options, error);
     if (sink->exporter)
         return true;
@@ -228,7 +229,7 @@ bool cli_sinks_names(struct cli_sinks *sinks, struct fl_scene *scene, struct fl_
     (void)protocol_layers_parse("crypto-material", &named);
     for (size_t i = 0; i < sinks->count; i++) {
         const struct cli_sink *sink = &sinks->items[i];
-        if (sink->exporter && sink->job->options.layers & named &&
+        if (sink->exporter && sink->job->options.picture.layers & named &&
             !fl_exporter_names(sink->exporter, scene, error))
             return false;
     }
@@ -238,14 +239,15 @@ bool cli_sinks_names(struct cli_sinks *sinks, struct fl_scene *scene, struct fl_
 static bool have(struct cli_sink *sink, uint32_t frame)
 {
     const struct message_render *wanted = &sink->job->options;
-    const uint32_t across = sink->part == CLI_PART_ALL ? wanted->views_across : 1;
+    const uint32_t across = sink->part == CLI_PART_ALL ? wanted->picture.views_across : 1;
     uint32_t width = 0, height = 0;
     if (!sink->is_series || !fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) ||
         !fl_image_size(sink->path, &width, &height))
         return false;
-    const bool has_size = wanted->crop_width > 0
-                              ? width == wanted->crop_width && height == wanted->crop_height
-                              : width == wanted->width * across && height == wanted->height * wanted->views_down;
+    const bool has_size = wanted->picture.crop_width > 0
+                              ? width == wanted->picture.crop_width && height == wanted->picture.crop_height
+                              : width == wanted->picture.width * across &&
+                                    height == wanted->picture.height * wanted->picture.views_down;
     const enum digest_state digest = has_size ? digest_check(sink->path) : DIGEST_DIFFERS;
     return digest == DIGEST_AGREES || (digest == DIGEST_MISSING && !sink->job->series.digests);
 }
@@ -299,7 +301,7 @@ static bool write_all(struct cli_sink *sink, const struct fl_frame *frame, struc
 static bool write_part(struct cli_sink *sink, const struct fl_frame *frame, struct fl_error *error)
 {
     const bool is_right = sink->part == CLI_PART_RIGHT;
-    const float aside = sink->job->options.baseline / 2;
+    const float aside = sink->job->options.picture.baseline / 2;
     const struct fl_frame_part part = {.x = is_right ? frame->width / 2 : 0,
                                        .width = frame->width / 2,
                                        .height = frame->height,

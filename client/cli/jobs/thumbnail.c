@@ -95,7 +95,7 @@ static bool complete(struct thumbnails *wanted)
     }
     wanted->to_folder = is_folder(wanted->output);
     if (!job->sampling.has_samples && !job->given.integrator) {
-        job->options.samples = SAMPLES;
+        job->options.sampling.samples = SAMPLES;
         job->sampling.has_samples = true;
     }
     job->sampling.filters = true;
@@ -106,7 +106,7 @@ static bool complete(struct thumbnails *wanted)
     job->output.path = wanted->to_folder ? "model.png" : wanted->output;
     if (!cli_job_complete(job, false))
         return false;
-    if (job->options.format == PROTOCOL_PIXEL_FORMAT_RGBA8)
+    if (job->options.picture.format == PROTOCOL_PIXEL_FORMAT_RGBA8)
         return true;
     cli_usage(job, wanted->output, "a sheet has 8 bits a colour");
     return fl_error_remedy(&job->error, "name a .png or .jpg file");
@@ -116,7 +116,7 @@ static bool complete(struct thumbnails *wanted)
 
 static bool prepare_sheet(struct thumbnails *wanted, struct fl_error *error)
 {
-    const uint32_t cell[2] = {wanted->job.options.width, wanted->job.options.height};
+    const uint32_t cell[2] = {wanted->job.options.picture.width, wanted->job.options.picture.height};
     return sheet_begin(&wanted->sheet, cell, wanted->columns, (uint32_t)wanted->models.count, error);
 }
 
@@ -360,7 +360,7 @@ int cli_thumbnail(int argc, char **argv)
                               .children = children};
     struct message_render defaults = fl_render_defaults();
     struct thumbnails wanted = {.columns = 0};
-    defaults.width = defaults.height = CELL_PIXELS;
+    defaults.picture.width = defaults.picture.height = CELL_PIXELS;
     const bool good =
         cli_job_begin(&wanted.job, defaults) && cli_parse(&argp, argc, argv, 0, &wanted) == 0 && complete(&wanted);
     const int status = good ? thumbnails(&wanted) : cli_report(&wanted.job.error);

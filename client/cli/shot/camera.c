@@ -228,8 +228,8 @@ bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
     for (enum view which = EYE; which < VIEW_COUNT; which++)
         view[which] = shot_member(at, properties[which].name);
     if (!read_place(reader, at, view) ||
-        (view[APERTURE].value && !read_view(reader, &view[APERTURE], APERTURE, &job->options.aperture)) ||
-        (view[FOCUS].value && !read_view(reader, &view[FOCUS], FOCUS, &job->options.focus)) ||
+        (view[APERTURE].value && !read_view(reader, &view[APERTURE], APERTURE, &job->options.camera.aperture)) ||
+        (view[FOCUS].value && !read_view(reader, &view[FOCUS], FOCUS, &job->options.camera.focus)) ||
         (view[EXPOSURE].value && !read_view(reader, &view[EXPOSURE], EXPOSURE, &exposure)))
         return false;
     job->clips.change_lens = shot_is_keyed(&view[APERTURE]);

@@ -10,7 +10,8 @@
 
 const struct field_desc *panel_setting(enum protocol_tracer tracer, size_t index)
 {
-    const struct field_desc *field = message_describe(MESSAGE_RENDER)->body()->fields;
+    const struct struct_desc *render = message_describe(MESSAGE_RENDER)->body();
+    const struct field_desc *field = struct_field(render, "tracing")->record()->fields;
     for (; field->name; field++)
         if (field->tracer && strcmp(field->tracer, protocol_tracer_text(tracer)) == 0 && index-- == 0)
             return field;
@@ -28,7 +29,7 @@ size_t panel_setting_count(enum protocol_tracer tracer)
 /* Address of a setting, whose offset is as in the message. */
 static void *place_of(const struct field_desc *setting, struct tracer_settings *settings)
 {
-    return (char *)settings + setting->offset - offsetof(struct message_render, settings);
+    return (char *)settings + setting->offset - offsetof(struct record_tracing, settings);
 }
 
 void panel_value(const struct field_desc *setting, const struct tracer_settings *settings, char *text,

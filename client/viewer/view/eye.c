@@ -13,7 +13,7 @@ bool view_follows(const struct view *view)
 
 uint32_t view_home_node(const struct view *view)
 {
-    return view->render.camera_path == PROTOCOL_CAMERA_NODE ? view->render.camera_node : 0;
+    return view->render.camera.camera_path == PROTOCOL_CAMERA_NODE ? view->render.camera.camera_node : 0;
 }
 
 void view_go(struct view *view, const struct viewer_camera *camera, uint32_t node)

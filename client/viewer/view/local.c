@@ -61,14 +61,14 @@ void view_ask_local(struct view *view, struct message_render *render)
     if (!view->local.asked)
         return;
     if (radius_of(view) > 0)
-        render->depth_radius = radius_of(view);
-    view->local.radius = render->depth_radius;
-    render->attachments |= FL_ATTACH_DEPTH | FL_ATTACH_STICKING;
-    render->depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
-    render->depth_pixels = DEPTH_PIXELS;
-    render->margin = MARGIN;
+        render->view.depth_radius = radius_of(view);
+    view->local.radius = render->view.depth_radius;
+    render->view.attachments |= FL_ATTACH_DEPTH | FL_ATTACH_STICKING;
+    render->view.depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
+    render->view.depth_pixels = DEPTH_PIXELS;
+    render->view.margin = MARGIN;
     /* The daemon has no hidden layers for a lens or an open shutter. */
-    render->hidden_layers = render->aperture > 0 || render->shutter > 0 ? 0 : HIDDEN_LAYERS;
+    render->view.hidden_layers = render->camera.aperture > 0 || render->camera.shutter > 0 ? 0 : HIDDEN_LAYERS;
 }
 
 bool view_asks_otherwise(const struct view *view)
@@ -118,13 +118,14 @@ static void leave_margin(struct fl_frame *frame)
 /* Makes the picture the new key. The key takes the pixels if the picture itself is not shown. */
 static bool give_key(struct view *view, struct fl_frame *frame, bool is_shown)
 {
-    struct views_key key = {
-        .depth_step = frame->depth_step,
-        .radius = view->local.radius,
-        .is_smeared = frame->encoding == PROTOCOL_ENCODING_JPEG || frame->encoding == PROTOCOL_ENCODING_H264,
-        .is_moving = frame->moving,
-        .is_final = !frame->moving && !frame->more_follows && view_has_samples(view, frame, view->render.samples),
-        .came_ns = monotonic_now_ns()};
+    struct views_key key = {.depth_step = frame->depth_step,
+                            .radius = view->local.radius,
+                            .is_smeared = frame->encoding == PROTOCOL_ENCODING_JPEG ||
+                                          frame->encoding == PROTOCOL_ENCODING_H264,
+                            .is_moving = frame->moving,
+                            .is_final = !frame->moving && !frame->more_follows &&
+                                        view_has_samples(view, frame, view->render.sampling.samples),
+                            .came_ns = monotonic_now_ns()};
     if (!view->local.views)
         view->local.views = views_create(&view->failure);
     if (!view->local.views || (is_shown && !pixmap_copy(&key.picture, &view->frames.arrived, &view->failure)))

@@ -59,12 +59,12 @@ void view_outline_ask(struct view *view, struct message_render *job)
     outline->revision = view->frames.last.revision;
     outline->tab = edit->tab;
     outline->id = edit->ids[edit->tab];
-    job->width = (uint32_t)view->frames.live.width;
-    job->height = (uint32_t)view->frames.live.height;
-    job->primary = view_primary(view);
+    job->picture.width = (uint32_t)view->frames.live.width;
+    job->picture.height = (uint32_t)view->frames.live.height;
+    job->tracing.primary = view_primary(view);
     job->encoding = session_is_local(view->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_ZSTD;
     view_use_eyes(view, job);
-    job->view_source = PROTOCOL_VIEW_SOURCE_RAYS;
+    job->picture.view_source = PROTOCOL_VIEW_SOURCE_RAYS;
 }
 
 /* Lists one material, or one node with its descendants. */

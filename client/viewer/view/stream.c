@@ -34,15 +34,15 @@ void view_use_eyes(const struct view *view, struct message_render *render)
     const struct view_options *options = view->options;
     if (!view->settings.stereo)
         return;
-    render->eyes_over = options->stereo_over;
-    render->views_across = options->stereo_over ? 1 : 2;
-    render->views_down = options->stereo_over ? 2 : 1;
-    render->width /= render->views_across;
-    render->height /= render->views_down;
-    render->baseline = options->stereo_m;
-    render->view_source = view->settings.views;
-    if (render->view_source == PROTOCOL_VIEW_SOURCE_LAYERS)
-        render->ground = 0; /* the ground is not supported in pictures made from layers */
+    render->picture.eyes_over = options->stereo_over;
+    render->picture.views_across = options->stereo_over ? 1 : 2;
+    render->picture.views_down = options->stereo_over ? 2 : 1;
+    render->picture.width /= render->picture.views_across;
+    render->picture.height /= render->picture.views_down;
+    render->picture.baseline = options->stereo_m;
+    render->picture.view_source = view->settings.views;
+    if (render->picture.view_source == PROTOCOL_VIEW_SOURCE_LAYERS)
+        render->picture.ground = 0; /* the ground is not supported in pictures made from layers */
 }
 
 /* Chooses encodings. Pixels stay uncompressed on the same machine. A network gets video in motion, and lossless
@@ -56,9 +56,9 @@ static void choose_encodings(const struct view *view, struct message_render *ren
                            : session_can_h264(view->session) ? PROTOCOL_ENCODING_H264
                                                              : PROTOCOL_ENCODING_JPEG;
     if (!options->has_still_encoding)
-        render->still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
-    render->adapt = options->always_adapt || (!is_local && !options->never_adapt);
-    render->parts = !is_local;
+        render->view.still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
+    render->view.adapt = options->always_adapt || (!is_local && !options->never_adapt);
+    render->view.parts = !is_local;
 }
 
 static void send_view(struct view *view)
@@ -69,22 +69,22 @@ static void send_view(struct view *view)
     const struct fl_clip_info *clip =
         view->eye.tour.clip != TOUR_NONE ? fl_scene_clip(session_scene(view->session), (size_t)view->eye.tour.clip)
                                          : NULL;
-    view_render_size(view, &render.width, &render.height);
+    view_render_size(view, &render.picture.width, &render.picture.height);
     view_use_eyes(view, &render);
     choose_encodings(view, &render);
-    render.tracer = settings->tracer;
-    render.integrator = settings->integrator;
-    render.settings = settings->tracers;
-    render.tone_map = settings->tone_map;
-    render.exposure_stops += (float)settings->exposure_thirds / 3;
-    render.primary = view_primary(view);
+    render.tracing.tracer = settings->tracer;
+    render.light.integrator = settings->integrator;
+    render.tracing.settings = settings->tracers;
+    render.picture.tone_map = settings->tone_map;
+    render.picture.exposure_stops += (float)settings->exposure_thirds / 3;
+    render.tracing.primary = view_primary(view);
     if (clip && clip->clip != 0) {
         use.clip = clip->clip;
         render.clips = &use;
         render.clips_count = 1;
     }
     view_ask_local(view, &render);
-    render.moving_rate = view->options->moving_rate;
+    render.view.moving_rate = view->options->moving_rate;
     view->sent.must_send_view = !session_show(view->session, &render, &view->sent.change);
     view->sent.must_send_camera = true; /* the new stream's frames carry the number of the camera sent after it */
 }
@@ -108,7 +108,7 @@ void view_send(struct view *view, uint64_t now_ns)
 {
     const bool is_moving = view->eye.moved_ns + REST_PAUSE_NS > now_ns;
     /* Another stream restarts the accumulation at rest, which costs little while it has few samples. */
-    const bool is_young = view->frames.last.samples <= view->render.pass_samples;
+    const bool is_young = view->frames.last.samples <= view->render.view.pass_samples;
     if (view->sent.must_send_view || ((is_moving || is_young) && view_asks_otherwise(view)))
         send_view(view);
     if (!view->eye.has_camera)
@@ -213,13 +213,14 @@ void view_receive(struct view *view, unsigned timeout_ms)
 
 bool view_has_samples(const struct view *view, const struct fl_frame *frame, unsigned enough)
 {
-    const float noise = view->render.noise;
+    const float noise = view->render.sampling.noise;
     return frame->samples >= enough || (noise > 0.0f && frame->noise <= noise);
 }
 
 bool view_is_at_rest(const struct view *view, unsigned samples)
 {
-    const unsigned maximum = view->render.samples, enough = samples > 0 && samples < maximum ? samples : maximum;
+    const unsigned maximum = view->render.sampling.samples,
+                   enough = samples > 0 && samples < maximum ? samples : maximum;
     const struct fl_scene *scene = session_scene(view->session);
     return view->eye.has_camera && view->sent.has_sent_camera && !view->sent.must_send_view &&
            !view->sent.must_send_camera && (!scene || view->frames.last.revision >= fl_scene_revision(scene)) &&

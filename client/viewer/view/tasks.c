@@ -15,7 +15,7 @@
 uint32_t view_primary(const struct view *view)
 {
     if (view->options->has_primary)
-        return view->render.primary;
+        return view->render.tracing.primary;
     return view->settings.tracer == PROTOCOL_TRACER_REFERENCE ? PROTOCOL_PRIMARY_TRACE : PROTOCOL_PRIMARY_RASTER;
 }
 
@@ -25,15 +25,15 @@ uint32_t view_primary(const struct view *view)
 static void fill_probe(const struct view *view, struct message_render *job)
 {
     *job = view->render;
-    job->width = job->height = 1;
-    job->samples = 1;
-    job->depth = 0;
-    job->tracer = view->settings.tracer;
-    job->settings = view->settings.tracers;
-    job->integrator = PROTOCOL_INTEGRATOR_WHITTED;
-    job->aperture = job->shutter = 0;
-    job->layers = 1u << PROTOCOL_LAYER_POSITION;
-    job->format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    job->picture.width = job->picture.height = 1;
+    job->sampling.samples = 1;
+    job->light.depth = 0;
+    job->tracing.tracer = view->settings.tracer;
+    job->tracing.settings = view->settings.tracers;
+    job->light.integrator = PROTOCOL_INTEGRATOR_WHITTED;
+    job->camera.aperture = job->camera.shutter = 0;
+    job->picture.layers = 1u << PROTOCOL_LAYER_POSITION;
+    job->picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     job->encoding = PROTOCOL_ENCODING_RAW;
 }
 
@@ -49,13 +49,13 @@ static void fill_key(const struct viewer_camera *camera, struct record_camera_ke
 
 static void use_node(struct message_render *job, uint32_t node)
 {
-    job->camera_path = PROTOCOL_CAMERA_NODE;
-    job->camera_node = node;
+    job->camera.camera_path = PROTOCOL_CAMERA_NODE;
+    job->camera.camera_node = node;
 }
 
 static void use_key(struct message_render *job, struct record_camera_key *key)
 {
-    job->camera_path = PROTOCOL_CAMERA_KEYS;
+    job->camera.camera_path = PROTOCOL_CAMERA_KEYS;
     job->keys = key;
     job->keys_count = 1;
 }
@@ -77,10 +77,11 @@ static void aim(const struct view *view, struct record_camera_key *key)
 {
     struct viewer_camera camera = view->eye.camera;
     double direction[3];
-    struct message_render render = {.width = (uint32_t)view->frames.live.width,
-                                    .height = (uint32_t)view->frames.live.height};
+    struct message_render render = {.picture.width = (uint32_t)view->frames.live.width,
+                                    .picture.height = (uint32_t)view->frames.live.height};
     view_use_eyes(view, &render);
-    camera_ray(&camera, (double)render.width / render.height, view->tasks.x, view->tasks.y, direction);
+    camera_ray(&camera, (double)render.picture.width / render.picture.height, view->tasks.x, view->tasks.y,
+               direction);
     const double distance = camera_distance(&camera);
     for (int i = 0; i < 3; i++)
         camera.look_at[i] = camera.eye[i] + direction[i] * distance;
@@ -101,25 +102,25 @@ static void use_camera(const struct view *view, struct message_render *job, stru
 static void fill_reference(const struct view *view, struct message_render *job, struct record_camera_key *key)
 {
     *job = view->render;
-    job->width = (uint32_t)view->heat.compared.width;
-    job->height = (uint32_t)view->heat.compared.height;
-    job->samples = view->frames.last.samples;
-    job->tracer = PROTOCOL_TRACER_REFERENCE;
-    job->primary = view_primary(view);
-    job->integrator = view->settings.integrator;
-    job->tone_map = view->settings.tone_map;
-    job->exposure_stops += (float)view->settings.exposure_thirds / 3;
-    job->accumulate = PROTOCOL_ACCUMULATION_ON; /* uses the random numbers of a view */
+    job->picture.width = (uint32_t)view->heat.compared.width;
+    job->picture.height = (uint32_t)view->heat.compared.height;
+    job->sampling.samples = view->frames.last.samples;
+    job->tracing.tracer = PROTOCOL_TRACER_REFERENCE;
+    job->tracing.primary = view_primary(view);
+    job->light.integrator = view->settings.integrator;
+    job->picture.tone_map = view->settings.tone_map;
+    job->picture.exposure_stops += (float)view->settings.exposure_thirds / 3;
+    job->sampling.accumulate = PROTOCOL_ACCUMULATION_ON; /* uses the random numbers of a view */
     view_use_eyes(view, job);
-    job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* an error of layers must show in the comparison */
+    job->picture.view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* an error of layers must show in the comparison */
     job->encoding = session_is_local(view->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     use_camera(view, job, key);
 }
 
 static void ask_for_ids(struct message_render *job)
 {
-    job->layers = 1u << PROTOCOL_LAYER_ID;
-    job->tracer = PROTOCOL_TRACER_BVH; /* sampled tracers have no node identifiers */
+    job->picture.layers = 1u << PROTOCOL_LAYER_ID;
+    job->tracing.tracer = PROTOCOL_TRACER_BVH; /* sampled tracers have no node identifiers */
 }
 
 static bool ask(struct view *view, enum view_task task, struct fl_error *refusal)
@@ -184,8 +185,8 @@ static double depth_of_scene(const struct view *view, const struct fl_frame *fra
     struct fl_scene_bounds bounds = {.empty = true};
     struct fl_error ignored;
     double depth = 0, diagonal = 0;
-    if (view->render.auto_node != 0 || !fl_scene_get_bounds(session_scene(view->session), &bounds, &ignored) ||
-        bounds.empty)
+    if (view->render.camera.auto_node != 0 ||
+        !fl_scene_get_bounds(session_scene(view->session), &bounds, &ignored) || bounds.empty)
         return 0;
     for (int i = 0; i < 3; i++) {
         const double lower = (double)bounds.lower_world[i], upper = (double)bounds.upper_world[i];

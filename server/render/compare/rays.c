@@ -91,21 +91,21 @@ void wave_tally_merge(struct wave_tally *into, const struct wave_tally *from)
     error_histogram_merge(&into->normal, &from->normal);
 }
 
-void wave_tally_figures(const struct wave_tally *tally, struct wave_comparison *figures)
+void wave_tally_figures(const struct wave_tally *tally, struct record_wave_comparison *figures)
 {
-    *figures = (struct wave_comparison){
+    *figures = (struct record_wave_comparison){
         .wave = tally->wave,
         .kind = tally->kind,
         .rays = tally->rays,
         .both_hit = tally->both_hit,
         .both_missed = tally->both_missed,
-        .only_first = tally->only_first,
-        .only_second = tally->only_second,
+        .only_tracer = tally->only_first,
+        .only_reference = tally->only_second,
         .far = tally->far,
         .edges = tally->edges,
         .other_surface = tally->other_surface,
-        .first_ns = tally->first_ns,
-        .second_ns = tally->second_ns,
+        .tracer_ns = tally->first_ns,
+        .reference_ns = tally->second_ns,
         .distance_median = error_histogram_percentile(&tally->distance, 0.5),
         .distance_p99 = error_histogram_percentile(&tally->distance, 0.99),
         .distance_max = tally->distance.max,

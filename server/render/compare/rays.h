@@ -14,6 +14,7 @@
 #define FARLIGHT_RENDER_COMPARE_RAYS_H
 
 #include "base/words.h"
+#include "protocol/values.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 
@@ -66,20 +67,9 @@ struct wave_tally {
 void wave_tally_merge(struct wave_tally *into, const struct wave_tally *from);
 
 /* The figures of a tally. A shadow ray hits if it is not fully lit, and is far if the transmittances of both
- * differ by more than WAVE_FAR_TRANSMITTANCE; it has no distance and no normal. */
-struct wave_comparison {
-    uint32_t wave;
-    enum ray_kind kind;
-    uint64_t rays, both_hit, both_missed, only_first, only_second, far, edges, other_surface;
-    uint64_t first_ns, second_ns;
-    /* Errors of rays that hit with both and are not on an edge: difference in world space, in scene diagonals. */
-    float distance_median, distance_p99, distance_max;
-    float relative_median; /* errors as a share of the reference's distance */
-    /* Angles between the shading normals of those rays that are not far either, degrees. */
-    float normal_median, normal_p99, normal_max;
-};
-
-void wave_tally_figures(const struct wave_tally *tally, struct wave_comparison *figures);
+ * differ by more than WAVE_FAR_TRANSMITTANCE; it has no distance and no normal. The first tracer is the job's, the
+ * second one the reference. */
+void wave_tally_figures(const struct wave_tally *tally, struct record_wave_comparison *figures);
 
 struct wave_compare_settings {
     float diagonal;  /* the scene's, in world space; above 0 */

@@ -91,7 +91,7 @@ bool comparison_keep_slice(struct comparison *comparison, struct error *error)
     return true;
 }
 
-bool comparison_take(struct comparison *comparison, struct wave_comparison **figures, uint32_t *count,
+bool comparison_take(struct comparison *comparison, struct record_wave_comparison **figures, uint32_t *count,
                      struct error *error)
 {
     uint32_t n = comparison->frame.count;

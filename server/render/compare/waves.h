@@ -34,7 +34,7 @@ bool comparison_wave(struct comparison *comparison, const struct wave *wave, enu
 bool comparison_keep_slice(struct comparison *comparison, struct error *error);
 void comparison_drop_slice(struct comparison *comparison);
 /* The figures of the frame, ascending by wave and kind; malloc'ed, the caller's. */
-bool comparison_take(struct comparison *comparison, struct wave_comparison **figures, uint32_t *count,
+bool comparison_take(struct comparison *comparison, struct record_wave_comparison **figures, uint32_t *count,
                      struct error *error);
 
 #endif

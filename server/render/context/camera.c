@@ -169,30 +169,30 @@ static float focus_distance(const struct frame_camera *camera, const struct gpu_
 
 void frame_view_size(const struct frame_request *request, uint32_t *width, uint32_t *height)
 {
-    *width = request->width / (request->views_across ? request->views_across : 1);
-    *height = request->height / (request->views_down ? request->views_down : 1);
+    *width = request->picture.width / (request->picture.views_across ? request->picture.views_across : 1);
+    *height = request->picture.height / (request->picture.views_down ? request->picture.views_down : 1);
 }
 
 bool frame_has_views(const struct frame_request *request)
 {
-    return request->views_across > 1 || request->views_down > 1;
+    return request->picture.views_across > 1 || request->picture.views_down > 1;
 }
 
 /* From the first eye to the camera, in views. */
 static void eyes_middle(const struct frame_request *request, float middle[2])
 {
-    middle[0] = request->views_across > 1 ? (float)(request->views_across - 1) / 2.0f : 0.0f;
-    middle[1] = request->views_down > 1 ? (float)(request->views_down - 1) / 2.0f : 0.0f;
+    middle[0] = request->picture.views_across > 1 ? (float)(request->picture.views_across - 1) / 2.0f : 0.0f;
+    middle[1] = request->picture.views_down > 1 ? (float)(request->picture.views_down - 1) / 2.0f : 0.0f;
 }
 
 /* From an eye to that of the next view to the right, and to that of the next one below. */
 static void eye_steps(const struct frame_request *request, float steps[4])
 {
-    const float baseline = frame_has_views(request) ? request->baseline : 0.0f;
+    const float baseline = frame_has_views(request) ? request->picture.baseline : 0.0f;
     steps[0] = baseline;
     steps[1] = 0.0f;
-    steps[2] = request->eyes_over ? baseline : 0.0f;
-    steps[3] = request->eyes_over ? 0.0f : -baseline;
+    steps[2] = request->picture.eyes_over ? baseline : 0.0f;
+    steps[3] = request->picture.eyes_over ? 0.0f : -baseline;
 }
 
 void frame_view_eye(const struct frame_request *request, uint32_t across, uint32_t down, float eye[2])
@@ -224,9 +224,9 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
     };
     memcpy(view.world_from_view, camera->world_from_view, sizeof(view.world_from_view));
     raster_camera_fill(uniforms, &view);
-    uniforms->width = request->width;
-    uniforms->height = request->height;
-    uniforms->tiles_across = (request->width + 7) / 8;
+    uniforms->width = request->picture.width;
+    uniforms->height = request->picture.height;
+    uniforms->tiles_across = (request->picture.width + 7) / 8;
     eyes_middle(request, uniforms->eyes_middle);
     eye_steps(request, uniforms->eye_steps);
     uniforms->lens[0] = request->aperture / 2.0f;

@@ -24,10 +24,10 @@ void context_span_end(struct render_device *device)
 
 /* A frame of many slices and samples has more spans than a record holds; what is of one stage, clock and wave
  * becomes one, which begins where the first of them did. */
-static void add_span(struct stage_times *times, uint64_t origin_ns, const struct stage_span *span)
+static void add_span(struct stage_times *times, uint64_t origin_ns, const struct record_stage_time *span)
 {
     for (uint32_t i = 0; i < times->count; i++) {
-        struct stage_span *own = &times->spans[i];
+        struct record_stage_time *own = &times->spans[i];
         if (own->stage == span->stage && own->clock == span->clock && own->wave == span->wave) {
             own->duration_ns += span->duration_ns;
             return;
@@ -67,7 +67,7 @@ void context_collect_done(struct render_device *device)
 
 void context_add_cpu_time(struct render_device *device, enum stage stage, uint64_t start_ns)
 {
-    const struct stage_span span = {
+    const struct record_stage_time span = {
         .stage = stage,
         .clock = CLOCK_CPU,
         .wave = device->wave_number,

@@ -34,12 +34,12 @@ bool context_samples_emitters(const struct render_frame *frame)
 
 uint32_t context_ao_rays(const struct render_frame *frame)
 {
-    return frame->request.ao_rays > 0 ? frame->request.ao_rays : AO_RAYS_DEFAULT;
+    return frame->request.light.ao_rays > 0 ? frame->request.light.ao_rays : AO_RAYS_DEFAULT;
 }
 
 float context_ao_distance(const struct render_frame *frame)
 {
-    float asked = frame->request.ao_distance;
+    float asked = frame->request.light.ao_distance;
     return asked > 0.0f ? asked : frame->scene->diagonal * AO_DISTANCE_DEFAULT;
 }
 

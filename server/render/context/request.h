@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/words.h"
 #include "base/ycbcr.h"
+#include "protocol/values.h"
 #include "trace/tracer.h"
 
 #include <stdbool.h>
@@ -29,7 +30,7 @@ enum frame_history {
     HISTORY_MOVING /* HISTORY_USED with other noise, whatever the seed; no samples are added to it */
 };
 
-/* A part of a picture, pixels; width 0: all of it. */
+/* A part of a picture, pixels. */
 struct frame_crop {
     uint32_t x, y, width, height;
 };
@@ -43,16 +44,17 @@ struct frame_ground {
     float radius;                           /* 0: there is none */
 };
 
+/* The records are those of `render`, which protocol/values.def explains; zeros stand for defaults. The session
+ * passes them whole, and the engine adds what a frame has of its own. */
 struct frame_request {
-    uint32_t width, height; /* the whole picture's */
-    /* Only the tiles of 8 x 8 pixels that this part touches get samples, and the result is the part. Not with
-     * `noise` and `denoise`, which look at pixels around, attachments and VIEW_SOURCE_LAYERS. */
-    struct frame_crop crop;
-    /* Views in it, of the same size, row by row; 0: 1. Each is that of an eye of its own, see frame_view_eye(). */
-    uint32_t views_across, views_down;
-    float baseline; /* metres between neighbouring eyes */
-    bool eyes_over; /* views one below the other are those of eyes side by side */
-    enum view_source view_source;
+    /* width and height are those of all views together, row by row; each view has an eye of its own, see
+     * frame_view_eye(). With a crop, only the tiles of 8 x 8 pixels that it touches get samples. */
+    struct record_picture picture;
+    struct record_sampling sampling;
+    struct record_lighting light;
+    struct record_comparison comparison; /* the second tracer has the same options */
+    struct record_tracing tracing;
+    struct tracer_options tracer_options; /* tracing.settings within the daemon's limits */
     /* Another camera than the picture's sees what is rendered; only with VIEW_SOURCE_LAYERS. */
     bool has_key;
     struct frame_camera key_camera;
@@ -60,62 +62,33 @@ struct frame_request {
      * within hidden_radius sees past what hides them; elsewhere there is nothing. */
     uint32_t hidden_layer;
     float hidden_radius; /* metres; of that */
-    uint32_t samples, depth;
-    /* Tiles stop one by one when their error is below that (picture/noise.h); `samples` is the most that one gets.
-     * 0: each gets all. Not with `compare` and VIEW_SOURCE_LAYERS. */
-    float noise;
-    uint64_t seed;
     struct frame_camera camera;
     /* The camera a frame earlier and a frame later, for LAYER_MOTION; without them it stands still. */
     bool has_neighbours;
     struct frame_camera camera_earlier, camera_later;
     double clips_time_s; /* when that is; 0: nothing plays */
-    unsigned tracer;     /* protocol's number */
-    struct tracer_options tracer_options;
-    enum integrator_kind integrator;
-    enum primary_kind primary;
-    enum tone_map tone_map;
-    enum pixel_format format;
-    float exposure_stops;
-    enum background background;
-    float background_colour[3]; /* linear, 0 .. 1; BACKGROUND_COLOUR */
-    float aperture;             /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
-    float focus; /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
-    enum pixel_filter filter;
-    enum brdf brdf;    /* reflection of rough surfaces; integrator path */
-    float clamp;       /* times 2^-exposure_stops: see shaders/render/fireflies.glsl; 0: nothing is limited */
-    float ao_distance; /* metres; 0: a tenth of the scene's diagonal */
-    float ao_falloff;  /* power of 1 - distance / ao_distance; 0: all counts the same */
-    uint32_t ao_rays;  /* a sample; 0: 8 */
-    float wireframe;   /* pixels: width of lines along the edges of triangles; 0: none */
+    float aperture;      /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
+    float focus;         /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     struct frame_ground ground;
-    float layer_opacity;  /* opacity of opaque surfaces, integrator raycast; 0: 0.5 */
-    uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */
     /* RGBA8 of the picture alone: it comes as these planes, which are less to read back, and which its encoder
      * need not make of it. */
     enum ycbcr ycbcr;
-    /* The frame goes on where the one before it ended, if that showed the same and was to be gone on from: scene,
-     * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
-     * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
-    bool accumulate;
-    bool starts_anew; /* with `accumulate`: this frame does not go on; those after it may go on from this one */
-    /* With `accumulate`: the limit of accumulated samples; of `samples` only those up to it are added. 0: no
-     * limit. */
+    /* With sampling.accumulate the frame goes on where the one before it ended, if that showed the same and was to
+     * be gone on from: scene, motion and request alike but for the number of samples and what is done with the sum
+     * (format, tone map, exposure); it adds its samples to those. n frames of k samples hold what one of n x k
+     * does, to the bit. */
+    bool starts_anew; /* with that: this frame does not go on; those after it may go on from this one */
+    /* With that: the limit of accumulated samples; of `samples` only those up to it are added. 0: no limit. */
     uint32_t samples_max;
-    /* Random noise is filtered out of the picture that is handed out, not out of the sums
-     * (render/passes/denoise/); what integrators without any show stays as it is, and so does a picture made from
-     * layers. */
-    enum denoise denoise;
-    /* With that: whether the picture, but not its sums, has what those before it have of the same places. */
+    /* With picture.denoise: whether the picture, but not its sums, has what those before it have of the same
+     * places. */
     enum frame_history history;
-    /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
-     * and the result has what came of it. The picture is that of `tracer`. */
-    bool compare;
-    unsigned compare_with;   /* protocol's number; with the same options */
-    float compare_far_share; /* 0: WAVE_FAR_SHARE, see render/compare/rays.h */
 };
 
+/* The part of the picture that the frame shows: its crop, or the whole picture. */
+struct frame_crop frame_request_crop(const struct frame_request *request);
+bool frame_request_is_cropped(const struct frame_request *request);
 /* The layers as bits, with the beauty where the request names none. */
 uint32_t frame_request_layers(const struct frame_request *request);
 /* The plane that an attachment alone is made of: a layer after all others. */

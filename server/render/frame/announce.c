@@ -24,14 +24,14 @@ void announce_first(struct frame_renderer *renderer)
     struct frame_work *work = renderer->work;
     const struct scene *scene = renderer->scene;
     struct tracer kind = {
-        .impl = frame_find_tracer(renderer, work->frame.request.tracer, "tracer", &(struct error){0})};
+        .impl = frame_find_tracer(renderer, work->frame.request.tracing.tracer, "tracer", &(struct error){0})};
     const bool tells = !renderer->announced_first && kind.impl && !kind.impl->sampled &&
-                       !work->frame.request.compare && !frame_is_from_layers(&renderer->request) &&
+                       !work->frame.request.comparison.compare && !frame_is_from_layers(&renderer->request) &&
                        !work->frame.request.hidden_layer && !work->frame.integrator->lit_by_surfaces &&
                        renderer->shared->copy.revision == 0 && !renderer->motion &&
                        scene->objects[OBJECT_SPHERES].count == 0;
     renderer->announced_first = true;
-    if (!tells || work->frame.request.samples == 0)
+    if (!tells || work->frame.request.sampling.samples == 0)
         return;
     work->frame.features = scene_features_of(scene);
     work->wave.sampled_hits = false;

@@ -10,9 +10,8 @@
 #include <math.h>
 
 #define SIZE_MAX_PIXELS 16384u /* width and height; keeps the number of a pixel in 32 bits */
-#define AO_RAYS_MAX 65536u     /* keeps the number of a sample's rays in 32 bits */
 
-/* ---- the request alone ---- */
+/* ---- the request alone: what the ranges of its records, which the protocol holds, leave open ---- */
 
 /* `fields`: of its transform, its angle and its height. */
 static bool check_view(const struct frame_camera *camera, const char *const fields[3], struct error *error)
@@ -36,55 +35,13 @@ static bool check_camera(const struct frame_request *request, struct error *erro
     if (!check_view(&request->camera, own, error) ||
         (request->has_key && !check_view(&request->key_camera, key, error)))
         return false;
-    if (!(request->aperture >= 0.0f && isfinite(request->aperture)))
-        return error_set(error, ERROR_INVALID, "aperture", "a lens of %g metres", (double)request->aperture);
-    if (!(request->focus >= 0.0f && isfinite(request->focus)))
-        return error_set(error, ERROR_INVALID, "focus", "%g metres; 0 and more are possible",
-                         (double)request->focus);
-    return true;
-}
-
-static bool check_background(const struct frame_request *request, struct error *error)
-{
-    if (request->background >= BACKGROUND_COUNT)
-        return error_set(error, ERROR_UNSUPPORTED, "background", "there is no background number %u",
-                         (unsigned)request->background);
-    for (int c = 0; c < 3; c++)
-        if (!(request->background_colour[c] >= 0.0f && request->background_colour[c] <= 1.0f))
-            return error_set(error, ERROR_INVALID, "background_colour", "%g; 0 to 1 are possible",
-                             (double)request->background_colour[c]);
-    return true;
-}
-
-static bool check_integrator(const struct frame_request *request, struct error *error)
-{
-    if (!integrator_by_number(request->integrator))
-        return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
-                         (unsigned)request->integrator);
-    if (request->brdf > BRDF_WARD)
-        return error_set(error, ERROR_UNSUPPORTED, "brdf", "there is no reflection model number %u",
-                         (unsigned)request->brdf);
-    if (!(request->clamp >= 0.0f && isfinite(request->clamp)))
-        return error_set(error, ERROR_INVALID, "clamp", "%g; 0 and more are possible", (double)request->clamp);
-    if (!(request->ao_distance >= 0.0f && isfinite(request->ao_distance)))
-        return error_set(error, ERROR_INVALID, "ao_distance", "%g metres; 0 and more are possible",
-                         (double)request->ao_distance);
-    if (!(request->ao_falloff >= 0.0f && isfinite(request->ao_falloff)))
-        return error_set(error, ERROR_INVALID, "ao_falloff", "a power of %g; 0 and more are possible",
-                         (double)request->ao_falloff);
-    if (request->ao_rays > AO_RAYS_MAX)
-        return error_set(error, ERROR_INVALID, "ao_rays", "%u rays a sample; up to %u are possible",
-                         request->ao_rays, AO_RAYS_MAX);
-    if (!(request->layer_opacity >= 0.0f && request->layer_opacity <= 1.0f))
-        return error_set(error, ERROR_INVALID, "layer_opacity", "%g; 0 to 1 are possible",
-                         (double)request->layer_opacity);
     return true;
 }
 
 /* Surfaces of pictures made from layers are those of the key view. */
 static bool check_rendered(const struct frame_request *request, const char *what, struct error *error)
 {
-    if (request->view_source != VIEW_SOURCE_LAYERS)
+    if (request->picture.view_source != VIEW_SOURCE_LAYERS)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "layers", "pictures that are made of depth layers have no %s", what);
     return error_remedy(error, "render all views and frames as they are, or leave out %s", what);
@@ -92,10 +49,11 @@ static bool check_rendered(const struct frame_request *request, const char *what
 
 static bool check_light_layers(const struct frame_request *request, struct error *error)
 {
-    if (!integrator_by_number(request->integrator)->scatters) { /* else a sample has several paths, or no light */
+    if (!integrator_by_number(request->light.integrator)
+             ->scatters) { /* else a sample has several paths, or no light */
         error_set(error, ERROR_UNSUPPORTED, "layers",
                   "the integrator %s does not tell the parts of its light apart",
-                  integrator_by_number(request->integrator)->name);
+                  integrator_by_number(request->light.integrator)->name);
         return error_remedy(error, "choose distributed or path, or leave out layers of light");
     }
     return check_rendered(request, "layers of light", error);
@@ -103,18 +61,18 @@ static bool check_light_layers(const struct frame_request *request, struct error
 
 static bool check_layers(const struct frame_request *request, struct error *error)
 {
-    if (request->layers & ~LAYER_BITS_ALL) {
+    if (request->picture.layers & ~LAYER_BITS_ALL) {
         error_set(error, ERROR_UNSUPPORTED, "layers", "there is no layer number %d",
-                  __builtin_ctz(request->layers & ~LAYER_BITS_ALL));
+                  __builtin_ctz(request->picture.layers & ~LAYER_BITS_ALL));
         return error_remedy(error, "leave it out, or ask a newer daemon");
     }
-    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != PIXEL_FORMAT_RGBA32F) {
+    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->picture.format != PIXEL_FORMAT_RGBA32F) {
         error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
         return error_remedy(error, "ask for rgba32f, or leave out layers");
     }
-    if (request->layers & LAYER_BITS_LIGHT && !check_light_layers(request, error))
+    if (request->picture.layers & LAYER_BITS_LIGHT && !check_light_layers(request, error))
         return false;
-    if (request->layers & LAYER_BIT_MOTION && !check_rendered(request, "motion", error))
+    if (request->picture.layers & LAYER_BIT_MOTION && !check_rendered(request, "motion", error))
         return false;
     if (request->attachments >= 1u << ATTACHMENT_COUNT)
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "there is no such set of attachments: %#x",
@@ -122,7 +80,7 @@ static bool check_layers(const struct frame_request *request, struct error *erro
     if (request->attachments && frame_request_layers(request) != 1u << LAYER_BEAUTY)
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "they go with the beauty alone");
     if (request->ycbcr != YCBCR_NONE &&
-        (request->format != PIXEL_FORMAT_RGBA8 || frame_request_layers(request) != 1u << LAYER_BEAUTY))
+        (request->picture.format != PIXEL_FORMAT_RGBA8 || frame_request_layers(request) != 1u << LAYER_BEAUTY))
         return error_set(error, ERROR_UNSUPPORTED, "format", "Y'CbCr is made of the beauty alone, as rgba8");
     return true;
 }
@@ -130,22 +88,21 @@ static bool check_layers(const struct frame_request *request, struct error *erro
 /* Checks the views, and where they come from. */
 static bool check_views(const struct frame_request *request, struct error *error)
 {
-    const uint32_t across = request->views_across ? request->views_across : 1;
-    const uint32_t down = request->views_down ? request->views_down : 1;
-    if (request->width % across || request->height % down)
-        return error_set(error, ERROR_INVALID, request->width % across ? "views_across" : "views_down",
-                         "%u x %u views do not fill %ux%u pixels", across, down, request->width, request->height);
-    if (!(request->baseline >= 0.0f && isfinite(request->baseline)))
-        return error_set(error, ERROR_INVALID, "baseline", "%g metres; 0 and more are possible",
-                         (double)request->baseline);
-    if (request->view_source == VIEW_SOURCE_LAYERS && request->compare)
+    const uint32_t across = request->picture.views_across ? request->picture.views_across : 1;
+    const uint32_t down = request->picture.views_down ? request->picture.views_down : 1;
+    if (request->picture.width % across || request->picture.height % down)
+        return error_set(error, ERROR_INVALID, request->picture.width % across ? "views_across" : "views_down",
+                         "%u x %u views do not fill %ux%u pixels", across, down, request->picture.width,
+                         request->picture.height);
+    if (request->picture.view_source == VIEW_SOURCE_LAYERS && request->comparison.compare)
         return error_set(error, ERROR_UNSUPPORTED, "compare",
                          "views made from layers are not traced by a second tracer; compare rendered ones");
     if (request->hidden_layer >= KEY_LAYERS_MAX)
         return error_set(error, ERROR_INVALID, "hidden_layers", "layer %u; there are %u", request->hidden_layer,
                          KEY_LAYERS_MAX - 1);
-    if (request->hidden_layer && (request->view_source == VIEW_SOURCE_LAYERS || request->compare ||
-                                  request->accumulate || request->aperture > 0.0f || frame_has_views(request)))
+    if (request->hidden_layer &&
+        (request->picture.view_source == VIEW_SOURCE_LAYERS || request->comparison.compare ||
+         request->sampling.accumulate || request->aperture > 0.0f || frame_has_views(request)))
         return error_set(error, ERROR_UNSUPPORTED, "hidden_layers",
                          "what is hidden is a picture of its own, through the middle of pixels, of one eye");
     return true;
@@ -153,12 +110,9 @@ static bool check_views(const struct frame_request *request, struct error *error
 
 static bool check_noise(const struct frame_request *request, struct error *error)
 {
-    if (!(request->noise >= 0.0f && request->noise <= 1.0f))
-        return error_set(error, ERROR_INVALID, "noise", "an error of %g; 0 to 1 are possible",
-                         (double)request->noise);
-    if (request->noise > 0.0f && request->compare)
+    if (request->sampling.noise > 0.0f && request->comparison.compare)
         return error_set(error, ERROR_UNSUPPORTED, "noise", "all waves are compared; give a number of samples");
-    if (request->noise > 0.0f && request->view_source == VIEW_SOURCE_LAYERS)
+    if (request->sampling.noise > 0.0f && request->picture.view_source == VIEW_SOURCE_LAYERS)
         return error_set(error, ERROR_UNSUPPORTED, "noise",
                          "pictures made from layers have a number of samples; render them as they are");
     return true;
@@ -172,7 +126,7 @@ static bool check_ground(const struct frame_request *request, struct error *erro
             return error_set(error, ERROR_INVALID, "ground", "its centre or its normal is not finite");
     if (!(ground->radius >= 0.0f && isfinite(ground->radius)))
         return error_set(error, ERROR_INVALID, "ground", "a radius of %g metres", (double)ground->radius);
-    if (ground->radius > 0.0f && request->view_source == VIEW_SOURCE_LAYERS)
+    if (ground->radius > 0.0f && request->picture.view_source == VIEW_SOURCE_LAYERS)
         return error_set(error, ERROR_UNSUPPORTED, "ground",
                          "pictures made from layers have none; render them as they are");
     return true;
@@ -180,15 +134,16 @@ static bool check_ground(const struct frame_request *request, struct error *erro
 
 static bool check_crop(const struct frame_request *request, struct error *error)
 {
-    const struct frame_crop *crop = &request->crop;
-    if (crop->width == 0 && crop->height == 0)
+    const struct record_picture *p = &request->picture;
+    if (p->crop_width == 0 && p->crop_height == 0)
         return true;
-    if (crop->width == 0 || crop->height == 0 || crop->x >= request->width || crop->y >= request->height ||
-        crop->width > request->width - crop->x || crop->height > request->height - crop->y)
+    if (p->crop_width == 0 || p->crop_height == 0 || p->crop_x >= p->width || p->crop_y >= p->height ||
+        p->crop_width > p->width - p->crop_x || p->crop_height > p->height - p->crop_y)
         return error_set(error, ERROR_INVALID, "crop", "%ux%u pixels from (%u, %u) on are not in %ux%u pixels",
-                         crop->width, crop->height, crop->x, crop->y, request->width, request->height);
-    if (request->noise > 0.0f || request->denoise != DENOISE_OFF || request->attachments ||
-        request->ycbcr != YCBCR_NONE || frame_has_views(request) || request->view_source == VIEW_SOURCE_LAYERS)
+                         p->crop_width, p->crop_height, p->crop_x, p->crop_y, p->width, p->height);
+    if (request->sampling.noise > 0.0f || request->picture.denoise != DENOISE_OFF || request->attachments ||
+        request->ycbcr != YCBCR_NONE || frame_has_views(request) ||
+        request->picture.view_source == VIEW_SOURCE_LAYERS)
         return error_set(error, ERROR_UNSUPPORTED, "crop",
                          "a part of a picture has one view, a number of samples, and no filter for noise");
     return true;
@@ -196,21 +151,12 @@ static bool check_crop(const struct frame_request *request, struct error *error)
 
 static bool check_alone(const struct frame_request *request, struct error *error)
 {
-    if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
-        request->height > SIZE_MAX_PIXELS)
+    if (request->picture.width == 0 || request->picture.height == 0 || request->picture.width > SIZE_MAX_PIXELS ||
+        request->picture.height > SIZE_MAX_PIXELS)
         return error_set(error, ERROR_INVALID, "width", "a picture of %ux%u pixels; 1 to %u are possible",
-                         request->width, request->height, SIZE_MAX_PIXELS);
-    if (request->samples == 0)
-        return error_set(error, ERROR_INVALID, "samples", "a picture of no samples");
-    if (request->filter > FILTER_BOX)
-        return error_set(error, ERROR_UNSUPPORTED, "pixel_filter", "there is no pixel filter number %u",
-                         (unsigned)request->filter);
-    if (request->format > PIXEL_FORMAT_RGBA32F)
-        return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
-                         (unsigned)request->format);
+                         request->picture.width, request->picture.height, SIZE_MAX_PIXELS);
     return check_noise(request, error) && check_crop(request, error) && check_ground(request, error) &&
-           check_views(request, error) && check_background(request, error) && check_integrator(request, error) &&
-           check_layers(request, error) && check_camera(request, error);
+           check_views(request, error) && check_layers(request, error) && check_camera(request, error);
 }
 
 /* ---- with tracers and scene ---- */
@@ -225,8 +171,9 @@ const struct tracer_impl *frame_find_tracer(const struct frame_renderer *rendere
 bool frame_check_request(const struct frame_renderer *renderer, const struct frame_request *request,
                          struct error *error)
 {
-    return check_alone(request, error) && frame_find_tracer(renderer, request->tracer, "tracer", error) &&
-           (!request->compare || frame_find_tracer(renderer, request->compare_with, "compare_with", error));
+    return check_alone(request, error) && frame_find_tracer(renderer, request->tracing.tracer, "tracer", error) &&
+           (!request->comparison.compare ||
+            frame_find_tracer(renderer, request->comparison.compare_with, "compare_with", error));
 }
 
 /* Whether a node of surfaces is in a light group. */
@@ -242,7 +189,7 @@ static bool has_grouped_surfaces(const struct gpu_scene *copy)
 bool frame_check_groups(const struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
-    if (!(work->frame.request.layers & LAYER_BITS_LIGHT_GROUPS) || !work->frame.tracer->impl->sampled ||
+    if (!(work->frame.request.picture.layers & LAYER_BITS_LIGHT_GROUPS) || !work->frame.tracer->impl->sampled ||
         !has_grouped_surfaces(work->frame.scene))
         return true;
     error_set(error, ERROR_UNSUPPORTED, "layers",
@@ -256,7 +203,7 @@ bool frame_check_groups(const struct frame_renderer *renderer, struct error *err
 /* A display's values are no light that adds up. */
 bool frame_check_light(const struct scene *scene, const struct frame_request *request, struct error *error)
 {
-    if (!(request->layers & LAYER_BITS_LIGHT) || !scene->environment.value.display_values)
+    if (!(request->picture.layers & LAYER_BITS_LIGHT) || !scene->environment.value.display_values)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "layers",
               "the light of this scene is a display's values, which do not add up");

@@ -48,7 +48,7 @@ static uint64_t primitives_shown(const struct gpu_scene *scene)
 static bool traces_first_hits(const struct render_frame *frame)
 {
     const struct tracer_impl *impl = frame->tracer->impl;
-    const uint64_t pixels = (uint64_t)frame->request.width * frame->request.height;
+    const uint64_t pixels = (uint64_t)frame->request.picture.width * frame->request.picture.height;
     return impl->traces_on_host ||
            (impl->finds_first_hits && gpu_measured_traces(&frame->device->gpu->measured, frame->spread,
                                                           primitives_shown(frame->scene), pixels));
@@ -58,6 +58,7 @@ bool choices_rasterise(const struct render_frame *frame)
 {
     const struct frame_request *request = &frame->request;
     const bool flat = !(request->aperture > 0.0f) && !frame->scene->has_motion && !frame_has_views(request);
-    return flat && !request->compare &&
-           (request->primary == PRIMARY_RASTER || (request->primary == PRIMARY_AUTO && !traces_first_hits(frame)));
+    return flat && !request->comparison.compare &&
+           (request->tracing.primary == PRIMARY_RASTER ||
+            (request->tracing.primary == PRIMARY_AUTO && !traces_first_hits(frame)));
 }

@@ -49,7 +49,7 @@ void frame_abandon(struct frame_renderer *renderer)
 static size_t attached_bytes(const struct frame_request *request)
 {
     size_t count = (size_t)__builtin_popcount(request->attachments);
-    return count * request->width * request->height * frame_format_bytes(PIXEL_FORMAT_DEPTH32F);
+    return count * request->picture.width * request->picture.height * frame_format_bytes(PIXEL_FORMAT_DEPTH32F);
 }
 
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
@@ -66,24 +66,23 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     stage_times_add(&work->device.times, STAGE_FRAME, CLOCK_CPU, 0, work->device.times.origin_ns,
                     clock_now_ns() - work->device.times.origin_ns);
     *result = renderer->result;
-    const struct frame_crop all = {0, 0, request->width, request->height};
-    const struct frame_crop *part = request->crop.width > 0 ? &request->crop : &all;
-    if (request->crop.width > 0)
+    const struct frame_crop crop = frame_request_crop(request);
+    if (frame_request_is_cropped(request))
         picture_cut(&renderer->picture, request);
     result->pixels = renderer->picture.pixels;
     result->layers = frame_request_layers(request);
     result->attachments = request->attachments;
     result->size_bytes = renderer->picture.size_bytes - attached_bytes(request);
     renderer->picture.pixels = NULL;
-    result->width = part->width;
-    result->height = part->height;
-    result->format = request->format;
+    result->width = crop.width;
+    result->height = crop.height;
+    result->format = request->picture.format;
     result->ycbcr = request->ycbcr;
     result->samples = renderer->picture.samples;
     result->noise = renderer->picture.noise.error;
-    result->primary_rays += request->noise > 0.0f
+    result->primary_rays += request->sampling.noise > 0.0f
                                 ? picture_noise_rays(&renderer->picture, renderer->samples_before)
-                                : (uint64_t)part->width * part->height * request->samples;
+                                : (uint64_t)crop.width * crop.height * request->sampling.samples;
     result->times = work->device.times;
     renderer->kept_request = *request;
     renderer->kept_samples = result->samples;
@@ -157,7 +156,7 @@ bool frame_step_waits(const struct frame_renderer *renderer)
 static bool may_go_on(const struct frame_renderer *renderer, const struct frame_request *request)
 {
     return renderer->kept_samples > 0 && !renderer->history.is_moving &&
-           request->samples <= UINT32_MAX - renderer->kept_samples &&
+           request->sampling.samples <= UINT32_MAX - renderer->kept_samples &&
            frame_request_adds_to(&renderer->kept_request, request);
 }
 
@@ -171,8 +170,10 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
 {
     struct error refused = {0}; /* by frame_begin, before it changes anything */
     const struct tracer_impl *const wanted[] = {
-        frame_find_tracer(renderer, request->tracer, "tracer", &refused),
-        request->compare ? frame_find_tracer(renderer, request->compare_with, "compare_with", &refused) : NULL,
+        frame_find_tracer(renderer, request->tracing.tracer, "tracer", &refused),
+        request->comparison.compare
+            ? frame_find_tracer(renderer, request->comparison.compare_with, "compare_with", &refused)
+            : NULL,
     };
     if (is_alone(renderer) || refused.kind != ERROR_NONE)
         return true;
@@ -182,7 +183,7 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
         if (wanted[i] && !(wanted[i]->depends_on & CHANGED_VIEW))
             impls[count++] = wanted[i];
     const struct gpu_scene *copy = &renderer->shared->copy;
-    const struct integrator *integrator = integrator_by_number(request->integrator);
+    const struct integrator *integrator = integrator_by_number(request->light.integrator);
     const bool lit = integrator && integrator->lit_by_surfaces;
     return gpu_scene_is_current(copy, scene, motion) && (!lit || gpu_scene_emitters_are_current(copy)) &&
            tracer_set_are_free(&renderer->shared->tracers, impls, count, &request->tracer_options);
@@ -208,7 +209,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
 {
     if (!frame_check_request(renderer, request, error) || !frame_check_light(scene, request, error))
         return false;
-    renderer->work = frame_work_take(renderer->shared, integrator_by_number(request->integrator), error);
+    renderer->work = frame_work_take(renderer->shared, integrator_by_number(request->light.integrator), error);
     if (!renderer->work)
         return false;
     struct frame_work *work = renderer->work;

@@ -21,7 +21,7 @@
 
 bool frame_is_from_layers(const struct frame_request *request)
 {
-    return request->view_source == VIEW_SOURCE_LAYERS;
+    return request->picture.view_source == VIEW_SOURCE_LAYERS;
 }
 
 struct frame_camera frame_key_camera(const struct frame_request *request)
@@ -34,8 +34,8 @@ struct frame_camera frame_key_camera(const struct frame_request *request)
  * texels. */
 static bool is_for_these_eyes(const struct frame_request *request)
 {
-    return request->samples == 1 && !request->accumulate && !request->has_key && request->aperture == 0.0f &&
-           frame_request_planes(request) == 1u << LAYER_BEAUTY;
+    return request->sampling.samples == 1 && !request->sampling.accumulate && !request->has_key &&
+           request->aperture == 0.0f && frame_request_planes(request) == 1u << LAYER_BEAUTY;
 }
 
 static float distance_between(const struct frame_camera *a, const struct frame_camera *b)
@@ -130,7 +130,7 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
 /* Frames that add to one another have layers with noise of their own each, or that of the first would stay. */
 static bool is_noise_new(const struct frame_renderer *renderer)
 {
-    return !integrator_by_number(renderer->request.integrator)->random ||
+    return !integrator_by_number(renderer->request.light.integrator)->random ||
            renderer->key.first_sample == renderer->eyes_samples_before;
 }
 
@@ -234,7 +234,7 @@ bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error)
 void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_request *request)
 {
     if (frame_is_layer_pass(renderer) && renderer->key.is_marked)
-        request->height = renderer->key.tile_rows[renderer->pass] * 8;
+        request->picture.height = renderer->key.tile_rows[renderer->pass] * 8;
 }
 
 /* Keeps the layer, all of whose samples are in its sums. */
@@ -246,8 +246,8 @@ static enum pass_progress keep(struct frame_renderer *renderer, struct error *er
         return PASS_FAILED;
     if (++renderer->band < key->sums.band_count)
         return PASS_MORE;
-    renderer->result.primary_rays +=
-        (uint64_t)work->frame.request.width * work->frame.request.height * work->frame.request.samples;
+    renderer->result.primary_rays += (uint64_t)work->frame.request.picture.width *
+                                     work->frame.request.picture.height * work->frame.request.sampling.samples;
     picture_restart(&key->sums);
     renderer->pass = next_layer(key, renderer->pass + 1);
     if (renderer->pass < key->layer_count)
@@ -262,7 +262,7 @@ static enum pass_progress keep(struct frame_renderer *renderer, struct error *er
 
 static bool wants_keep(const void *self, const struct render_wave *wave)
 {
-    return frame_is_layer_pass(self) && wave->frame->request.samples > 0;
+    return frame_is_layer_pass(self) && wave->frame->request.sampling.samples > 0;
 }
 
 static enum pass_progress run_keep(void *self, struct render_wave *wave, struct error *error)
@@ -296,11 +296,12 @@ bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
     if (!trace_state_tell(renderer->work->key_trace_state, rows, error))
         return false;
     /* A picture that had all its samples has asked for none. */
-    if (renderer->work->frame.request.samples == 0)
+    if (renderer->work->frame.request.sampling.samples == 0)
         return true;
     if (!key_view_take_count(&renderer->key, renderer->device, &unknown, error))
         return false;
-    const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->frame.request.samples;
+    const uint64_t samples = (uint64_t)request->picture.width * request->picture.height *
+                             renderer->work->frame.request.sampling.samples;
     rows->part = 0;
     rows->part_name = NULL;
     warn_of_unknown(structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples), request);

@@ -50,7 +50,7 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
     struct frame_work *work = renderer->work;
     const struct frame_request *request = &work->frame.request;
     work->frame.comparison = NULL;
-    if (!request->compare) {
+    if (!request->comparison.compare) {
         comparison_destroy(work->comparison);
         work->comparison = NULL;
         return true;
@@ -61,7 +61,7 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
     if (!work->comparison)
         return false;
     comparison_begin(work->comparison, &renderer->shared->copy, work->frame.tracer, renderer->second,
-                     request->compare_far_share);
+                     request->comparison.compare_far);
     work->frame.comparison = work->comparison;
     context_add_cpu_time(&work->device, STAGE_COMPARE, start_ns);
     return true;
@@ -77,7 +77,7 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
     if (renderer->wanted_slice_pixels)
         return renderer->wanted_slice_pixels;
     const struct render_frame *frame = &renderer->work->frame;
-    return choices_slice_rays(renderer->device, frame->request.compare, frame->uniforms.light_count);
+    return choices_slice_rays(renderer->device, frame->request.comparison.compare, frame->uniforms.light_count);
 }
 
 /* A wave for each bounce and one before them, or one alone where nothing sends rays on; more if a slice has needed
@@ -85,8 +85,8 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
 static uint32_t waves_queued(const struct frame_renderer *renderer)
 {
     struct frame_work *work = renderer->work;
-    const uint32_t depth =
-        work->frame.request.depth < WAVES_QUEUED_MAX ? work->frame.request.depth + 1 : WAVES_QUEUED_MAX;
+    const uint32_t depth = work->frame.request.light.depth < WAVES_QUEUED_MAX ? work->frame.request.light.depth + 1
+                                                                              : WAVES_QUEUED_MAX;
     const bool bounces = wave_shading_expects_bounces(&work->frame);
     return at_least(renderer->waves_needed, bounces ? depth : 1);
 }
@@ -95,9 +95,9 @@ static uint32_t waves_queued(const struct frame_renderer *renderer)
 static uint32_t sample_shift_max(const struct frame_renderer *renderer)
 {
     const struct frame_request *request = &renderer->work->frame.request;
-    const uint64_t strip_pixels = (uint64_t)request->width * renderer->work->primary.strip_rows;
+    const uint64_t strip_pixels = (uint64_t)request->picture.width * renderer->work->primary.strip_rows;
     uint32_t shift = 0;
-    while (2u << shift <= SAMPLES_TOGETHER_MAX && 2u << shift <= request->samples &&
+    while (2u << shift <= SAMPLES_TOGETHER_MAX && 2u << shift <= request->sampling.samples &&
            (!renderer->work->primary.rasterises || strip_pixels << (shift + 1) <= LAYERS_PIXELS_MAX))
         shift++;
     return shift;
@@ -108,7 +108,7 @@ static uint32_t sample_shift_max(const struct frame_renderer *renderer)
 static uint32_t rays_a_path(const struct frame_renderer *renderer)
 {
     struct frame_work *work = renderer->work;
-    const bool once = !work->frame.request.compare && !wave_shading_expects_bounces(&work->frame) &&
+    const bool once = !work->frame.request.comparison.compare && !wave_shading_expects_bounces(&work->frame) &&
                       work->shading.extra->shadow_rays(&work->frame) <= 1;
     return once ? 1 : CHOICES_WAVE_PER_SLICE;
 }
@@ -132,8 +132,8 @@ static bool size_frame(struct frame_renderer *renderer, struct error *error)
     if (renderer->wanted_wave_rays)
         wave_rays = renderer->wanted_wave_rays;
     work->wave.capacity = at_least(wave_rays, rays);
-    work->device.counts_on_host =
-        !renderer->queues_ahead || work->frame.request.compare || work->frame.tracer->impl->traces_on_host;
+    work->device.counts_on_host = !renderer->queues_ahead || work->frame.request.comparison.compare ||
+                                  work->frame.tracer->impl->traces_on_host;
     work->wave.waves_queued = waves_queued(renderer);
     work->frame.sums_in_picture = work->device.counts_on_host && renderer->target->samples == 1 &&
                                   renderer->target->layers & 1u << LAYER_BEAUTY && !work->frame.comparison &&
@@ -163,10 +163,10 @@ static void fill_filter(struct render_frame *frame)
 {
     _Static_assert(sizeof(frame->uniforms.filter_places) / sizeof(float) > PIXEL_FILTER_INTERVALS,
                    "room for all places");
-    if (!frame->spread || (frame->has_filter && frame->filter == frame->request.filter))
+    if (!frame->spread || (frame->has_filter && frame->filter == frame->request.sampling.pixel_filter))
         return;
-    pixel_filter_places((float *)frame->uniforms.filter_places, frame->request.filter);
-    frame->filter = frame->request.filter;
+    pixel_filter_places((float *)frame->uniforms.filter_places, frame->request.sampling.pixel_filter);
+    frame->filter = frame->request.sampling.pixel_filter;
     frame->has_filter = true;
 }
 
@@ -174,12 +174,12 @@ static void fill_filter(struct render_frame *frame)
 static void limit_samples(const struct frame_renderer *renderer, struct frame_request *request)
 {
     uint32_t before = renderer->samples_before, maximum = request->samples_max;
-    if (!request->accumulate || !before)
+    if (!request->sampling.accumulate || !before)
         return;
     uint32_t lacking = !maximum ? UINT32_MAX : maximum > before ? maximum - before : 0;
-    if (request->noise > 0.0f && renderer->picture.noise.going_on == 0)
+    if (request->sampling.noise > 0.0f && renderer->picture.noise.going_on == 0)
         lacking = 0;
-    request->samples = request->samples < lacking ? request->samples : lacking;
+    request->sampling.samples = request->sampling.samples < lacking ? request->sampling.samples : lacking;
 }
 
 /* Sets what needs no memory of the device. */
@@ -192,17 +192,17 @@ static bool set_up(struct frame_renderer *renderer, struct error *error)
     frame_key_limit_rows(renderer, &work->frame.request); /* the camera is that of all of them */
     environment_fill_uniforms(work->frame.environment, &work->frame.uniforms, &renderer->shared->copy);
     work->frame.display_values = renderer->shared->copy.scene->environment.value.display_values;
-    work->frame.uniforms.depth = request->depth;
+    work->frame.uniforms.depth = request->light.depth;
     work->frame.uniforms.far_width[2] = frame_request_hides_environment(request) ? 1.0f : 0.0f;
     /* Samples of a layer's texel all pass through its middle. */
     work->frame.spread =
-        !frame_is_layer_pass(renderer) && (request->samples > 1 || frame_request_goes_on(request));
+        !frame_is_layer_pass(renderer) && (request->sampling.samples > 1 || frame_request_goes_on(request));
     work->frame.uniforms.far_width[1] =
         work->frame.spread
-            ? 1.0f / sqrtf(frame_request_goes_on(request) ? SAMPLES_GOING_ON : (float)request->samples)
+            ? 1.0f / sqrtf(frame_request_goes_on(request) ? SAMPLES_GOING_ON : (float)request->sampling.samples)
             : 1.0f;
     fill_filter(&work->frame);
-    work->frame.uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
+    work->frame.uniforms.seed = (uint32_t)(request->sampling.seed ^ request->sampling.seed >> 32);
     return size_frame(renderer, error);
 }
 
@@ -215,7 +215,7 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     if (!begin_comparison(renderer, error) || (renderer->key_tracer && !frame_key_set_pass(renderer, error)) ||
         !set_up(renderer, error))
         return false;
-    if (request->samples && !renderer->announced)
+    if (request->sampling.samples && !renderer->announced)
         announce_programs(renderer);
     if (!denoise_history_begin(&renderer->history, &work->frame, renderer->shared->showing, goes_on, error) ||
         !reserve_frame(renderer, error) || !gpu_check_reset(renderer->device, "beginning a frame", error))
@@ -226,7 +226,7 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     renderer->samples_phase = SAMPLES_BEGIN;
     renderer->announced = false;
     denoise_begin(&work->denoise, &renderer->denoise, &renderer->history, &renderer->picture);
-    return request->samples || context_upload_uniforms(&work->frame, error);
+    return request->sampling.samples || context_upload_uniforms(&work->frame, error);
 }
 
 enum pass_progress ready_step(struct frame_renderer *renderer, struct error *error)
@@ -251,7 +251,7 @@ bool ready_announce_early(struct frame_renderer *renderer, struct error *error)
     reserve_begin(renderer);
     bool done = update_environment(renderer, &lit, &failed) && (!lit || set_up(renderer, &failed));
     renderer->announced_early = done && lit;
-    if (renderer->announced_early && renderer->work->frame.request.samples)
+    if (renderer->announced_early && renderer->work->frame.request.sampling.samples)
         announce_shading(renderer);
     return reserve_end(renderer, done, &failed, error);
 }

@@ -39,9 +39,9 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
     _Static_assert(sizeof(((struct frame_uniforms *)0)->sample_places) == SAMPLES_TOGETHER_MAX * 2 * sizeof(float),
                    "a place for each sample");
     struct frame_work *work = renderer->work;
-    uint32_t left = work->frame.request.samples - renderer->sample;
+    uint32_t left = work->frame.request.sampling.samples - renderer->sample;
     const uint32_t held = renderer->samples_before + renderer->sample;
-    if (work->frame.request.noise > 0.0f && picture_noise_next(held) - held < left)
+    if (work->frame.request.sampling.noise > 0.0f && picture_noise_next(held) - held < left)
         left = picture_noise_next(held) - held;
     work->frame.uniforms.sample_index =
         (frame_is_layer_pass(renderer) ? renderer->eyes_samples_before : renderer->samples_before) +
@@ -50,9 +50,10 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
     const uint32_t shift = slices_sample_shift(&renderer->slices, left);
     work->frame.uniforms.sample_shift = shift < sample_shift_max ? shift : sample_shift_max;
     /* A sample that is added to others has no group of its own. */
-    work->frame.uniforms.group_shift = frame_request_goes_on(&work->frame.request)
-                                           ? 0
-                                           : slices_group_shift(work->frame.request.samples, renderer->sample);
+    work->frame.uniforms.group_shift =
+        frame_request_goes_on(&work->frame.request)
+            ? 0
+            : slices_group_shift(work->frame.request.sampling.samples, renderer->sample);
     for (uint32_t i = 0; i < 1u << work->frame.uniforms.sample_shift; i++)
         place_sample(&work->frame, work->frame.uniforms.sample_index + i,
                      &work->frame.uniforms.sample_places[i / 2][i % 2 * 2]);
@@ -192,7 +193,7 @@ static bool measure_noise(struct frame_renderer *renderer, struct error *error)
     if (!picture_noise_measure(picture, &work->frame, held, error))
         return false;
     if (picture->noise.going_on == 0) {
-        work->frame.request.samples = renderer->sample;
+        work->frame.request.sampling.samples = renderer->sample;
         picture->samples = held;
     }
     return true;
@@ -262,7 +263,7 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
         begin_ahead(renderer);
     if (!slices_take(&renderer->slices, renderer->target, sample_shift, &work->wave.slice)) {
         renderer->sample += 1u << sample_shift;
-        const bool lands = renderer->sample == work->frame.request.samples ||
+        const bool lands = renderer->sample == work->frame.request.sampling.samples ||
                            picture_noise_is_due(renderer->target, renderer->samples_before + renderer->sample);
         renderer->samples_phase = lands ? SAMPLES_LAND : SAMPLES_BEGIN;
         return true;
@@ -300,7 +301,7 @@ static enum pass_progress land_all(struct frame_renderer *renderer, struct error
         return PASS_MORE;
     if (!measure_noise(renderer, error))
         return PASS_FAILED;
-    if (renderer->sample < renderer->work->frame.request.samples) {
+    if (renderer->sample < renderer->work->frame.request.sampling.samples) {
         renderer->samples_phase = SAMPLES_BEGIN;
         return PASS_MORE;
     }
@@ -310,7 +311,8 @@ static enum pass_progress land_all(struct frame_renderer *renderer, struct error
 static bool wants(const void *self, const struct render_wave *wave)
 {
     (void)self;
-    return wave->frame->request.samples > 0; /* else the picture has all its samples and is only output again */
+    return wave->frame->request.sampling.samples >
+           0; /* else the picture has all its samples and is only output again */
 }
 
 static enum pass_progress run(void *self, struct render_wave *wave, struct error *error)

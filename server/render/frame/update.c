@@ -58,17 +58,17 @@ static bool take_tracers(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
     const struct frame_request *request = &work->frame.request;
-    renderer->tracer = work->frame.tracer = take_tracer(renderer, request->tracer, "tracer", error);
+    renderer->tracer = work->frame.tracer = take_tracer(renderer, request->tracing.tracer, "tracer", error);
     if (!renderer->tracer || !frame_work_trace_by(renderer->work, &work->trace_state, renderer->tracer, error))
         return false;
     if (frame_is_from_layers(request) || request->hidden_layer)
         return frame_key_take(renderer, error);
-    if (!request->compare)
+    if (!request->comparison.compare)
         return true;
     struct tracer_set *tracers = frame_tracers(renderer, renderer->tracer->impl);
-    renderer->second = request->compare_with == request->tracer
+    renderer->second = request->comparison.compare_with == request->tracing.tracer
                            ? tracer_set_take_again(tracers, renderer->tracer)
-                           : take_tracer(renderer, request->compare_with, "compare_with", error);
+                           : take_tracer(renderer, request->comparison.compare_with, "compare_with", error);
     return renderer->second;
 }
 

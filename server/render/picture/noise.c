@@ -55,7 +55,7 @@ bool picture_noise_begin(struct picture *picture, const struct render_frame *fra
                          struct error *error)
 {
     struct picture_noise *noise = &picture->noise;
-    if (!(frame->request.noise > 0.0f)) {
+    if (!(frame->request.sampling.noise > 0.0f)) {
         picture_noise_finish(noise, frame->device->gpu);
         return true;
     }
@@ -140,7 +140,7 @@ bool picture_noise_measure(struct picture *picture, const struct render_frame *f
     gpu_uniform_uint(program, "samples", samples);
     gpu_uniform_uint(program, "half_samples", is_first ? 0 : half);
     gpu_uniform_uint(program, "keep", is_first || samples == 2 * half);
-    gpu_uniform_float(program, "exposure", exp2f(frame->request.exposure_stops));
+    gpu_uniform_float(program, "exposure", exp2f(frame->request.picture.exposure_stops));
     for (uint32_t band = 0; band < picture->band_count; band++) {
         uint32_t first_slot;
         const uint32_t slots = picture_band_slots(picture, band, &first_slot);
@@ -156,7 +156,7 @@ bool picture_noise_measure(struct picture *picture, const struct render_frame *f
     gpu_buffer_read(frame->device->gpu, &noise->tile_errors, 0, noise->errors, bytes);
     if (!gpu_check(frame->device->gpu, "the errors of tiles", error))
         return false;
-    stop_tiles(picture, frame->request.noise, samples);
+    stop_tiles(picture, frame->request.sampling.noise, samples);
     gpu_buffer_write(frame->device->gpu, &noise->tile_samples, 0, noise->samples, bytes);
     return true;
 }

@@ -89,12 +89,11 @@ uint32_t picture_run_end(const struct picture *picture, uint32_t slot)
 
 static void set_crop(struct picture *picture, const struct frame_request *request)
 {
-    const struct frame_crop all = {0, 0, request->width, request->height};
-    const struct frame_crop *crop = request->crop.width > 0 ? &request->crop : &all;
-    picture->crop_left = crop->x / 8;
-    picture->crop_right = (crop->x + crop->width + 7) / 8;
-    picture->crop_top = crop->y / 8;
-    picture->crop_bottom = (crop->y + crop->height + 7) / 8;
+    const struct frame_crop crop = frame_request_crop(request);
+    picture->crop_left = crop.x / 8;
+    picture->crop_right = (crop.x + crop.width + 7) / 8;
+    picture->crop_top = crop.y / 8;
+    picture->crop_bottom = (crop.y + crop.height + 7) / 8;
 }
 
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot)
@@ -111,7 +110,7 @@ static bool list_bands(struct picture *picture, const struct gpu_facts *facts, c
     picture->band_rows = facts->band_slots_max / row_slots & ~7u;
     if (picture->band_rows == 0)
         picture->band_rows = 8;
-    uint32_t padded_rows = (request->height + 7) & ~7u;
+    uint32_t padded_rows = (request->picture.height + 7) & ~7u;
     if (picture->band_rows > padded_rows)
         picture->band_rows = padded_rows;
     uint32_t count = (padded_rows + picture->band_rows - 1) / picture->band_rows;
@@ -154,20 +153,20 @@ bool picture_begin(struct picture *picture, struct render_frame *frame, uint32_t
     const struct frame_request *request = &frame->request;
     uint32_t layers = frame_request_planes(request);
     picture_drop_pixels(picture);
-    if (!picture->bands || picture->width != request->width || picture->height != request->height ||
-        picture->layers != layers) {
+    if (!picture->bands || picture->width != request->picture.width ||
+        picture->height != request->picture.height || picture->layers != layers) {
         free_bands(picture, frame->device->gpu);
         picture->layers = layers;
         picture->plane_count = (uint32_t)__builtin_popcount(layers);
-        picture->width = request->width;
-        picture->height = request->height;
-        picture->tiles_across = (request->width + 7) / 8;
+        picture->width = request->picture.width;
+        picture->height = request->picture.height;
+        picture->tiles_across = (request->picture.width + 7) / 8;
         if (!list_bands(picture, &frame->device->gpu->facts, request, error))
             return false;
     }
     set_crop(picture, request);
-    picture->samples = samples_before + request->samples;
-    frame->tile_samples = request->noise > 0.0f ? &picture->noise.tile_samples : NULL;
+    picture->samples = samples_before + request->sampling.samples;
+    frame->tile_samples = request->sampling.noise > 0.0f ? &picture->noise.tile_samples : NULL;
     return true;
 }
 

@@ -43,13 +43,13 @@ static uint8_t *band_pixels(const struct picture *picture, const struct render_f
 
 void picture_cut(struct picture *picture, const struct frame_request *request)
 {
-    const struct frame_crop *crop = &request->crop;
-    const size_t pixel_bytes = frame_format_bytes(request->format), row_bytes = crop->width * pixel_bytes;
+    const struct frame_crop crop = frame_request_crop(request);
+    const size_t pixel_bytes = frame_format_bytes(request->picture.format), row_bytes = crop.width * pixel_bytes;
     uint8_t *to = picture->pixels;
     for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
-        for (uint32_t y = 0; y < crop->height; y++, to += row_bytes) {
-            const size_t row = (size_t)plane * picture->height + crop->y + y;
-            memmove(to, picture->pixels + (row * picture->width + crop->x) * pixel_bytes, row_bytes);
+        for (uint32_t y = 0; y < crop.height; y++, to += row_bytes) {
+            const size_t row = (size_t)plane * picture->height + crop.y + y;
+            memmove(to, picture->pixels + (row * picture->width + crop.x) * pixel_bytes, row_bytes);
         }
     }
     picture->size_bytes = (size_t)(to - picture->pixels);

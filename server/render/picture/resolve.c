@@ -20,7 +20,7 @@ static float scale_of(const struct picture *picture, const struct frame_request 
 {
     float mean = 1.0f / (float)picture->samples;
     if (is_exposed(layer))
-        return exp2f(request->exposure_stops) * mean;
+        return exp2f(request->picture.exposure_stops) * mean;
     return frame_request_is_first_sample(layer) ? 1.0f : mean;
 }
 
@@ -52,7 +52,7 @@ static void display_defines(const struct render_frame *frame, enum layer layer, 
     const char *names[] = {shows_display_values(frame, layer), counts_tiles(frame, layer), form_of(layer)};
     size_t n = 0;
     if (displays && !names[0])
-        defines[n++] = (struct gpu_define){"TONE_MAP", numbers[frame->request.tone_map]};
+        defines[n++] = (struct gpu_define){"TONE_MAP", numbers[frame->request.picture.tone_map]};
     for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
         if (names[i])
             defines[n++] = (struct gpu_define){names[i], "1"};
@@ -93,8 +93,9 @@ static void set_background(const struct gpu_program *program, const struct rende
     const struct frame_request *request = &frame->request;
     const bool is_behind = layer == LAYER_BACKGROUND ||
                            layer == LAYER_LIGHT_REST + frame->scene->scene->environment.value.light_group;
-    const bool has_colour = (layer == LAYER_BEAUTY || is_behind) && request->background == BACKGROUND_COLOUR;
-    const float *colour = request->background_colour;
+    const bool has_colour =
+        (layer == LAYER_BEAUTY || is_behind) && request->picture.background == BACKGROUND_COLOUR;
+    const float *colour = request->picture.background_colour;
     const float background[4] = {colour[0], colour[1], colour[2], 1.0f}, none[4] = {0};
     gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
 }
@@ -106,7 +107,8 @@ static void set_tiles(const struct gpu_program *program, const struct picture *p
     (void)picture_band_slots(picture, band, &first_slot);
     gpu_buffer_bind_texels(frame->device->gpu, frame->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
     gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
-    gpu_uniform_float(program, "exposure", is_exposed(layer) ? exp2f(frame->request.exposure_stops) : 1.0f);
+    gpu_uniform_float(program, "exposure",
+                      is_exposed(layer) ? exp2f(frame->request.picture.exposure_stops) : 1.0f);
 }
 
 static bool is_ycbcr(const struct render_frame *frame, enum layer layer)

@@ -55,12 +55,12 @@ static uint32_t one_each_for_lights_and_environment(const struct render_frame *f
 static void set_ao(const struct render_frame *frame, const struct gpu_program *program)
 {
     gpu_uniform_float(program, "reach", context_ao_distance(frame));
-    gpu_uniform_float(program, "falloff", frame->request.ao_falloff);
+    gpu_uniform_float(program, "falloff", frame->request.light.ao_falloff);
 }
 
 static void set_raycast(const struct render_frame *frame, const struct gpu_program *program)
 {
-    float opacity = frame->request.layer_opacity;
+    float opacity = frame->request.light.layer_opacity;
     gpu_uniform_float(program, "layer_opacity", opacity > 0.0f ? opacity : OPACITY_DEFAULT);
 }
 
@@ -122,7 +122,7 @@ static size_t path_defines(const struct render_wave *wave, struct gpu_define *de
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (wave->frame->environment_choice->rows > 0)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
-    if (wave->frame->request.brdf == BRDF_WARD)
+    if (wave->frame->request.light.brdf == BRDF_WARD)
         defines[n++] = (struct gpu_define){"WARD", "1"};
     return n;
 }

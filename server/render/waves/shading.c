@@ -98,7 +98,7 @@ static const struct gpu_program *shade_program(struct wave_shading *shading, str
     const struct gpu_program *program = context_use_with(wave->device, integrator->shader, defines, error);
     if (!program)
         return NULL;
-    bool last = wave->number >= wave->frame->request.depth + integrator->straight_waves;
+    bool last = wave->number >= wave->frame->request.light.depth + integrator->straight_waves;
     gpu_uniform_uint(program, "first_slot", wave->slice.first_slot);
     gpu_uniform_uint(program, "wave_number", wave->number);
     gpu_uniform_uint(program, "last_wave", last);
@@ -330,7 +330,7 @@ static void announce_bounces(struct wave_shading *shading, struct render_wave *w
 bool wave_shading_expects_bounces(const struct render_frame *frame)
 {
     const struct integrator *integrator = frame->integrator;
-    return frame->scene->instance_count > 0 && frame->request.depth > 0 &&
+    return frame->scene->instance_count > 0 && frame->request.light.depth > 0 &&
            (integrator->always_bounces || (integrator->mirrors && frame->features.mirrors));
 }
 
@@ -349,7 +349,7 @@ void wave_shading_announce(struct wave_shading *shading, struct render_wave *wav
 static bool wants_shading(const void *self, const struct render_wave *wave)
 {
     const struct wave_shading *shading = self;
-    return shading->is_wanted && wave->frame->request.view_source != VIEW_SOURCE_LAYERS;
+    return shading->is_wanted && wave->frame->request.picture.view_source != VIEW_SOURCE_LAYERS;
 }
 
 const struct pass shading_pass = {

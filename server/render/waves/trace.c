@@ -20,8 +20,8 @@ static unsigned family_of(const struct render_wave *wave, enum ray_kind kind)
 static void set_frame(const struct render_frame *frame, struct wave *rays)
 {
     const struct frame_request *request = &frame->request;
-    rays->frame_samples = (uint64_t)request->width * request->height * request->samples;
-    rays->apart = request->crop.width > 0;
+    rays->frame_samples = (uint64_t)request->picture.width * request->picture.height * request->sampling.samples;
+    rays->apart = frame_request_is_cropped(request);
 }
 
 static enum tracer_progress trace_step(struct render_wave *wave, enum ray_kind kind, const struct wave *rays,

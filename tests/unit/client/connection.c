@@ -371,7 +371,7 @@ static void play_job(struct daemon *daemon)
 static struct fl_job *start_job(struct fl_scene *scene, uint32_t first, uint32_t last, uint32_t step)
 {
     struct message_render wanted = fl_render_defaults();
-    wanted.width = wanted.height = EDGE;
+    wanted.picture.width = wanted.picture.height = EDGE;
     wanted.first_frame = first;
     wanted.last_frame = last;
     wanted.frame_step = step;

@@ -27,13 +27,13 @@ static struct {
 static struct message_render some_options(void)
 {
     struct message_render options = fl_view_defaults();
-    options.width = options.height = EDGE;
+    options.picture.width = options.picture.height = EDGE;
     options.credit = IN_FLIGHT;
-    options.exposure_stops = 1;
-    options.still_encoding = PROTOCOL_ENCODING_ZSTD;
-    options.pass_samples = 2;
+    options.picture.exposure_stops = 1;
+    options.view.still_encoding = PROTOCOL_ENCODING_ZSTD;
+    options.view.pass_samples = 2;
     options.weight = 5;
-    options.adapt = 1;
+    options.view.adapt = 1;
     return options;
 }
 
@@ -215,14 +215,14 @@ TEST(cameras_are_sent_and_frames_name_them_with_their_times)
     }
     end_view(view);
     assert_int_equal(seen.first.kind, PROTOCOL_JOB_VIEW);
-    assert_int_equal(seen.first.samples, 64);
+    assert_int_equal(seen.first.sampling.samples, 64);
     assert_int_equal(seen.first.frames_per_second, 60);
-    assert_int_equal(seen.first.still_encoding, PROTOCOL_ENCODING_ZSTD);
-    assert_int_equal(seen.first.pass_samples, 2);
+    assert_int_equal(seen.first.view.still_encoding, PROTOCOL_ENCODING_ZSTD);
+    assert_int_equal(seen.first.view.pass_samples, 2);
     assert_int_equal(seen.first.weight, 5);
-    assert_int_equal(seen.first.adapt, 1);
+    assert_int_equal(seen.first.view.adapt, 1);
     assert_int_equal(seen.first.credit, IN_FLIGHT);
-    assert_true(seen.first.exposure_stops == 1);
+    assert_true(seen.first.picture.exposure_stops == 1);
     assert_true(seen.was_moving);
     assert_int_equal(seen.node, 9);
     assert_int_equal(seen.cancels, 1);
@@ -259,9 +259,9 @@ static void play_changes(struct daemon *daemon)
     while (look(daemon)) {
         const struct message_frame_begin frame = some_frame(number, seen.last_command);
         if (asked.type == MESSAGE_RENDER) {
-            if (request != 0 && asked.render.width > EDGE)
+            if (request != 0 && asked.render.picture.width > EDGE)
                 tell_frame(daemon, request, &frame);
-            number += request != 0 && asked.render.width > EDGE;
+            number += request != 0 && asked.render.picture.width > EDGE;
             if (request != 0)
                 tell_type(daemon, request, MESSAGE_OK);
             request = header.request;
@@ -277,9 +277,9 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
     struct fl_view *view = begin_view(play_changes);
     struct message_render options = some_options();
     uint32_t number = 0;
-    options.tracer = PROTOCOL_TRACER_LDC;
+    options.tracing.tracer = PROTOCOL_TRACER_LDC;
     for (unsigned i = 0; i < 40; i++) {
-        options.width = i >= 20 ? 2 * EDGE : EDGE;
+        options.picture.width = i >= 20 ? 2 * EDGE : EDGE;
         if (!fl_view_change(view, &options, &error) || !fl_view_look(view, &some_camera, NULL, &error))
             fail_msg("%s", error.text);
         for (unsigned frames = i >= 20 ? 2 : 1; frames > 0; frames--) {
@@ -291,7 +291,7 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
         }
     }
     for (unsigned i = 0; i < 20; i++) { /* faster than anything is answered */
-        options.width = EDGE;
+        options.picture.width = EDGE;
         assert_true(fl_view_change(view, &options, &error));
     }
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
@@ -299,7 +299,7 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
     end_view(view);
     assert_int_equal(seen.renders, 61);
     assert_int_equal(seen.last.channel, seen.first.channel);
-    assert_int_equal(seen.last.tracer, PROTOCOL_TRACER_LDC);
+    assert_int_equal(seen.last.tracing.tracer, PROTOCOL_TRACER_LDC);
     assert_int_equal(seen.cameras, 41);
 }
 
@@ -307,7 +307,7 @@ TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
 {
     struct fl_view *view = begin_view(play_view);
     struct message_render options = fl_render_defaults();
-    options.width = options.height = EDGE;
+    options.picture.width = options.picture.height = EDGE;
     options.first_frame = options.last_frame = 77;
     for (unsigned i = 0; i < 3; i++) {
         bool done = false;
@@ -550,7 +550,7 @@ static void play_parts(struct daemon *daemon)
     greet(daemon);
     while (look(daemon)) {
         struct message next = {.type = MESSAGE_FRAME_PARTS};
-        if (asked.type == MESSAGE_RENDER && asked.render.parts) {
+        if (asked.type == MESSAGE_RENDER && asked.render.view.parts) {
             request = header.request;
             next.frame_parts.parts = parts;
             next.frame_parts.parts_count = 2;
@@ -571,8 +571,8 @@ static void play_parts(struct daemon *daemon)
 TEST(first_parts_are_delivered_at_once_and_again_at_the_end_for_one_credit)
 {
     struct fl_view *view = begin_view(play_parts);
-    usual_options.attachments = FL_ATTACH_NORMALS;
-    usual_options.parts = 1;
+    usual_options.view.attachments = FL_ATTACH_NORMALS;
+    usual_options.view.parts = 1;
     fl_view_deliver_parts(view, true);
     assert_true(fl_view_change(view, &usual_options, &error));
     for (int i = 0; i < 2; i++) {

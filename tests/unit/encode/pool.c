@@ -188,7 +188,8 @@ static struct engine_frame *frame_with_depth(float fov_y, float nearest)
     for (size_t i = 0; i < plane_bytes / 4; i++)
         memcpy(made->result.pixels + plane_bytes + 4 * i, &(float){i == 1 ? nearest : depth_of(i)}, 4);
     made->request.camera.fov_y = fov_y;
-    made->depth = (struct view_depth){DEPTH_FORM_INVERSE, 0.5f, 0.2f};
+    made->view =
+        (struct record_view){.depth_form = DEPTH_FORM_INVERSE, .depth_pixels = 0.5f, .depth_radius = 0.2f};
     return made;
 }
 

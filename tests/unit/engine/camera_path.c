@@ -62,15 +62,14 @@ static int end(void **state)
 
 EACH_TEST(begin, end)
 
-static struct engine_job job_of(enum camera_path path, struct camera_key *keys, uint32_t key_count)
+static struct engine_job job_of(enum camera_path path, struct record_camera_key *keys, uint32_t key_count)
 {
     return (struct engine_job){
         .last_frame = 1000,
         .frame_step = 1,
         .frames_per_second = 10,
-        .frame = {.width = 160, .height = 90},
-        .path = path,
-        .framing = usual_framing,
+        .frame = {.picture.width = 160, .picture.height = 90},
+        .camera = {.camera_path = path, USUAL_FRAMING},
         .keys = keys,
         .key_count = key_count,
     };
@@ -98,9 +97,9 @@ static struct frame_camera camera_at(const struct engine_job *job, uint32_t fram
     return camera;
 }
 
-static struct camera_key key_at(float time_s, float x, float y, float z)
+static struct record_camera_key key_at(float time_s, float x, float y, float z)
 {
-    return (struct camera_key){
+    return (struct record_camera_key){
         .time_s = time_s,
         .eye_world = {x, y, z},
         .look_at_world = {x, y, z - 1},
@@ -125,7 +124,7 @@ TEST(the_time_of_a_frame_counts_from_the_origin)
 
 TEST(one_key_stands_still)
 {
-    struct camera_key key = key_at(3, 1, 2, 3);
+    struct record_camera_key key = key_at(3, 1, 2, 3);
     struct engine_job job = job_of(CAMERA_KEYS, &key, 1);
     for (uint32_t frame = 0; frame < 100; frame += 33) {
         struct frame_camera camera = camera_at(&job, frame);
@@ -139,7 +138,8 @@ TEST(one_key_stands_still)
 
 TEST(keys_pass_through_their_points_and_stand_still_outside)
 {
-    struct camera_key keys[] = {key_at(1, 0, 0, 0), key_at(2, 5, 1, 0), key_at(4, 6, -3, 2), key_at(5, 0, 0, 9)};
+    struct record_camera_key keys[] = {key_at(1, 0, 0, 0), key_at(2, 5, 1, 0), key_at(4, 6, -3, 2),
+                                       key_at(5, 0, 0, 9)};
     struct engine_job job = job_of(CAMERA_KEYS, keys, 4);
     const uint32_t frames[] = {0, 10, 20, 40, 50, 500}; /* 10 a second */
     const int expected[] = {0, 0, 1, 2, 3, 3};
@@ -158,7 +158,7 @@ TEST(keys_pass_through_their_points_and_stand_still_outside)
 TEST(keys_at_equal_distances_make_the_spline_of_catmull_and_rom)
 {
     const float p[] = {1, 4, 2, 7, 7};
-    struct camera_key keys[5];
+    struct record_camera_key keys[5];
     for (int i = 0; i < 5; i++)
         keys[i] = key_at((float)i * 2, p[i], 0, 0);
     for (int segment = 1; segment < 3; segment++) {
@@ -167,7 +167,7 @@ TEST(keys_at_equal_distances_make_the_spline_of_catmull_and_rom)
                    d = (double)p[segment + 2];
             double expected = 0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t * t +
                                      (3 * b - a - 3 * c + d) * t * t * t);
-            struct camera_key key;
+            struct record_camera_key key;
             animation_key_at(keys, 5, 2 * (segment + t), &key);
             expect_near("eye", key.eye_world, (double[]){expected, 0, 0}, 3, 1e-5);
             expect_near("look_at", key.look_at_world, (double[]){expected, 0, -1}, 3, 1e-5);
@@ -178,11 +178,11 @@ TEST(keys_at_equal_distances_make_the_spline_of_catmull_and_rom)
 TEST(a_line_with_even_speed_stays_one_at_uneven_keys)
 {
     const float times[] = {0, 0.5f, 3, 3.25f, 7};
-    struct camera_key keys[5];
+    struct record_camera_key keys[5];
     for (int i = 0; i < 5; i++)
         keys[i] = key_at(times[i], 2 * times[i] + 1, -times[i], 4);
     for (double time_s = 0; time_s <= 7; time_s += 0.0625) {
-        struct camera_key key;
+        struct record_camera_key key;
         animation_key_at(keys, 5, time_s, &key);
         expect_near("eye", key.eye_world, (double[]){2 * time_s + 1, -time_s, 4}, 3, 1e-5);
     }
@@ -190,11 +190,12 @@ TEST(a_line_with_even_speed_stays_one_at_uneven_keys)
 
 TEST(a_spline_does_not_leave_the_range_of_fields_of_view)
 {
-    struct camera_key keys[] = {key_at(0, 0, 0, 0), key_at(1, 0, 0, 0), key_at(2, 0, 0, 0), key_at(3, 0, 0, 0)};
+    struct record_camera_key keys[] = {key_at(0, 0, 0, 0), key_at(1, 0, 0, 0), key_at(2, 0, 0, 0),
+                                       key_at(3, 0, 0, 0)};
     keys[0].fov_y = keys[3].fov_y = 0.001f;
     keys[1].fov_y = keys[2].fov_y = 3.1f;
     for (double time_s = 0; time_s <= 3; time_s += 0.01) {
-        struct camera_key key;
+        struct record_camera_key key;
         animation_key_at(keys, 4, time_s, &key);
         assert_true(key.fov_y >= 0.001f && key.fov_y <= 3.1f);
     }
@@ -202,7 +203,7 @@ TEST(a_spline_does_not_leave_the_range_of_fields_of_view)
 
 TEST(keys_that_span_no_view_are_errors)
 {
-    struct camera_key keys[] = {key_at(1, 0, 0, 0), key_at(1, 5, 1, 0)};
+    struct record_camera_key keys[] = {key_at(1, 0, 0, 0), key_at(1, 5, 1, 0)};
     struct engine_job job = job_of(CAMERA_KEYS, keys, 2);
     struct error error = {0};
     assert_false(shot_check(&job, scene, NULL, &error));
@@ -224,11 +225,11 @@ TEST(keys_that_span_no_view_are_errors)
 
 TEST(an_orbit_by_90_degrees_is_a_quarter_of_the_circle)
 {
-    struct camera_key key = {
+    struct record_camera_key key = {
         .eye_world = {10, 3, 5}, .look_at_world = {10, 1, 1}, .up_world = {0, 2, 0}, .fov_y = 0.7f};
     struct engine_job job = job_of(CAMERA_ORBIT, &key, 1);
-    job.orbit_turn = (float)(2 * PI);
-    job.orbit_seconds = 4;
+    job.camera.orbit_turn = (float)(2 * PI);
+    job.camera.orbit_seconds = 4;
     /* The eye is at (0, 2, 4) from the centre; a turn about +y takes +z to +x. */
     const double eyes[5][3] = {{10, 3, 5}, {14, 3, 1}, {10, 3, -3}, {6, 3, 1}, {10, 3, 5}};
     for (uint32_t quarter = 0; quarter < 5; quarter++) {
@@ -254,16 +255,16 @@ TEST(an_orbit_by_90_degrees_is_a_quarter_of_the_circle)
 
 TEST(an_orbit_turns_about_its_own_up_axis)
 {
-    struct camera_key key = {
+    struct record_camera_key key = {
         .eye_world = {3, 0, 1}, .look_at_world = {0, 0, 1}, .up_world = {0, 0, 1}, .fov_y = 1};
     struct engine_job job = job_of(CAMERA_ORBIT, &key, 1);
-    job.orbit_turn = (float)(PI / 2);
-    job.orbit_seconds = 1;
+    job.camera.orbit_turn = (float)(PI / 2);
+    job.camera.orbit_seconds = 1;
     struct frame_camera camera = camera_at(&job, 10);
     float eye[3];
     eye_of(&camera, eye);
     expect_near("eye", eye, (double[]){0, 3, 1}, 3, 1e-5);
-    job.orbit_seconds = 0;
+    job.camera.orbit_seconds = 0;
     struct error error = {0};
     assert_false(shot_check(&job, scene, NULL, &error));
     assert_string_equal(error.field, "render.orbit_seconds");
@@ -279,8 +280,8 @@ TEST(an_orbit_without_a_key_turns_about_the_middle_of_the_scene)
     struct error error = {0};
     assert_true(scene_commit(scene, &disc, 1, &error));
     struct engine_job job = job_of(CAMERA_ORBIT, NULL, 0);
-    job.orbit_turn = 1;
-    job.orbit_seconds = 1;
+    job.camera.orbit_turn = 1;
+    job.camera.orbit_seconds = 1;
     struct frame_camera first = camera_at(&job, 0), camera;
     float start[3], eye[3];
     eye_of(&first, start);
@@ -322,9 +323,10 @@ TEST(what_an_orbit_goes_around_is_as_large_as_its_margin_allows)
     struct error error = {0};
     assert_true(scene_commit(scene, &disc, 1, &error));
     struct engine_job job = job_of(CAMERA_ORBIT, NULL, 0);
-    job.orbit_turn = job.orbit_seconds = 1;
-    job.framing.fov_y = 0.2f; /* so that the eye is not as near as it may be */
-    const double aspect = (double)job.frame.width / job.frame.height, wanted = 1 - 2 * (double)job.framing.margin;
+    job.camera.orbit_turn = job.camera.orbit_seconds = 1;
+    job.camera.auto_fov = 12.0f; /* so that the eye is not as near as it may be */
+    const double aspect = (double)job.frame.picture.width / job.frame.picture.height,
+                 wanted = 1 - 2 * (double)job.camera.auto_margin;
     for (uint32_t frame = 0; frame < 60; frame += 7) {
         const struct frame_camera camera = camera_at(&job, frame);
         /* A disc is all of its poses: it touches the margin in each. */
@@ -362,14 +364,14 @@ TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
     if (!scene_commit(scene, edits, 3, &error))
         fail_msg("%s", error.text);
     struct engine_job job = job_of(CAMERA_NODE, NULL, 0);
-    job.camera_node = 2;
+    job.camera.camera_node = 2;
     struct frame_camera camera = camera_at(&job, 0);
     const float *m = camera.world_from_view;
     expect_near("eye", (float[]){m[3], m[7], m[11]}, (double[]){21, 2, 3}, 3, 1e-5);
     expect_near("back", (float[]){m[2], m[6], m[10]}, (double[]){1, 0, 0}, 3, 1e-6);
     expect_near("up", (float[]){m[1], m[5], m[9]}, (double[]){0, 1, 0}, 3, 1e-6);
     assert_true(camera.fov_y == 0.9f && camera.near == 0.25f);
-    job.camera_node = 1;
+    job.camera.camera_node = 1;
     assert_false(shot_check(&job, scene, NULL, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.camera_node");
@@ -388,8 +390,8 @@ TEST(what_a_frame_could_not_tell_is_an_error_before_it_is_rendered)
     assert_string_equal(error.field, "render.frames_per_second");
 
     error = (struct error){0};
-    struct camera_key keys[] = {key_at(0, 0, 0, 0), key_at(1, 1e12f, 0, 0), key_at(2, 1e12f, 0, 0),
-                                key_at(3, 0, 0, 0)};
+    struct record_camera_key keys[] = {key_at(0, 0, 0, 0), key_at(1, 1e12f, 0, 0), key_at(2, 1e12f, 0, 0),
+                                       key_at(3, 0, 0, 0)};
     for (int i = 0; i < 4; i++)
         keys[i].look_at_world[2] = -1e12f;
     job = job_of(CAMERA_KEYS, keys, 4);

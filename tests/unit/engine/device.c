@@ -196,20 +196,17 @@ static void submit_job(uint64_t client, uint32_t request, unsigned tracer)
                 .last_frame = FRAMES - 1,
                 .frame_step = 1,
                 .frames_per_second = 1,
-                .frame = {.width = 96,
-                          .height = 96,
-                          .samples = 2,
-                          .depth = 2,
-                          .seed = 5,
-                          .tracer = tracer,
+                .frame = {.picture.width = 96,
+                          .picture.height = 96,
+                          .sampling.samples = 2,
+                          .light.depth = 2,
+                          .sampling.seed = 5,
+                          .tracing.tracer = tracer,
                           .tracer_options.ldc.resolution = 64,
-                          .primary = tracer == TRACER_LDC ? PRIMARY_TRACE : PRIMARY_RASTER},
+                          .tracing.primary = tracer == TRACER_LDC ? PRIMARY_TRACE : PRIMARY_RASTER},
                 .encoding = ENCODING_ZSTD,
                 .quality = 3,
-                .path = CAMERA_ORBIT,
-                .framing = usual_framing,
-                .orbit_turn = 1,
-                .orbit_seconds = 1,
+                .camera = {.camera_path = CAMERA_ORBIT, USUAL_FRAMING, .orbit_turn = 1, .orbit_seconds = 1},
                 .credit = FRAMES,
             },
     });
@@ -324,32 +321,35 @@ TEST(jobs_switch_tracers_on_one_scene_while_both_run)
 /* A view that refines one picture, frame by frame. */
 static void submit_view(uint64_t client, uint32_t request, uint32_t view)
 {
-    struct camera_key *key = malloc(sizeof(*key));
+    struct record_camera_key *key = malloc(sizeof(*key));
     assert_non_null(key);
-    *key = (struct camera_key){.eye_world = {2.0f - (float)view, 1.5f, 3.0f},
-                               .look_at_world = {0, 0.3f, 0},
-                               .up_world = {0, 1, 0},
-                               .fov_y = 0.7f};
+    *key = (struct record_camera_key){.eye_world = {2.0f - (float)view, 1.5f, 3.0f},
+                                      .look_at_world = {0, 0.3f, 0},
+                                      .up_world = {0, 1, 0},
+                                      .fov_y = 0.7f};
     struct engine_job job = {
         .last_frame = FRAMES - 1,
         .frame_step = 1,
         .frames_per_second = 1,
-        .frame =
-            {.width = 160 + 50 * view, .height = 200, .samples = 2, .depth = 3, .seed = view, .accumulate = true},
+        .frame = {.picture.width = 160 + 50 * view,
+                  .picture.height = 200,
+                  .sampling.samples = 2,
+                  .light.depth = 3,
+                  .sampling.seed = view,
+                  .sampling.accumulate = true},
         .encoding = ENCODING_ZSTD,
         .quality = 1,
-        .path = CAMERA_KEYS,
-        .framing = usual_framing,
+        .camera = {.camera_path = CAMERA_KEYS, USUAL_FRAMING},
         .keys = key,
         .key_count = 1,
         .credit = FRAMES,
     };
-    job.frame.integrator = view == 1 ? INTEGRATOR_PATH : view == 2 ? INTEGRATOR_AO : INTEGRATOR_WHITTED;
+    job.frame.light.integrator = view == 1 ? INTEGRATOR_PATH : view == 2 ? INTEGRATOR_AO : INTEGRATOR_WHITTED;
     if (view == BATCH_VIEW) {
-        job.frame.tracer = TRACER_LDC;
+        job.frame.tracing.tracer = TRACER_LDC;
         job.frame.tracer_options.ldc.resolution = 64;
-        job.path = CAMERA_ORBIT;
-        job.orbit_turn = job.orbit_seconds = 1;
+        job.camera.camera_path = CAMERA_ORBIT;
+        job.camera.orbit_turn = job.camera.orbit_seconds = 1;
     }
     submit((struct engine_command){
         .kind = ENGINE_JOB_START, .client = client, .request = request, .scene = 1, .job = job});
@@ -411,7 +411,7 @@ TEST_LONG(views_of_one_scene_at_once_show_what_each_shows_alone)
 
 #define VIEW_SAMPLES 6
 
-static struct engine_command picture(uint32_t request, struct camera_key *key)
+static struct engine_command picture(uint32_t request, struct record_camera_key *key)
 {
     struct engine_command made = {
         .kind = ENGINE_JOB_START,
@@ -422,13 +422,13 @@ static struct engine_command picture(uint32_t request, struct camera_key *key)
             {
                 .frame_step = 1,
                 .frames_per_second = 1000,
-                .frame = {.width = 200,
-                          .height = 150,
-                          .samples = VIEW_SAMPLES,
-                          .depth = 2,
-                          .seed = 5,
-                          .accumulate = true},
-                .path = CAMERA_KEYS,
+                .frame = {.picture.width = 200,
+                          .picture.height = 150,
+                          .sampling.samples = VIEW_SAMPLES,
+                          .light.depth = 2,
+                          .sampling.seed = 5,
+                          .sampling.accumulate = true},
+                .camera.camera_path = CAMERA_KEYS,
                 .keys = malloc(sizeof(*key)),
                 .key_count = 1,
                 .credit = 1000,
@@ -443,8 +443,8 @@ static struct engine_command picture(uint32_t request, struct camera_key *key)
 TEST(views_beside_each_other_come_to_the_pictures_of_single_frames)
 {
     make_scene(1, 0.7f);
-    struct camera_key keys[2] = {{.eye_world = {0, 1, 3}, .up_world = {0, 1, 0}, .fov_y = 1},
-                                 {.eye_world = {2, 2, 1}, .up_world = {0, 1, 0}, .fov_y = 1}};
+    struct record_camera_key keys[2] = {{.eye_world = {0, 1, 3}, .up_world = {0, 1, 0}, .fov_y = 1},
+                                        {.eye_world = {2, 2, 1}, .up_world = {0, 1, 0}, .fov_y = 1}};
     uint64_t expected[2], seen[2] = {0};
     for (uint32_t i = 0; i < 2; i++) {
         submit(picture(10 + i, &keys[i]));
@@ -462,7 +462,7 @@ TEST(views_beside_each_other_come_to_the_pictures_of_single_frames)
         view_wishes_set_camera(wishes, &(struct view_camera){.command = 1, .key = keys[i]});
         made.job.kind = JOB_VIEW;
         made.job.last_frame = UINT32_MAX;
-        made.job.pass_samples = 2;
+        made.job.view.pass_samples = 2;
         made.job.wishes = wishes;
         submit(made);
     }
@@ -586,10 +586,10 @@ static uint64_t expect_picture(uint64_t *revision)
 static void submit_picture(uint64_t client, uint32_t request)
 {
     struct engine_command made =
-        picture(request, &(struct camera_key){.eye_world = {0, 2, 3}, .up_world = {0, 1, 0}, .fov_y = 1});
+        picture(request, &(struct record_camera_key){.eye_world = {0, 2, 3}, .up_world = {0, 1, 0}, .fov_y = 1});
     made.client = client;
-    made.job.frame.tracer = TRACER_BVH;
-    made.job.frame.primary = PRIMARY_TRACE;
+    made.job.frame.tracing.tracer = TRACER_BVH;
+    made.job.frame.tracing.primary = PRIMARY_TRACE;
     submit(made);
 }
 

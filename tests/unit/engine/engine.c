@@ -46,8 +46,8 @@ TEST(frames_come_in_order_with_what_they_cost)
 static void expect_samples(uint32_t request, bool starts_anew, const uint32_t samples[3])
 {
     struct engine_command *made = render(1, request, 5, 7);
-    made->job.frame.samples = 4;
-    made->job.frame.accumulate = true;
+    made->job.frame.sampling.samples = 4;
+    made->job.frame.sampling.accumulate = true;
     made->job.frame.starts_anew = starts_anew;
     submit(made);
     for (uint32_t i = 0; i < 3; i++) {
@@ -75,8 +75,8 @@ TEST(layers_are_encoded_as_one_picture)
     for (uint32_t encoding = ENCODING_RAW; encoding <= ENCODING_ZSTD; encoding++) {
         struct engine_command *made = render(1, 2 + encoding, 0, 0);
         made->job.encoding = (enum encoding)encoding;
-        made->job.frame.format = PIXEL_FORMAT_RGBA32F;
-        made->job.frame.layers = layers;
+        made->job.frame.picture.format = PIXEL_FORMAT_RGBA32F;
+        made->job.frame.picture.layers = layers;
         submit(made);
         struct engine_event *event = expect_frame(1, 2 + encoding, 0);
         const struct engine_frame *got = event->frame;
@@ -151,9 +151,9 @@ static void run_beside_each_other(uint32_t weight_of_first)
         open_scene(client, 1);
     for (uint64_t client = 1; client <= 2; client++) {
         struct engine_command *made = render(client, 5, 0, 0);
-        made->job.frame.samples = client == 1 ? 40 : 400;
-        made->job.frame.ao_rays = client == 1 ? 5000 : 500;
-        made->job.frame.seed = client;
+        made->job.frame.sampling.samples = client == 1 ? 40 : 400;
+        made->job.frame.light.ao_rays = client == 1 ? 5000 : 500;
+        made->job.frame.sampling.seed = client;
         made->job.weight = client == 1 ? weight_of_first : 0;
         submit(made);
     }
@@ -178,12 +178,12 @@ TEST(a_job_that_would_wait_for_the_device_lets_others_go_first)
     for (uint64_t client = 1; client <= 2; client++) {
         open_scene(client, 1);
         struct engine_command *made = gated(render(client, 5, 0, 0));
-        made->job.frame.samples = 30;
-        made->job.frame.seed = client;
-        made->job.frame.ao_rays = 200;
+        made->job.frame.sampling.samples = 30;
+        made->job.frame.sampling.seed = client;
+        made->job.frame.light.ao_rays = 200;
         made->job.weight = client == 1 ? 16 : 1;
         if (client == 1)
-            made->job.frame.depth = WAITING_DEPTH;
+            made->job.frame.light.depth = WAITING_DEPTH;
         submit(made);
     }
     atomic_store(&fake.gate_open, true);
@@ -310,7 +310,7 @@ TEST(a_job_that_searches_a_large_scene_for_its_camera_can_be_cancelled_and_other
     fill_scene(2);
     struct engine_command *made[2] = {render(1, 3, 0, 0), render(1, 5, 0, 0)};
     for (int i = 0; i < 2; i++)
-        made[i]->job.path = CAMERA_AUTO;
+        made[i]->job.camera.camera_path = CAMERA_AUTO;
     submit(made[0]);
     submit_target(ENGINE_JOB_CANCEL, 1, 4, 3, 0);
     expect_failed(1, 3, ERROR_CANCELLED, "");

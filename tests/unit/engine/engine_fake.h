@@ -140,7 +140,7 @@ static inline struct frame_renderer *fake_renderer_create(struct frame_scene *sh
 
 static inline uint64_t fake_frame_bytes(const struct frame_request *request)
 {
-    return atomic_load(&fake.takes_memory) ? (uint64_t)request->width * request->height : 0;
+    return atomic_load(&fake.takes_memory) ? (uint64_t)request->picture.width * request->picture.height : 0;
 }
 
 static inline void fake_end_frame(struct frame_renderer *renderer)
@@ -194,7 +194,7 @@ static inline bool fake_may_begin(const struct frame_renderer *renderer, const s
                                   const struct scene_motion *motion, const struct frame_request *request)
 {
     const struct frame_scene *shared = renderer->shared;
-    bool moves = motion || request->depth == CHANGING_DEPTH;
+    bool moves = motion || request->light.depth == CHANGING_DEPTH;
     return !shared->frames || (!moves && !shared->moved && shared->revision == scene->revision);
 }
 
@@ -209,7 +209,7 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
     if (!gpu_memory_take(renderer->shared->device, fake_frame_bytes(request), "a frame", error))
         return false;
     renderer->shared->revision = scene->revision;
-    renderer->shared->moved = motion || request->depth == CHANGING_DEPTH;
+    renderer->shared->moved = motion || request->light.depth == CHANGING_DEPTH;
     renderer->shared->frames++;
     atomic_fetch_add(&fake.in_progress, 1);
     renderer->motion_digest = fake_motion_digest(motion);
@@ -217,7 +217,7 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
     renderer->busy = true;
     renderer->scene = scene;
     renderer->request = *request;
-    renderer->steps_left = request->samples;
+    renderer->steps_left = request->sampling.samples;
     renderer->last_step = -1;
     stage_times_begin(&renderer->times);
     atomic_fetch_add(&fake.frames_begun, 1);
@@ -237,12 +237,12 @@ static inline void fake_work(struct frame_renderer *renderer)
     int step = renderer->last_step = atomic_fetch_add(&fake.step_count, 1);
     uint64_t start_ns = clock_now_ns(), now_ns = start_ns;
     if (clock_is_stopped())
-        clock_let_pass(renderer->request.ao_rays * UINT64_C(1000));
-    while (now_ns - start_ns < renderer->request.ao_rays * UINT64_C(1000))
+        clock_let_pass(renderer->request.light.ao_rays * UINT64_C(1000));
+    while (now_ns - start_ns < renderer->request.light.ao_rays * UINT64_C(1000))
         now_ns = clock_now_ns();
     if (step >= STEPS_MAX)
         return;
-    fake.step_seeds[step] = renderer->request.seed;
+    fake.step_seeds[step] = renderer->request.sampling.seed;
     fake.step_ns[step] = now_ns - start_ns;
 }
 
@@ -251,7 +251,8 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
 {
     fake_work(renderer);
     int fail_from = atomic_load(&fake.fail_from_frame);
-    bool is_meant = !atomic_load(&fake.fail_seed) || renderer->request.seed == atomic_load(&fake.fail_seed);
+    bool is_meant =
+        !atomic_load(&fake.fail_seed) || renderer->request.sampling.seed == atomic_load(&fake.fail_seed);
     if ((atomic_load(&fake.fail_steps) > 0 && is_meant) ||
         (fail_from && atomic_load(&fake.frames_begun) >= fail_from)) {
         atomic_fetch_sub(&fake.fail_steps, 1);
@@ -259,8 +260,8 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         return FRAME_FAILED;
     }
     unsigned let_through = atomic_load(&fake.gate_seed);
-    bool is_gated =
-        renderer->request.depth == GATED_DEPTH && !(let_through && renderer->request.seed == let_through);
+    bool is_gated = renderer->request.light.depth == GATED_DEPTH &&
+                    !(let_through && renderer->request.sampling.seed == let_through);
     if (is_gated && !atomic_load(&fake.gate_open)) {
         usleep(500);
         return FRAME_MORE;
@@ -270,7 +271,7 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     bool goes_on = renderer->kept_samples && renderer->kept_revision == renderer->scene->revision &&
                    frame_request_adds_to(&renderer->kept_request, &renderer->request);
     uint32_t before = goes_on ? renderer->kept_samples : 0, maximum = renderer->request.samples_max;
-    uint32_t all = before + renderer->request.samples;
+    uint32_t all = before + renderer->request.sampling.samples;
     renderer->kept_samples = before && maximum && all > maximum ? (before > maximum ? before : maximum) : all;
     renderer->kept_request = renderer->request;
     renderer->kept_revision = renderer->scene->revision;
@@ -278,10 +279,10 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     size_t all_bytes = (size_t)frame_request_bytes(request);
     size_t attached = (size_t)__builtin_popcount(request->attachments);
     *result = (struct frame_result){
-        .width = renderer->request.width,
-        .height = renderer->request.height,
-        .size_bytes = all_bytes - 4 * attached * request->width * request->height,
-        .format = renderer->request.format,
+        .width = renderer->request.picture.width,
+        .height = renderer->request.picture.height,
+        .size_bytes = all_bytes - 4 * attached * request->picture.width * request->picture.height,
+        .format = renderer->request.picture.format,
         .ycbcr = request->ycbcr,
         .revision = renderer->scene->revision,
         .samples = renderer->kept_samples,
@@ -304,7 +305,8 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
 
 static inline bool fake_step_waits(const struct frame_renderer *renderer)
 {
-    return renderer->request.depth == WAITING_DEPTH && atomic_load(&fake.step_count) == renderer->last_step + 1;
+    return renderer->request.light.depth == WAITING_DEPTH &&
+           atomic_load(&fake.step_count) == renderer->last_step + 1;
 }
 
 static inline void fake_abandon(struct frame_renderer *renderer)
@@ -550,8 +552,8 @@ static inline struct engine_command *render(uint64_t client, uint32_t request, u
         .last_frame = last,
         .frame_step = 1,
         .frames_per_second = 24,
-        .frame = {.width = 4, .height = 3, .samples = 1, .tracer = 0},
-        .framing = usual_framing,
+        .frame = {.picture.width = 4, .picture.height = 3, .sampling.samples = 1, .tracing.tracer = 0},
+        .camera = {USUAL_FRAMING},
         .encoding = ENCODING_RAW,
         .quality = 3,
         .credit = 1000,
@@ -561,7 +563,7 @@ static inline struct engine_command *render(uint64_t client, uint32_t request, u
 
 static inline struct engine_command *gated(struct engine_command *made)
 {
-    made->job.frame.depth = GATED_DEPTH;
+    made->job.frame.light.depth = GATED_DEPTH;
     return made;
 }
 

@@ -13,7 +13,7 @@ TEST(jobs_that_cannot_be_are_refused_with_their_field)
 {
     open_scene(1, 1);
     struct engine_command *made = render(1, 2, 0, 0);
-    made->job.frame.tracer = 63;
+    made->job.frame.tracing.tracer = 63;
     submit(made);
     struct engine_event *event = expect_event(ENGINE_FAILED, 1, 2);
     assert_int_equal(event->error.kind, ERROR_UNSUPPORTED);
@@ -25,26 +25,22 @@ TEST(jobs_that_cannot_be_are_refused_with_their_field)
     expect_failed(1, 3, ERROR_INVALID, "render.last_frame");
     made = render(1, 4, 0, 0);
     made->job.encoding = ENCODING_JPEG;
-    made->job.frame.format = PIXEL_FORMAT_RGBA16F;
+    made->job.frame.picture.format = PIXEL_FORMAT_RGBA16F;
     submit(made);
     expect_failed(1, 4, ERROR_UNSUPPORTED, "render.encoding");
     made = render(1, 5, 0, 0);
-    made->job.path = CAMERA_NODE;
-    made->job.camera_node = 8;
+    made->job.camera.camera_path = CAMERA_NODE;
+    made->job.camera.camera_node = 8;
     submit(made);
     expect_failed(1, 5, ERROR_UNKNOWN_ID, "render.camera_node");
     made = render(1, 6, 0, 0);
-    made->job.path = CAMERA_KEYS;
+    made->job.camera.camera_path = CAMERA_KEYS;
     submit(made);
     expect_failed(1, 6, ERROR_INVALID, "render.keys");
     made = render(1, 7, 0, 0);
     made->scene = 4;
     submit(made);
     expect_failed(1, 7, ERROR_UNKNOWN_ID, "render.scene");
-    made = render(1, 8, 0, 0);
-    made->job.frame_step = 0;
-    submit(made);
-    expect_failed(1, 8, ERROR_INVALID, "render.frame_step");
 }
 
 /* ---- the device --------------------------------------------------------------------------------- */
@@ -171,7 +167,7 @@ TEST(idle_scenes_are_evicted_when_device_memory_runs_out)
 static struct engine_command *seeded(uint64_t client, uint32_t seed)
 {
     struct engine_command *made = render(client, seed, 0, 0);
-    made->job.frame.seed = seed;
+    made->job.frame.sampling.seed = seed;
     return made;
 }
 

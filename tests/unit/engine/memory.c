@@ -24,8 +24,8 @@ EACH_TEST(begin, stop_engine)
 static struct engine_command *taking(uint64_t client, uint32_t request, uint64_t bytes)
 {
     struct engine_command *made = render(client, request, 0, 0);
-    made->job.frame.width = 1000;
-    made->job.frame.height = (uint32_t)(bytes / 1000);
+    made->job.frame.picture.width = 1000;
+    made->job.frame.picture.height = (uint32_t)(bytes / 1000);
     return made;
 }
 
@@ -54,9 +54,9 @@ TEST(views_go_on_while_batches_wait_for_memory)
     expect_silence();
     struct view_wishes *wishes = view_wishes_create();
     struct engine_command *view = render(3, 30, 0, UINT32_MAX);
-    view->job.pass_samples = 1;
+    view->job.view.pass_samples = 1;
     view->job.kind = JOB_VIEW;
-    view->job.still_encoding = ENCODING_RAW;
+    view->job.view.still_encoding = ENCODING_RAW;
     view->job.wishes = view_wishes_ref(wishes);
     submit(view);
     const struct view_camera camera = {.command = 7,

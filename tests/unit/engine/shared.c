@@ -9,9 +9,9 @@ EACH_TEST(start_engine, stop_engine)
 static struct engine_command *still(uint32_t request, uint32_t steps, uint32_t depth)
 {
     struct engine_command *made = render(1, request, 0, 0);
-    made->job.frame.samples = steps;
-    made->job.frame.seed = request;
-    made->job.frame.depth = depth;
+    made->job.frame.sampling.samples = steps;
+    made->job.frame.sampling.seed = request;
+    made->job.frame.light.depth = depth;
     return made;
 }
 
@@ -49,7 +49,7 @@ TEST(frames_of_one_scene_take_turns_by_slices)
     open_scene(1, 1);
     for (uint32_t request = 2; request <= 4; request++) {
         struct engine_command *made = still(request, 100, 0);
-        made->job.frame.ao_rays = 1000;
+        made->job.frame.light.ao_rays = 1000;
         submit(made);
     }
     atomic_store(&fake.holds_steps, false);

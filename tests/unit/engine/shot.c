@@ -50,7 +50,7 @@ static struct scene *turning_scene(double degrees)
 
 static uint32_t pose_count(const struct scene *scene, uint32_t clip_count, double open_s, double shutter_s)
 {
-    const struct clip_use uses[] = {{.clip = 1, .speed = 1}, {.clip = 2, .speed = 1}};
+    const struct record_clip_use uses[] = {{.clip = 1, .speed = 1}, {.clip = 2, .speed = 1}};
     struct scene_motion motion;
     struct error error = {0};
     if (!scene_motion_evaluate(&motion, scene, uses, clip_count, open_s, shutter_s, &error))
@@ -108,20 +108,18 @@ TEST(joints_alone_need_two_poses)
 
 /* ---- cameras and lenses -------------------------------------------------------------------------- */
 
-static struct camera_key home = {
+static struct record_camera_key home = {
     .eye_world = {0, 0, 5}, .look_at_world = {0, 0, 0}, .up_world = {0, 1, 0}, .fov_y = 0.5f};
 
-static struct engine_job job_of(enum camera_path path, struct clip_use *clips, uint32_t clip_count)
+static struct engine_job job_of(enum camera_path path, struct record_clip_use *clips, uint32_t clip_count)
 {
     bool has_key = path == CAMERA_KEYS || path == CAMERA_ORBIT;
     return (struct engine_job){
         .last_frame = 1000,
         .frame_step = 1,
         .frames_per_second = 10,
-        .frame = {.width = 160, .height = 90, .samples = 1, .seed = 77},
-        .path = path,
-        .camera_node = 3,
-        .framing = usual_framing,
+        .frame = {.picture.width = 160, .picture.height = 90, .sampling.samples = 1, .sampling.seed = 77},
+        .camera = {.camera_path = path, .camera_node = 3, USUAL_FRAMING},
         .keys = has_key ? &home : NULL,
         .key_count = has_key,
         .clips = clips,
@@ -150,7 +148,7 @@ static void expect_refused(const struct engine_job *job, const struct scene *sce
 TEST(a_camera_at_a_node_moves_with_it)
 {
     struct scene *scene = turning_scene(90);
-    struct clip_use use = {.clip = 1, .speed = 1};
+    struct record_clip_use use = {.clip = 1, .speed = 1};
     struct engine_job job = job_of(CAMERA_NODE, &use, 1);
     job.time_origin_frame = 10;
     for (uint32_t frame = 10; frame <= 15; frame++) {
@@ -169,12 +167,12 @@ TEST(a_camera_at_a_node_moves_with_it)
 TEST(motion_vectors_have_the_cameras_and_poses_of_the_frames_beside)
 {
     struct scene *scene = turning_scene(90);
-    struct clip_use use = {.clip = 1, .speed = 1, .start_s = -0.05f};
+    struct record_clip_use use = {.clip = 1, .speed = 1, .start_s = -0.05f};
     struct engine_job job = job_of(CAMERA_NODE, &use, 1);
     job.frames_per_second = 100;
     job.first_frame = job.last_frame = 5;
     job.frame_step = 3;
-    job.frame.layers = 1u << LAYER_MOTION;
+    job.frame.picture.layers = 1u << LAYER_MOTION;
     struct shot shot = shot_at(&job, scene, 0), before, after;
     job.time_origin_frame = 1;
     before = shot_at(&job, scene, 0);
@@ -192,7 +190,7 @@ TEST(motion_vectors_have_the_cameras_and_poses_of_the_frames_beside)
     shot_finish(&before);
     shot_finish(&after);
     job = job_of(CAMERA_KEYS, NULL, 0); /* nothing plays, and the camera has one key */
-    job.frame.layers = 1u << LAYER_MOTION;
+    job.frame.picture.layers = 1u << LAYER_MOTION;
     shot = shot_at(&job, scene, 0);
     assert_memory_equal(&shot.request.camera_later, &shot.request.camera, sizeof(shot.request.camera));
     assert_false(shot.motion.has_neighbours);
@@ -212,7 +210,7 @@ TEST(the_key_of_a_frame_is_the_nearest_one_and_of_two_the_earlier)
                  {4, 3, 0, 3}, {64, 0, 33, 64}, {64, 0, 32, 0}, {4, 7, 11, 11}};
     struct engine_job job = job_of(CAMERA_KEYS, NULL, 0);
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
-        job.upsample = cases[i].upsample;
+        job.frame.picture.upsample = cases[i].upsample;
         job.time_origin_frame = cases[i].origin;
         assert_int_equal(shot_key_frame(&job, cases[i].frame), cases[i].key);
         job.first_frame = cases[i].frame; /* a range that begins there has the same key */
@@ -224,23 +222,23 @@ TEST(the_key_of_a_frame_is_the_nearest_one_and_of_two_the_earlier)
 TEST(a_frame_that_is_made_from_its_key_has_a_camera_of_its_own_and_the_rest_of_the_key)
 {
     struct scene *scene = turning_scene(90);
-    struct clip_use use = {.clip = 1, .speed = 1};
+    struct record_clip_use use = {.clip = 1, .speed = 1};
     struct engine_job job = job_of(CAMERA_NODE, &use, 1);
     job.frames_per_second = 1000;
-    job.frame.view_source = VIEW_SOURCE_LAYERS;
+    job.frame.picture.view_source = VIEW_SOURCE_LAYERS;
     struct shot key = shot_at(&job, scene, 4), own = shot_at(&job, scene, 6);
     assert_false(own.request.has_key);
-    job.upsample = 4;
+    job.frame.picture.upsample = 4;
     struct shot made = shot_at(&job, scene, 6), rendered = shot_at(&job, scene, 4);
-    assert_true(made.request.has_key && made.request.view_source == VIEW_SOURCE_LAYERS);
+    assert_true(made.request.has_key && made.request.picture.view_source == VIEW_SOURCE_LAYERS);
     assert_memory_equal(made.request.camera.world_from_view, own.request.camera.world_from_view, 48);
     assert_memory_equal(made.request.key_camera.world_from_view, key.request.camera.world_from_view, 48);
     assert_true(made.request.camera.world_from_view[3] > made.request.key_camera.world_from_view[3]);
-    assert_true(made.time_s == own.time_s && made.request.seed == key.request.seed);
+    assert_true(made.time_s == own.time_s && made.request.sampling.seed == key.request.sampling.seed);
     assert_memory_equal(made.motion.poses[0].nodes[0].parent_from_node,
                         key.motion.poses[0].nodes[0].parent_from_node, 48);
     /* The key itself is made from the layers that the others need anyway. */
-    assert_true(rendered.request.has_key && rendered.request.view_source == VIEW_SOURCE_LAYERS);
+    assert_true(rendered.request.has_key && rendered.request.picture.view_source == VIEW_SOURCE_LAYERS);
     assert_memory_equal(rendered.request.key_camera.world_from_view, key.request.camera.world_from_view, 48);
     assert_memory_equal(rendered.request.camera.world_from_view, key.request.camera.world_from_view, 48);
     shot_finish(&key);
@@ -254,18 +252,18 @@ TEST(layers_are_asked_for_where_a_picture_needs_them)
 {
     struct scene *scene = turning_scene(90);
     struct engine_job job = job_of(CAMERA_KEYS, NULL, 0);
-    job.frame.view_source = VIEW_SOURCE_LAYERS;
+    job.frame.picture.view_source = VIEW_SOURCE_LAYERS;
     struct shot shot = shot_at(&job, scene, 0);
-    assert_int_equal(shot.request.view_source, VIEW_SOURCE_RAYS);
+    assert_int_equal(shot.request.picture.view_source, VIEW_SOURCE_RAYS);
     shot_finish(&shot);
-    job.frame.aperture = 0.1f;
+    job.camera.aperture = 0.1f;
     shot = shot_at(&job, scene, 0);
-    assert_int_equal(shot.request.view_source, VIEW_SOURCE_LAYERS);
+    assert_int_equal(shot.request.picture.view_source, VIEW_SOURCE_LAYERS);
     shot_finish(&shot);
-    job.frame.aperture = 0;
-    job.frame.views_across = 2;
+    job.camera.aperture = 0;
+    job.frame.picture.views_across = 2;
     shot = shot_at(&job, scene, 0);
-    assert_int_equal(shot.request.view_source, VIEW_SOURCE_LAYERS);
+    assert_int_equal(shot.request.picture.view_source, VIEW_SOURCE_LAYERS);
     shot_finish(&shot);
     scene_destroy(scene);
 }
@@ -283,14 +281,14 @@ TEST(clips_move_the_view_of_a_camera_with_keys)
     add_clip(&list, 4, (float[]){0, 7}, 2);
     add_channel(&list, 14, 4, CHANNEL_VIEW_FOCUS, 0, 1, 1);
     expect_commit(scene, &list);
-    struct clip_use uses[] = {{.clip = 3, .speed = 1}, {.clip = 4, .speed = 1}};
+    struct record_clip_use uses[] = {{.clip = 3, .speed = 1}, {.clip = 4, .speed = 1}};
     struct engine_job job = job_of(CAMERA_KEYS, uses, 1);
-    job.frame.exposure_stops = 0.5f;
+    job.frame.picture.exposure_stops = 0.5f;
     struct shot shot = shot_at(&job, scene, 5);
     const struct frame_request *request = &shot.request;
     assert_true(request->camera.world_from_view[3] == 3.0f && request->camera.world_from_view[11] == 6.0f);
     assert_true(fabsf(request->camera.fov_y - 0.6f) < 1e-6f);
-    assert_true(request->aperture == 3.0f && request->exposure_stops == 2.5f);
+    assert_true(request->aperture == 3.0f && request->picture.exposure_stops == 2.5f);
     /* It looks at the origin still, sqrt(45) m away. */
     assert_true(fabsf(request->focus - sqrtf(45)) < 1e-5f);
     shot_finish(&shot);
@@ -303,7 +301,7 @@ TEST(clips_move_the_view_of_a_camera_with_keys)
         job = job_of(others[i], uses, 1);
         expect_refused(&job, scene, ERROR_INVALID, "render.camera_path");
     }
-    job.path = CAMERA_KEYS;
+    job.camera.camera_path = CAMERA_KEYS;
     uses[0].clip = 9;
     expect_refused(&job, scene, ERROR_UNKNOWN_ID, "render.clips[0].clip");
     scene_destroy(scene);
@@ -312,14 +310,14 @@ TEST(clips_move_the_view_of_a_camera_with_keys)
 TEST(a_lens_is_sharp_where_it_looks)
 {
     struct scene *scene = turning_scene(90);
-    struct clip_use use = {.clip = 1, .speed = 1};
+    struct record_clip_use use = {.clip = 1, .speed = 1};
     const enum camera_path paths[] = {CAMERA_AUTO, CAMERA_KEYS, CAMERA_ORBIT, CAMERA_NODE};
     for (int i = 0; i < 4; i++) {
         struct engine_job job = job_of(paths[i], &use, 1);
         struct shot shot = shot_at(&job, scene, 4);
         assert_true(shot.request.aperture == 0.0f && shot.request.focus == 0.0f); /* no lens */
         shot_finish(&shot);
-        job.frame.aperture = 0.1f;
+        job.camera.aperture = 0.1f;
         shot = shot_at(&job, scene, 4);
         const float *m = shot.request.camera.world_from_view;
         /* The square's middle; keys look at the origin. The camera of node 3 has it behind it, at its side. */
@@ -329,7 +327,7 @@ TEST(a_lens_is_sharp_where_it_looks)
         assert_true(fabsf(shot.request.focus - expected) < 1e-4f);
         assert_true(paths[i] == CAMERA_NODE || expected > 0);
         shot_finish(&shot);
-        job.frame.focus = 3;
+        job.camera.focus = 3;
         shot = shot_at(&job, scene, 4);
         assert_true(shot.request.aperture == 0.1f && shot.request.focus == 3.0f);
         shot_finish(&shot);
@@ -339,7 +337,7 @@ TEST(a_lens_is_sharp_where_it_looks)
     add_set(&list, OBJECT_CAMERA, 1)->set.camera.value.height = 1;
     expect_commit(scene, &list);
     struct engine_job job = job_of(CAMERA_NODE, &use, 1);
-    job.frame.aperture = 0.1f;
+    job.camera.aperture = 0.1f;
     struct shot shot = shot_at(&job, scene, 4);
     assert_true(shot.request.aperture == 0.0f && shot.request.focus == 0.0f);
     shot_finish(&shot);
@@ -355,7 +353,7 @@ TEST(an_automatic_camera_shows_the_pose_at_time_0_in_all_frames)
     add_clip(&list, 1, (float[]){0, 1, 50, 0, 0, 90, 0, 0}, 8);
     add_channel(&list, 1, 1, CHANNEL_NODE_TRANSLATION, 1, 3, 2);
     expect_commit(scene, &list);
-    struct clip_use use = {.clip = 1, .speed = 1, .start_s = -0.5f};
+    struct record_clip_use use = {.clip = 1, .speed = 1, .start_s = -0.5f};
     struct engine_job job = job_of(CAMERA_AUTO, &use, 1);
     struct animation_bounds bounds = {0};
     struct frame_camera expected;
@@ -389,10 +387,10 @@ TEST(a_ground_lies_beneath_all_that_clips_do)
     add_clip(&list, 1, (float[]){0, 1, 2, 0, 0, 0, 0, -3, 0, 0, 0, 0}, 12);
     add_channel(&list, 1, 1, CHANNEL_NODE_TRANSLATION, 1, 3, 3);
     expect_commit(scene, &list);
-    struct clip_use use = {.clip = 1, .speed = 1};
+    struct record_clip_use use = {.clip = 1, .speed = 1};
     struct engine_job job = job_of(CAMERA_AUTO, &use, 1);
-    job.has_ground = true;
-    job.ground_up_world[1] = 2.0f;
+    job.frame.picture.ground = true;
+    job.frame.picture.ground_up_y = 2.0f;
     struct animation_bounds bounds = {0};
     for (uint32_t frame = 0; frame < 25; frame += 12) {
         struct shot fresh = shot_at(&job, scene, frame), kept;
@@ -406,8 +404,8 @@ TEST(a_ground_lies_beneath_all_that_clips_do)
     }
     /* Of the rest pose, without the clip; seen from x, what lies at 0. */
     job.clip_count = 0;
-    job.ground_up_world[0] = 1.0f;
-    job.ground_up_world[1] = 0.0f;
+    job.frame.picture.ground_up_x = 1.0f;
+    job.frame.picture.ground_up_y = 0.0f;
     struct shot still = shot_at(&job, scene, 0);
     assert_true(fabsf(still.request.ground.centre_world[0]) < 1e-3f);
     shot_finish(&still);
@@ -421,15 +419,15 @@ TEST(noise_is_another_in_every_frame_but_in_none_that_accumulates)
     uint64_t seeds[200];
     for (uint32_t frame = 0; frame < 200; frame++) {
         struct shot shot = shot_at(&job, scene, frame);
-        seeds[frame] = shot.request.seed;
+        seeds[frame] = shot.request.sampling.seed;
         shot_finish(&shot);
         for (uint32_t before = 0; before < frame; before++)
             assert_true(seeds[before] != seeds[frame]);
     }
     assert_int_equal(seeds[0], 77);
-    job.frame.accumulate = true;
+    job.frame.sampling.accumulate = true;
     struct shot shot = shot_at(&job, scene, 150);
-    assert_int_equal(shot.request.seed, 77);
+    assert_int_equal(shot.request.sampling.seed, 77);
     shot_finish(&shot);
     scene_destroy(scene);
 }
@@ -445,7 +443,7 @@ TEST(a_given_camera_sees_the_scene_of_that_time)
     struct scene_channel *aperture = add_channel(&list, 5, 3, CHANNEL_VIEW_APERTURE, 0, 1, 1);
     aperture->value.first_value = 4;
     expect_commit(scene, &list);
-    struct clip_use uses[] = {{.clip = 1, .speed = 1}, {.clip = 3, .speed = 1}};
+    struct record_clip_use uses[] = {{.clip = 1, .speed = 1}, {.clip = 3, .speed = 1}};
     struct engine_job job = job_of(CAMERA_KEYS, uses, 2);
     struct shot frame = shot_at(&job, scene, 5), look;
     struct view_camera from = {.command = 1, .key = home};
@@ -460,7 +458,7 @@ TEST(a_given_camera_sees_the_scene_of_that_time)
     assert_true(look.request.camera.world_from_view[11] == 5.0f);
     assert_true(look.request.aperture == 0.25f);
     assert_true(look.request.focus == 5.0f);
-    assert_int_equal(look.request.seed, 77); /* from one place there is one picture */
+    assert_int_equal(look.request.sampling.seed, 77); /* from one place there is one picture */
     shot_finish(&frame);
     shot_finish(&look);
     struct error error = {0};
@@ -474,9 +472,9 @@ TEST(a_given_camera_sees_the_scene_of_that_time)
 TEST(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does)
 {
     struct scene *scene = turning_scene(90);
-    struct clip_use use = {.clip = 1, .speed = 1};
+    struct record_clip_use use = {.clip = 1, .speed = 1};
     struct engine_job along = job_of(CAMERA_NODE, &use, 1), watched = job_of(CAMERA_KEYS, &use, 1);
-    along.frame.aperture = watched.frame.aperture = 0.5f; /* it is focused alike */
+    along.camera.aperture = watched.camera.aperture = 0.5f; /* it is focused alike */
     for (uint32_t frame = 0; frame <= 10; frame += 5) {
         struct shot expected = shot_at(&along, scene, frame), look;
         struct view_camera from = {.command = 1, .key = home, .node = 3};
@@ -533,13 +531,13 @@ static void run_range(uint32_t request, uint32_t first, uint32_t last, uint32_t 
 {
     struct engine_command *made = render(1, request, first, last);
     made->job.frame_step = step;
-    made->job.shutter = 0.5f;
-    made->job.frame.aperture = 0.25f;
+    made->job.camera.shutter = 0.5f;
+    made->job.camera.aperture = 0.25f;
     made->job.clip_count = 2;
     made->job.clips = calloc(2, sizeof(*made->job.clips));
     assert_non_null(made->job.clips);
-    made->job.clips[0] = (struct clip_use){.clip = 1, .speed = 1.5f, .loop = true};
-    made->job.clips[1] = (struct clip_use){.clip = 2, .speed = 1, .start_s = 0.25f};
+    made->job.clips[0] = (struct record_clip_use){.clip = 1, .speed = 1.5f, .loop = true};
+    made->job.clips[1] = (struct record_clip_use){.clip = 2, .speed = 1, .start_s = 0.25f};
     submit(made);
     for (uint32_t frame = first; frame <= last; frame += step) {
         struct engine_event *event = expect_frame(1, request, frame);
@@ -559,7 +557,7 @@ static void expect_same(const struct record *whole, const struct record *part, u
         fail_msg("frame %u shows another motion", frame);
     assert_memory_equal(a->camera.world_from_view, b->camera.world_from_view, sizeof(a->camera.world_from_view));
     assert_true(a->camera.fov_y == b->camera.fov_y && a->aperture == b->aperture && a->focus == b->focus);
-    assert_true(a->seed == b->seed && a->exposure_stops == b->exposure_stops);
+    assert_true(a->sampling.seed == b->sampling.seed && a->picture.exposure_stops == b->picture.exposure_stops);
     assert_true(whole->time_s == part->time_s && whole->shutter_s == part->shutter_s);
 }
 
@@ -591,7 +589,7 @@ TEST_WITH(a_clip_that_goes_ends_the_job_and_says_which, start_engine, stop_engin
     made->job.clip_count = 1;
     made->job.clips = calloc(1, sizeof(*made->job.clips));
     assert_non_null(made->job.clips);
-    made->job.clips[0] = (struct clip_use){.clip = 2, .speed = 1};
+    made->job.clips[0] = (struct record_clip_use){.clip = 2, .speed = 1};
     submit(made);
     wait_until(&fake.frames_begun, 1);
     struct engine_command *removal = command(ENGINE_COMMIT, 1, 11);

@@ -54,12 +54,12 @@ static struct engine_command *view_of(uint32_t request, struct view_wishes *want
     struct engine_command *made = render(1, request, 0, UINT32_MAX);
     made->job.kind = JOB_VIEW;
     made->job.frames_per_second = 100000;
-    made->job.frame.samples = 4;
-    made->job.pass_samples = 1;
+    made->job.frame.sampling.samples = 4;
+    made->job.view.pass_samples = 1;
     made->job.weight = 1;
     made->job.encoding = ENCODING_JPEG;
     made->job.quality = 80;
-    made->job.still_encoding = ENCODING_RAW;
+    made->job.view.still_encoding = ENCODING_RAW;
     made->job.wishes = view_wishes_ref(wanted);
     return made;
 }
@@ -98,7 +98,7 @@ TEST(a_frame_tells_of_the_camera_that_it_shows)
 {
     struct engine_command *made = view(2);
     made->job.first_frame = 5;
-    made->job.frame.samples = 1;
+    made->job.frame.sampling.samples = 1;
     submit(made);
     struct engine_frame *first = take(expect_frame(1, 2, 5));
     assert_int_equal(first->command, 0);
@@ -122,8 +122,8 @@ TEST(a_frame_tells_of_the_camera_that_it_shows)
 
 static struct engine_command *with_samples(struct engine_command *made, uint32_t samples, uint32_t pass_samples)
 {
-    made->job.frame.samples = samples;
-    made->job.pass_samples = pass_samples;
+    made->job.frame.sampling.samples = samples;
+    made->job.view.pass_samples = pass_samples;
     return made;
 }
 
@@ -176,7 +176,7 @@ TEST(a_picture_that_rests_is_refined_until_it_has_its_samples)
 TEST(a_picture_that_rests_is_refined_until_its_error_is_as_small_as_wanted)
 {
     struct engine_command *made = with_samples(view(2), 1000, 3);
-    made->job.frame.noise = 0.12f;
+    made->job.frame.sampling.noise = 0.12f;
     submit(made);
     expect_picture(2, 0, 0, 3, ENCODING_RAW);
     expect_picture(2, 1, 0, 6, ENCODING_RAW);
@@ -374,7 +374,7 @@ TEST(a_stream_continues_over_frames_at_rest_and_restarts_on_request)
     expect_encoded(take_next(7, true), ENCODING_H264, false);
     /* So it does with a view that takes the place of this one. */
     made = with_samples(view(3), 1, 1);
-    made->job.encoding = made->job.still_encoding = ENCODING_H264;
+    made->job.encoding = made->job.view.still_encoding = ENCODING_H264;
     submit(made);
     expect_done(1, 2);
     expect_encoded(take(next_event()), ENCODING_H264, true);
@@ -400,7 +400,7 @@ TEST(a_view_takes_the_place_of_another_and_goes_on_from_it)
     expect_silence();
     /* One that cannot be changes nothing. */
     made = view(5);
-    made->job.frame.tracer = 99;
+    made->job.frame.tracing.tracer = 99;
     submit(made);
     expect_failed(1, 5, ERROR_UNSUPPORTED, "render.tracer");
     look(6, true);
@@ -463,12 +463,12 @@ TEST(effort_counts_for_a_view_that_moves_and_asked_for_it)
     for (uint32_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         struct engine_command *made = with_samples(view(2 + i), 2, 1);
         const uint64_t number = 10 * (i + 1);
-        made->job.adapt = rows[i].adapt;
-        made->job.keeps_rate = rows[i].keeps_rate;
-        made->job.margin = rows[i].margin;
-        made->job.frame.depth = 8;
-        made->job.frame.width = 80;
-        made->job.frame.height = 48;
+        made->job.view.adapt = rows[i].adapt;
+        made->job.view.moving_rate = rows[i].keeps_rate ? 10.0f : 0.0f;
+        made->job.view.margin = rows[i].margin;
+        made->job.frame.light.depth = 8;
+        made->job.frame.picture.width = 80;
+        made->job.frame.picture.height = 48;
         view_wishes_set_effort(wishes, &rows[i].effort);
         look(number, false);
         submit(made);
@@ -484,11 +484,11 @@ TEST(effort_counts_for_a_view_that_moves_and_asked_for_it)
         struct engine_frame *frame = take(expect_frame(1, 2 + i, 2));
         if (frame->result.width != rows[i].width || frame->result.height != rows[i].height ||
             frame->margin_x != rows[i].margin_x || frame->margin_y != rows[i].margin_y ||
-            frame->request.depth != rows[i].depth || frame->quality != rows[i].quality ||
+            frame->request.light.depth != rows[i].depth || frame->quality != rows[i].quality ||
             frame->wanted_bytes != rows[i].bytes)
             fail_msg("%s: %ux%u with a margin of %ux%u, %u bounces, quality %u, %d bytes", names[i],
                      frame->result.width, frame->result.height, frame->margin_x, frame->margin_y,
-                     frame->request.depth, frame->quality, (int)frame->wanted_bytes);
+                     frame->request.light.depth, frame->quality, (int)frame->wanted_bytes);
         /* A margin keeps as many pixels a radian. */
         assert_float_equal(tanf(frame->request.camera.fov_y / 2.0f) / tanf(fov_y / 2.0f),
                            (float)rows[i].height / (float)(rows[i].height - 2 * rows[i].margin_y), 1e-5f);
@@ -509,18 +509,18 @@ static void expect_layer(uint32_t number, uint64_t command, uint32_t layer, uint
     assert_int_equal(frame->request.hidden_layer, layer);
     assert_int_equal(frame->of_frame, of_frame);
     assert_int_equal(frame->encoding, encoding);
-    assert_int_equal(frame->result.samples, layer ? 1 : frame->request.samples);
+    assert_int_equal(frame->result.samples, layer ? 1 : frame->request.sampling.samples);
 }
 
 /* A stream has pictures alone: what they hide is coded as pictures that stand alone. */
 TEST(what_a_picture_hides_follows_it_while_it_moves)
 {
     struct engine_command *made = with_samples(view(2), 1, 1);
-    made->job.hidden_layers = 2;
+    made->job.view.hidden_layers = 2;
     made->job.encoding = ENCODING_H264;
-    made->job.still_encoding = ENCODING_RAW;
-    made->job.frame.format = PIXEL_FORMAT_RGBA8;
-    made->job.frame.width = made->job.frame.height = 64;
+    made->job.view.still_encoding = ENCODING_RAW;
+    made->job.frame.picture.format = PIXEL_FORMAT_RGBA8;
+    made->job.frame.picture.width = made->job.frame.picture.height = 64;
     look(1, true);
     submit(made);
     expect_layer(0, 1, 0, 0, ENCODING_H264);
@@ -542,7 +542,7 @@ TEST(what_is_hidden_takes_no_more_than_its_share_while_cameras_come)
     clock_stop();
     atomic_store(&fake.step_us, 2000);
     struct engine_command *made = with_samples(view(2), 1, 1);
-    made->job.hidden_layers = 1;
+    made->job.view.hidden_layers = 1;
     look(1, true);
     submit(made);
     expect_layer(0, 1, 0, 0, ENCODING_JPEG);
@@ -567,10 +567,10 @@ TEST(what_is_hidden_takes_no_more_than_its_share_while_cameras_come)
 TEST(less_is_made_for_views_of_the_client_where_time_or_the_link_is_short)
 {
     struct engine_command *made = with_samples(view(2), 4, 4);
-    made->job.adapt = true;
-    made->job.margin = 0.25f;
-    made->job.hidden_layers = 1;
-    made->job.frame.width = made->job.frame.height = 64;
+    made->job.view.adapt = true;
+    made->job.view.margin = 0.25f;
+    made->job.view.hidden_layers = 1;
+    made->job.frame.picture.width = made->job.frame.picture.height = 64;
     view_wishes_set_effort(wishes,
                            &(struct view_effort){.samples = 2, .margin_halves_less = 1, .no_hidden = true});
     look(1, true);
@@ -582,7 +582,7 @@ TEST(less_is_made_for_views_of_the_client_where_time_or_the_link_is_short)
     const uint64_t rendered_ns = frame->rendered_ns;
     frame = take(expect_frame(1, 2, 1));
     assert_int_equal(frame->request.hidden_layer, 1);
-    assert_int_equal(frame->request.width, 40);               /* half of 64 and its margins */
+    assert_int_equal(frame->request.picture.width, 40);       /* half of 64 and its margins */
     assert_true(frame->applied_ns - rendered_ns >= 100 * MS); /* nobody has wished anything since */
     view_wishes_set_effort(wishes, &(struct view_effort){.margin_halves_less = 2});
     look(2, true);
@@ -594,7 +594,7 @@ TEST(less_is_made_for_views_of_the_client_where_time_or_the_link_is_short)
 TEST(a_view_that_cannot_have_what_is_hidden_goes_on_without)
 {
     struct engine_command *made = with_samples(view(2), 1, 1);
-    made->job.hidden_layers = 1;
+    made->job.view.hidden_layers = 1;
     atomic_store(&fake.fail_kind, ERROR_LIMIT);
     atomic_store(&fake.fail_from_frame, atomic_load(&fake.frames_begun) + 2);
     look(1, true);
@@ -617,7 +617,7 @@ static void expect_form(struct engine_frame *frame, enum encoding encoding, enum
 TEST(frames_come_in_the_form_that_their_encoder_takes)
 {
     struct engine_command *made = with_samples(view(2), 2, 1);
-    made->job.adapt = true;
+    made->job.view.adapt = true;
     view_wishes_set_effort(wishes, &(struct view_effort){.quality = 95, .sparing = true});
     submit(made);
     /* Of rest only its samples tell whether it will be one that loses. */
@@ -633,7 +633,7 @@ TEST(frames_come_in_the_form_that_their_encoder_takes)
     expect_form(take(expect_frame(1, 2, 5)), ENCODING_RAW, YCBCR_NONE);
     /* Rest that is encoded as motion comes in the same form. */
     made = with_samples(view(3), 2, 1);
-    made->job.still_encoding = ENCODING_JPEG;
+    made->job.view.still_encoding = ENCODING_JPEG;
     submit(made);
     expect_done(1, 2);
     look(4, false);
@@ -663,7 +663,7 @@ TEST_WITH(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free, NULL, NULL
     struct job job = {
         .scene = &held,
         .output = job_output_create(&(struct job_output_options){.events = events, .window = 3, .credit = 100}),
-        .spec = {.wishes = own, .frame.samples = 1, .pass_samples = 1},
+        .spec = {.wishes = own, .frame.sampling.samples = 1, .view.pass_samples = 1},
         .view = {.credit = 10, .due_ns = 7 * MS, .render_ns = 3 * MS, .rendered_ns = 10 * MS},
     };
     assert_int_equal(view_due_ns(&job), 7 * MS);

@@ -9,7 +9,7 @@
 
 static const struct field_desc *first_field(void)
 {
-    return message_describe(MESSAGE_RENDER)->body()->fields;
+    return struct_field(message_describe(MESSAGE_RENDER)->body(), "tracing")->record()->fields;
 }
 
 TEST(every_setting_belongs_to_a_tracer_and_is_named_after_it)
@@ -50,7 +50,7 @@ TEST(zero_is_the_default_of_every_setting)
     tracer_settings_resolve(&settings);
     assert_true(tracer_settings_check(&settings, "", &fault));
     message_init(&message, MESSAGE_RENDER);
-    assert_memory_equal(&settings, &message.render.settings, sizeof(settings));
+    assert_memory_equal(&settings, &message.render.tracing.settings, sizeof(settings));
     assert_true(settings.quadtree.pixels == 0.25f);
     assert_int_equal(settings.ldc.resolution, 0); /* the tracer chooses */
 }

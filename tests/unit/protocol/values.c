@@ -187,7 +187,7 @@ static void try_wrong_fields(const struct message *message, const struct struct_
         case FIELD_BYTES:
             break;
         case FIELD_RECORD:
-            try_wrong_fields(message, field->record(), body + field->offset, path);
+            try_wrong_fields(message, field->record(), body + field->offset, parent); /* without its own name */
             break;
         case FIELD_STRING:
             try_wrong_string(message, field, body, path);
@@ -217,6 +217,23 @@ TEST(a_wrong_value_of_any_field_is_refused_with_the_path_of_the_field)
         check_round_trip(&message); /* all was put back */
     }
     assert_true(wrong_values_tried > 1000);
+}
+
+/* An error names a field without the record that it lies in. */
+TEST(the_fields_of_a_message_and_its_records_have_different_names)
+{
+    for (size_t i = 0; i < protocol_message_count; i++) {
+        struct field_desc leaves[160];
+        const struct message_desc *desc = &protocol_messages[i];
+        const size_t count = struct_leaves(desc->body(), leaves, 160);
+        assert_in_range(count, 0, 159);
+        for (size_t a = 0; a < count; a++) {
+            for (size_t b = 0; b < a; b++) {
+                if (strcmp(leaves[a].name, leaves[b].name) == 0)
+                    fail_msg("%s.%s stands for two fields", desc->info.name, leaves[a].name);
+            }
+        }
+    }
 }
 
 TEST(bulk_padding_must_be_zero)

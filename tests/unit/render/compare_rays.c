@@ -167,7 +167,7 @@ TEST(far_is_a_share_of_the_diagonal_or_of_a_longer_way)
 TEST(errors_are_in_scene_diagonals_and_in_shares_of_the_distance)
 {
     struct wave_tally *tally = *state;
-    struct wave_comparison figures;
+    struct record_wave_comparison figures;
     for (int i = 0; i < 99; i++)
         compare(tally, &down, hit_at(4.001f), hit_at(4));
     compare(tally, &down, hit_at(4.004f), hit_at(4));
@@ -257,7 +257,7 @@ TEST(dead_rays_do_not_count_unless_something_was_hit)
 TEST(distances_that_are_no_numbers_are_errors)
 {
     struct wave_tally *tally = *state;
-    struct wave_comparison figures;
+    struct record_wave_comparison figures;
     compare(tally, &down, hit_at(NAN), hit_at(4));
     assert_counts(tally, 0, 0, 0, 1, 0, 0, 0);
     compare(tally, &down, hit_at(INFINITY), hit_at(4));
@@ -343,7 +343,7 @@ TEST(moved_rays_are_a_few_rounding_steps_off_and_still_different_rays)
 TEST(the_order_of_rays_and_slices_changes_no_figure)
 {
     struct wave_tally *forward = *state, *parts[3];
-    struct wave_comparison a, b;
+    struct record_wave_comparison a, b;
     for (int i = 0; i < 3; i++)
         parts[i] = calloc(1, sizeof(*parts[i]));
     for (int i = 0; i < 3000; i++)
@@ -356,9 +356,9 @@ TEST(the_order_of_rays_and_slices_changes_no_figure)
     wave_tally_merge(parts[1], parts[2]);
     wave_tally_figures(forward, &a);
     wave_tally_figures(parts[1], &b);
-    assert_int_equal(b.first_ns, 12);
-    b.first_ns = 0;
-    assert_memory_equal(&a, &b, offsetof(struct wave_comparison, normal_max) + sizeof(a.normal_max));
+    assert_int_equal(b.tracer_ns, 12);
+    b.tracer_ns = 0;
+    assert_memory_equal(&a, &b, offsetof(struct record_wave_comparison, normal_max) + sizeof(a.normal_max));
     assert_int_equal(b.rays, 3000);
     for (int i = 0; i < 3; i++)
         free(parts[i]);

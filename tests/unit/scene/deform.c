@@ -74,7 +74,7 @@ TEST(joints_below_joints_follow_a_clip)
     expect_commit(scene, &list);
     for (double t = 0; t <= 1; t += 0.125) {
         struct scene_pose pose;
-        const struct clip_use use = {.clip = 1, .speed = 1};
+        const struct record_clip_use use = {.clip = 1, .speed = 1};
         assert_true(scene_pose_evaluate(&pose, scene, &use, 1, t, NULL));
         float positions[12];
         deform(&pose, 3, positions, NULL);

@@ -8,7 +8,7 @@
 
 EACH_TEST(begin_scene, end_scene)
 
-static struct scene_pose pose_at(const struct clip_use *uses, uint32_t count, double time_s)
+static struct scene_pose pose_at(const struct record_clip_use *uses, uint32_t count, double time_s)
 {
     struct scene_pose pose;
     struct error error = {0};
@@ -17,7 +17,7 @@ static struct scene_pose pose_at(const struct clip_use *uses, uint32_t count, do
     return pose;
 }
 
-static const struct clip_use plain_use = {.clip = 1, .speed = 1};
+static const struct record_clip_use plain_use = {.clip = 1, .speed = 1};
 
 /* Where a node's own point is at a time while clip 1 plays. */
 static void expect_place(uint32_t node, double time_s, const float point[3], const double expected[3])
@@ -127,7 +127,7 @@ TEST(clips_begin_end_repeat_and_run_at_their_speed)
     assert_true(scene_clip_duration_s(scene, 1) == 4.0);
     assert_true(scene_clip_duration_s(scene, 9) == 0.0);
     const struct {
-        struct clip_use use;
+        struct record_clip_use use;
         double time_s, x;
     } cases[] = {
         {{.clip = 1, .speed = 1}, -7, 10},
@@ -161,9 +161,9 @@ TEST(of_two_clips_that_change_the_same_the_later_one_counts)
     add_channel(&list, 2, 7, CHANNEL_NODE_SCALE, 1, 3, 1);
     add_channel(&list, 3, 8, CHANNEL_NODE_TRANSLATION, 1, 3, 1);
     expect_commit(scene, &list);
-    const struct clip_use orders[][3] = {{{7, 0, 1, false}, {8, 0, 1, false}},
-                                         {{8, 0, 1, false}, {7, 0, 1, false}},
-                                         {{8, 0, 1, false}, {7, 0, 1, false}, {8, 0, 1, false}}};
+    const struct record_clip_use orders[][3] = {{{7, 0, 1, false}, {8, 0, 1, false}},
+                                                {{8, 0, 1, false}, {7, 0, 1, false}},
+                                                {{8, 0, 1, false}, {7, 0, 1, false}, {8, 0, 1, false}}};
     const uint32_t counts[] = {2, 2, 3};
     const double places[][3] = {{4, 5, 6}, {1, 2, 3}, {4, 5, 6}};
     for (int i = 0; i < 3; i++) {
@@ -175,7 +175,7 @@ TEST(of_two_clips_that_change_the_same_the_later_one_counts)
     }
     struct scene_pose pose;
     struct error error = {0};
-    const struct clip_use unknown[] = {{.clip = 7, .speed = 1}, {.clip = 9, .speed = 1}};
+    const struct record_clip_use unknown[] = {{.clip = 7, .speed = 1}, {.clip = 9, .speed = 1}};
     assert_false(scene_pose_evaluate(&pose, scene, unknown, 2, 0, &error));
     assert_int_equal(error.kind, ERROR_UNKNOWN_ID);
     assert_string_equal(error.field, "clips[1].clip");

@@ -20,7 +20,7 @@ static struct {
     struct engine_command *_Atomic kept_commit; /* has no answer until release_commit() */
     uint32_t job_request, next_frame, last_frame;
     struct engine_job job; /* the last one, but for what it owns */
-    struct clip_use job_clips[16];
+    struct record_clip_use job_clips[16];
     struct structure_rows structure; /* of the frames that it renders */
     uint64_t credit_seen, commits;
     atomic_uint edits, gone;
@@ -45,11 +45,11 @@ static inline void render(const struct engine_command *command)
         struct engine_event *made =
             port_frame(command->client, engine.job_request, engine.next_frame, FRAME_BYTES);
         struct engine_frame *frame = made->frame;
-        frame->request.tracer = engine.job.frame.tracer;
-        frame->request.aperture = engine.job.frame.aperture;
-        frame->request.focus = engine.job.frame.focus;
-        frame->shutter_s = engine.job.shutter / 8;
-        frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1;
+        frame->request.tracing.tracer = engine.job.frame.tracing.tracer;
+        frame->request.aperture = engine.job.camera.aperture;
+        frame->request.focus = engine.job.camera.focus;
+        frame->shutter_s = engine.job.camera.shutter / 8;
+        frame->result.layers = engine.job.frame.picture.layers ? engine.job.frame.picture.layers : 1;
         frame->result.samples = 5; /* with those of frames before */
         frame->result.structure = engine.structure;
         for (size_t i = 0; i < FRAME_BYTES; i++)
@@ -148,7 +148,7 @@ static inline struct message render_message(uint32_t last_frame, uint32_t credit
     struct message message = made(MESSAGE_RENDER);
     message.render.scene = 1;
     message.render.channel = 2;
-    message.render.width = message.render.height = 1;
+    message.render.picture.width = message.render.picture.height = 1;
     message.render.credit = credit;
     message.render.last_frame = last_frame;
     return message;

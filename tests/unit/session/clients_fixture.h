@@ -215,7 +215,7 @@ static inline void send_blob(struct client *client, uint32_t request, const stru
 static inline uint64_t render_frame(struct client *client, uint32_t request, uint32_t scene)
 {
     struct message message = made(MESSAGE_RENDER);
-    message.render.width = message.render.height = 1;
+    message.render.picture.width = message.render.picture.height = 1;
     message.render.scene = scene;
     message.render.channel = request;
     message.render.credit = 1;

@@ -127,7 +127,7 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
     send_message(2, 0, &message);
     expect_error(2, PROTOCOL_ERROR_UNKNOWN_ID);
     message = render_message(0, 1);
-    message.render.width = 1024;
+    message.render.picture.width = 1024;
     send_message(3, 0, &message);
     expect_error(3, PROTOCOL_ERROR_LIMIT);
     message = render_message(0, 1);
@@ -137,11 +137,11 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
     assert_string_equal(client.message.error.field, "render.last_frame");
     message = render_message(0, 1);
     message.render.encoding = PROTOCOL_ENCODING_JPEG;
-    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     send_message(5, 0, &message);
     expect_error(5, PROTOCOL_ERROR_UNSUPPORTED);
     message = render_message(0, 1);
-    message.render.camera_path = PROTOCOL_CAMERA_KEYS;
+    message.render.camera.camera_path = PROTOCOL_CAMERA_KEYS;
     send_message(6, 0, &message);
     expect_error(6, PROTOCOL_ERROR_INVALID);
 }
@@ -153,7 +153,7 @@ static void send_unchecked(uint32_t request, const struct message *message)
     static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
     struct message valid = *message;
     struct writer writer;
-    memset(&valid.render.settings, 0, sizeof(valid.render.settings));
+    memset(&valid.render.tracing.settings, 0, sizeof(valid.render.tracing.settings));
     writer_init(&writer, bytes, sizeof(bytes));
     assert_true(message_write(&writer, request, 0, &valid));
     plain_encode(&payload, message);
@@ -169,12 +169,12 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     struct message message = render_message(0, 1);
     message.render.clips = clips;
     message.render.clips_count = 2;
-    message.render.aperture = 0.125f;
-    message.render.focus = 7;
-    message.render.shutter = 0.5f;
-    message.render.pixel_filter = PROTOCOL_FILTER_TENT;
-    message.render.settings.bvh.form = PROTOCOL_TRACER_FORM_PAPER;
-    message.render.accumulate = PROTOCOL_ACCUMULATION_ON;
+    message.render.camera.aperture = 0.125f;
+    message.render.camera.focus = 7;
+    message.render.camera.shutter = 0.5f;
+    message.render.sampling.pixel_filter = PROTOCOL_FILTER_TENT;
+    message.render.tracing.settings.bvh.form = PROTOCOL_TRACER_FORM_PAPER;
+    message.render.sampling.accumulate = PROTOCOL_ACCUMULATION_ON;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
     const struct message_frame_begin *begin = &client.message.frame_begin;
@@ -185,7 +185,8 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     assert_true(engine.job_clips[0].clip == 4 && engine.job_clips[0].start_s == -2.0f);
     assert_true(engine.job_clips[0].speed == 0.5f && engine.job_clips[0].loop);
     assert_true(engine.job_clips[1].clip == 5 && engine.job_clips[1].speed == 3.0f && !engine.job_clips[1].loop);
-    assert_true(job->shutter == 0.5f && job->frame.filter == FILTER_TENT && job->frame.accumulate);
+    assert_true(job->camera.shutter == 0.5f && job->frame.sampling.pixel_filter == FILTER_TENT &&
+                job->frame.sampling.accumulate);
     assert_int_equal(job->frame.tracer_options.bvh.form, TRACER_FORM_PAPER);
     take_rest();
 }
@@ -205,11 +206,11 @@ SESSION_TEST(a_job_starts_anew_where_it_asks_for_it_and_a_view_never)
     open_scene(1, 1);
     for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct message message = render_message(0, 1);
-        message.render.accumulate = cases[i].wanted;
+        message.render.sampling.accumulate = cases[i].wanted;
         message.render.kind = cases[i].kind;
         send_message(2 + 2 * i, 2 + i, &message);
         expect(MESSAGE_FRAME_BEGIN, 2 + 2 * i);
-        assert_int_equal(engine.job.frame.accumulate, cases[i].accumulates);
+        assert_int_equal(engine.job.frame.sampling.accumulate != PROTOCOL_ACCUMULATION_OFF, cases[i].accumulates);
         assert_int_equal(engine.job.frame.starts_anew, cases[i].starts_anew);
         while (cases[i].kind == PROTOCOL_JOB_BATCH && receive()->type != MESSAGE_OK)
             continue;
@@ -220,9 +221,9 @@ SESSION_TEST(settings_of_cubes_go_to_the_engine_with_the_daemons_limits)
 {
     open_scene(1, 1);
     struct message message = render_message(0, 1);
-    message.render.tracer = PROTOCOL_TRACER_LDC;
-    message.render.settings.ldc.resolution = 16;
-    message.render.settings.ldc.form = PROTOCOL_TRACER_FORM_PAPER;
+    message.render.tracing.tracer = PROTOCOL_TRACER_LDC;
+    message.render.tracing.settings.ldc.resolution = 16;
+    message.render.tracing.settings.ldc.form = PROTOCOL_TRACER_FORM_PAPER;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
     assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_LDC);
@@ -238,16 +239,16 @@ SESSION_TEST(layers_go_to_the_engine_and_come_with_the_frame)
 {
     open_scene(1, 1);
     struct message message = render_message(0, 1);
-    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     message.render.encoding = PROTOCOL_ENCODING_ZSTD;
-    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY | 1u << PROTOCOL_LAYER_DEPTH;
+    message.render.picture.layers = 1u << PROTOCOL_LAYER_BEAUTY | 1u << PROTOCOL_LAYER_DEPTH;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
-    assert_int_equal(engine.job.frame.layers, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH);
-    assert_int_equal(client.message.frame_begin.layers, message.render.layers);
+    assert_int_equal(engine.job.frame.picture.layers, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH);
+    assert_int_equal(client.message.frame_begin.layers, message.render.picture.layers);
     take_rest();
     message = render_message(0, 1); /* the picture alone has any format, named or not */
-    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY;
+    message.render.picture.layers = 1u << PROTOCOL_LAYER_BEAUTY;
     message.render.encoding = PROTOCOL_ENCODING_JPEG;
     send_message(3, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 3);
@@ -273,9 +274,9 @@ SESSION_TEST(layers_that_pixels_or_messages_do_not_hold_are_refused)
     open_scene(1, 1);
     for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct message message = render_message(0, 1);
-        message.render.width = message.render.height = cases[i].edge_pixels;
-        message.render.layers = cases[i].layers;
-        message.render.format = cases[i].format;
+        message.render.picture.width = message.render.picture.height = cases[i].edge_pixels;
+        message.render.picture.layers = cases[i].layers;
+        message.render.picture.format = cases[i].format;
         message.render.encoding = cases[i].encoding;
         send_message(2 + i, 0, &message);
         expect_error(2 + i, cases[i].code);
@@ -298,16 +299,16 @@ static struct message views_message(const struct views_case *given)
 {
     struct message message = render_message(0, 1);
     struct message_render *render = &message.render;
-    render->views_across = given->across ? given->across : 1;
-    render->views_down = given->down ? given->down : 1;
-    render->eyes_over = given->eyes_over;
-    render->upsample = given->upsample ? given->upsample : 1;
-    render->accumulate = given->accumulate;
-    render->compare = given->compare;
-    render->width = given->width ? given->width : render->width;
-    render->baseline = given->baseline;
-    render->shutter = given->shutter;
-    render->view_source = given->source;
+    render->picture.views_across = given->across ? given->across : 1;
+    render->picture.views_down = given->down ? given->down : 1;
+    render->picture.eyes_over = given->eyes_over;
+    render->picture.upsample = given->upsample ? given->upsample : 1;
+    render->sampling.accumulate = given->accumulate;
+    render->comparison.compare = given->compare;
+    render->picture.width = given->width ? given->width : render->picture.width;
+    render->picture.baseline = given->baseline;
+    render->camera.shutter = given->shutter;
+    render->picture.view_source = given->source;
     render->kind = given->kind;
     return message;
 }
@@ -386,7 +387,7 @@ SESSION_TEST(settings_that_no_tracer_has_are_refused_by_their_field)
     open_scene(1, 1);
     for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct message message = render_message(0, 1);
-        message.render.settings = cases[i].settings;
+        message.render.tracing.settings = cases[i].settings;
         send_unchecked(2 + i, &message);
         expect_error(2 + i, PROTOCOL_ERROR_INVALID);
         assert_string_equal(client.message.error.field, cases[i].field);
@@ -409,15 +410,15 @@ SESSION_TEST(the_pictures_size_goes_to_the_engine_where_a_resolution_is_chosen_b
 {
     open_scene(1, 1);
     struct message message = render_message(0, 1);
-    message.render.width = 300;
-    message.render.height = 200;
-    message.render.tracer = PROTOCOL_TRACER_LDC;
+    message.render.picture.width = 300;
+    message.render.picture.height = 200;
+    message.render.tracing.tracer = PROTOCOL_TRACER_LDC;
     assert_int_equal(pixels_noted_for(&message), 65536);
-    message.render.settings.ldc.resolution = 1024;
+    message.render.tracing.settings.ldc.resolution = 1024;
     assert_int_equal(pixels_noted_for(&message), 0);
-    message.render.tracer = PROTOCOL_TRACER_ABUFFER;
+    message.render.tracing.tracer = PROTOCOL_TRACER_ABUFFER;
     assert_int_equal(pixels_noted_for(&message), 65536);
-    message.render.tracer = PROTOCOL_TRACER_BVH;
+    message.render.tracing.tracer = PROTOCOL_TRACER_BVH;
     assert_int_equal(pixels_noted_for(&message), 0);
 }
 
@@ -425,34 +426,35 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
 {
     open_scene(1, 1);
     struct message message = render_message(0, 1);
-    message.render.tracer = PROTOCOL_TRACER_ABUFFER;
-    message.render.settings.abuffer.resolution = 64;
-    message.render.settings.abuffer.voxels = 64;
-    message.render.settings.abuffer.form = PROTOCOL_TRACER_FORM_PAPER;
-    message.render.integrator = PROTOCOL_INTEGRATOR_PATH;
-    message.render.brdf = PROTOCOL_BRDF_WARD;
-    message.render.ao_distance = 2;
-    message.render.ao_falloff = 0.5f;
-    message.render.clamp = 8;
-    message.render.ao_rays = 256;
-    message.render.layer_opacity = 0.75f;
-    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
-    message.render.layers = 1u << PROTOCOL_LAYER_ALBEDO | 1u << PROTOCOL_LAYER_ID;
+    message.render.tracing.tracer = PROTOCOL_TRACER_ABUFFER;
+    message.render.tracing.settings.abuffer.resolution = 64;
+    message.render.tracing.settings.abuffer.voxels = 64;
+    message.render.tracing.settings.abuffer.form = PROTOCOL_TRACER_FORM_PAPER;
+    message.render.light.integrator = PROTOCOL_INTEGRATOR_PATH;
+    message.render.light.brdf = PROTOCOL_BRDF_WARD;
+    message.render.light.ao_distance = 2;
+    message.render.light.ao_falloff = 0.5f;
+    message.render.light.clamp = 8;
+    message.render.light.ao_rays = 256;
+    message.render.light.layer_opacity = 0.75f;
+    message.render.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.picture.layers = 1u << PROTOCOL_LAYER_ALBEDO | 1u << PROTOCOL_LAYER_ID;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
     assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_ABUFFER);
-    assert_int_equal(client.message.frame_begin.layers, message.render.layers);
+    assert_int_equal(client.message.frame_begin.layers, message.render.picture.layers);
     const struct frame_request *request = &engine.job.frame;
     assert_int_equal(request->tracer_options.abuffer.resolution, 64);
     assert_int_equal(request->tracer_options.abuffer.voxels, 64);
     assert_int_equal(request->tracer_options.abuffer.form, TRACER_FORM_PAPER);
     assert_int_equal(request->tracer_options.limits.abuffer_mebibytes, 1);
-    assert_int_equal(request->integrator, INTEGRATOR_PATH);
-    assert_int_equal(request->brdf, BRDF_WARD);
-    assert_true(request->clamp == 8);
-    assert_true(request->ao_distance == 2 && request->ao_falloff == 0.5f && request->layer_opacity == 0.75f);
-    assert_int_equal(request->ao_rays, 256);
-    assert_int_equal(request->layers, message.render.layers);
+    assert_int_equal(request->light.integrator, INTEGRATOR_PATH);
+    assert_int_equal(request->light.brdf, BRDF_WARD);
+    assert_true(request->light.clamp == 8);
+    assert_true(request->light.ao_distance == 2 && request->light.ao_falloff == 0.5f &&
+                request->light.layer_opacity == 0.75f);
+    assert_int_equal(request->light.ao_rays, 256);
+    assert_int_equal(request->picture.layers, message.render.picture.layers);
     take_rest();
 }
 
@@ -461,14 +463,14 @@ SESSION_TEST(layers_count_as_pictures_in_the_memory_for_frames)
     open_scene(1, 1);
     struct message message = render_message(0, 1);
     /* While a job runs, all layers are more than is left of the memory for frames; the picture is not. */
-    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
-    message.render.width = message.render.height = 128;
-    message.render.layers = 0;
+    message.render.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.picture.width = message.render.picture.height = 128;
+    message.render.picture.layers = 0;
     atomic_store(&engine.keep_jobs, true);
     send_message(3, 0, &message);
     for (uint32_t request = 4; request < 6; request++) {
         message.render.channel++;
-        message.render.layers = request == 4 ? 127 : 0;
+        message.render.picture.layers = request == 4 ? 127 : 0;
         send_message(request, 0, &message);
     }
     expect_error(4, PROTOCOL_ERROR_BUSY);
@@ -511,7 +513,8 @@ SESSION_TEST(a_job_whose_frames_do_not_fit_in_memory_waits_for_others_to_end)
     atomic_store(&engine.keep_jobs, true);
     open_scene(1, 1);
     struct message message = render_message(0, 1);
-    message.render.width = message.render.height = 512; /* 7 MiB: 3 frames in the engine, 4 to be sent */
+    message.render.picture.width = message.render.picture.height =
+        512; /* 7 MiB: 3 frames in the engine, 4 to be sent */
     send_message(2, 0, &message);
     message.render.channel = 3;
     send_message(3, 0, &message);
@@ -522,9 +525,9 @@ SESSION_TEST(a_job_whose_frames_do_not_fit_in_memory_waits_for_others_to_end)
     expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 4);
     message = render_message(0, 1);
-    message.render.width = message.render.height = 512;
-    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F; /* more than there is, but it is the only one */
-    message.render.layers = 127;
+    message.render.picture.width = message.render.picture.height = 512;
+    message.render.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA32F; /* more than there is, but it is the only one */
+    message.render.picture.layers = 127;
     send_message(5, 0, &message);
     cancel(6, 5);
     expect_error(5, PROTOCOL_ERROR_CANCELLED);

@@ -43,9 +43,9 @@ static struct message render_message(uint32_t width, uint32_t height, uint32_t s
     message.render.scene = 1;
     message.render.channel = 2;
     message.render.credit = 1;
-    message.render.width = width;
-    message.render.height = height;
-    message.render.samples = samples;
+    message.render.picture.width = width;
+    message.render.picture.height = height;
+    message.render.sampling.samples = samples;
     return message;
 }
 

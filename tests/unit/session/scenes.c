@@ -131,7 +131,7 @@ TEST(a_view_at_rest_shows_what_another_client_changes)
     commit_sphere(one, 1);
     attach(other, 7, "model");
     struct message message = made(MESSAGE_RENDER);
-    message.render.width = message.render.height = 1;
+    message.render.picture.width = message.render.picture.height = 1;
     message.render.kind = PROTOCOL_JOB_VIEW;
     message.render.scene = 7;
     message.render.channel = 20;
@@ -488,8 +488,8 @@ static void start_job(struct client *client, uint32_t scene, uint32_t channel)
     message.render.last_frame = 19;
     message.render.frame_step = 3;
     message.render.credit = 0;
-    message.render.width = message.render.height = 16;
-    message.render.tracer = PROTOCOL_TRACER_NAIVE;
+    message.render.picture.width = message.render.picture.height = 16;
+    message.render.tracing.tracer = PROTOCOL_TRACER_NAIVE;
     send_message(client, 800 + scene, 0, &message);
 }
 

@@ -164,11 +164,11 @@ static struct message view_message(uint32_t credit)
     message.render.scene = 1;
     message.render.channel = CHANNEL;
     message.render.credit = credit;
-    message.render.width = message.render.height = 1;
-    message.render.samples = 16;
+    message.render.picture.width = message.render.picture.height = 1;
+    message.render.sampling.samples = 16;
     message.render.frames_per_second = 1; /* the link is never what holds frames back */
     message.render.encoding = PROTOCOL_ENCODING_JPEG;
-    message.render.still_encoding = PROTOCOL_ENCODING_ZSTD;
+    message.render.view.still_encoding = PROTOCOL_ENCODING_ZSTD;
     return message;
 }
 
@@ -266,10 +266,10 @@ static void take_frame(uint32_t request, uint32_t number)
 SESSION_TEST(a_frame_names_the_camera_that_it_shows)
 {
     struct engine_command *start = start_view(2, 8);
-    assert_int_equal(start->job.pass_samples, 1);
-    assert_int_equal(start->job.frame.samples, 16);
+    assert_int_equal(start->job.view.pass_samples, 1);
+    assert_int_equal(start->job.frame.sampling.samples, 16);
     assert_int_equal(start->job.encoding, ENCODING_JPEG);
-    assert_int_equal(start->job.still_encoding, ENCODING_ZSTD);
+    assert_int_equal(start->job.view.still_encoding, ENCODING_ZSTD);
     uint64_t before_ns = clock_now_ns();
     send_camera(7, true);
     told(ENGINE_VIEW_CHANGED);
@@ -521,7 +521,7 @@ static struct engine_command *start_view_in_parts(uint32_t credit)
 {
     open_scene(1, 1);
     struct message message = view_message(credit);
-    message.render.parts = 1;
+    message.render.view.parts = 1;
     send_message(2, 0, &message);
     return told(ENGINE_JOB_START);
 }
@@ -556,7 +556,7 @@ static size_t take_cut(uint32_t number)
 TEST_WITH(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come, set_up, tear_down)
 {
     struct engine_command *start = start_view_in_parts(1);
-    assert_true(start->job.parts);
+    assert_true(start->job.view.parts);
     say_parts(2, 0, 0, 10000);
     expect_parts(2, 0);
     send_camera(7, true);
@@ -651,14 +651,14 @@ static struct engine_command *start_view_on_a_slow_link(float margin, uint64_t w
 {
     open_scene(1, 1);
     struct message message = view_message(100);
-    message.render.adapt = 1;
-    message.render.still_encoding = PROTOCOL_ENCODING_RAW;
+    message.render.view.adapt = 1;
+    message.render.view.still_encoding = PROTOCOL_ENCODING_RAW;
     message.render.quality = 90;
     message.render.frames_per_second = 1000;
-    message.render.margin = margin;
+    message.render.view.margin = margin;
     send_message(2, 0, &message);
     struct engine_command *start = told(ENGINE_JOB_START);
-    assert_true(start->job.adapt);
+    assert_true(start->job.view.adapt);
     clock_stop();
     say_frame(2, 0, 1); /* moving */
     take_frame(2, 0);
@@ -694,12 +694,12 @@ SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
 {
     open_scene(1, 1);
     struct message message = view_message(100);
-    message.render.moving_rate = 20;
+    message.render.view.moving_rate = 20;
     message.render.quality = 90;
-    message.render.depth = 8;
+    message.render.light.depth = 8;
     send_message(2, 0, &message);
     struct engine_command *start = told(ENGINE_JOB_START);
-    assert_true(start->job.keeps_rate && !start->job.adapt);
+    assert_true(start->job.view.moving_rate > 0.0f && !start->job.view.adapt);
     struct engine_event *slow = frame_of(2, 0, 1, FRAME_BYTES);
     slow->frame->rendered_ns = slow->frame->applied_ns + UINT64_C(2000000000);
     slow->frame->encoded_ns = slow->frame->rendered_ns + 100;
@@ -732,11 +732,11 @@ SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
 static struct engine_command *replace_view(uint32_t request, uint32_t width)
 {
     struct message message = view_message(0);
-    message.render.width = width;
+    message.render.picture.width = width;
     send_message(request, 0, &message);
     struct engine_command *command = told(ENGINE_JOB_START);
     assert_int_equal(command->request, request);
-    assert_int_equal(command->job.frame.width, width);
+    assert_int_equal(command->job.frame.picture.width, width);
     return command;
 }
 
@@ -805,7 +805,7 @@ SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
     expect_error_within_frame(4, PROTOCOL_ERROR_OUT_OF_MEMORY, &bytes);
     message = view_message(1); /* room for its frames is there but for that one */
     message.render.channel = CHANNEL + 1;
-    message.render.width = message.render.height = LESS_THAN_ALL_EDGE;
+    message.render.picture.width = message.render.picture.height = LESS_THAN_ALL_EDGE;
     send_message(5, 0, &message);
     wait_until_read();
     expect_error_within_frame(5, PROTOCOL_ERROR_BUSY, &bytes);
@@ -829,7 +829,7 @@ SESSION_TEST(a_refused_view_leaves_the_running_one_unchanged)
 {
     start_view_with_credit();
     struct message message = view_message(0);
-    message.render.width = 4096; /* more than the limit: the session says so itself */
+    message.render.picture.width = 4096; /* more than the limit: the session says so itself */
     send_message(3, 0, &message);
     expect_error(3, PROTOCOL_ERROR_LIMIT);
     replace_view(4, 17);
@@ -859,7 +859,7 @@ SESSION_TEST(a_view_that_fails_leaves_its_channel_to_the_next)
         told(ENGINE_JOB_CREDIT);
     struct message message = made(MESSAGE_RENDER);
     message.render.scene = 1;
-    message.render.width = message.render.height = 1;
+    message.render.picture.width = message.render.picture.height = 1;
     message.render.channel = CHANNEL;
     send_message(4, 0, &message);
     expect_told_start(4, JOB_BATCH);
@@ -928,27 +928,30 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
         const char *field;
         enum protocol_error_code code;
     } rows[] = {
-        {PROTOCOL_JOB_VIEW, {.layers = 1u << PROTOCOL_LAYER_DEPTH}, "render.layers", PROTOCOL_ERROR_UNSUPPORTED},
+        {PROTOCOL_JOB_VIEW,
+         {.picture.layers = 1u << PROTOCOL_LAYER_DEPTH},
+         "render.layers",
+         PROTOCOL_ERROR_UNSUPPORTED},
         {PROTOCOL_JOB_VIEW, {.encoding = PROTOCOL_ENCODING_H264}, "render.encoding", PROTOCOL_ERROR_UNSUPPORTED},
         {PROTOCOL_JOB_VIEW,
-         {.still_encoding = PROTOCOL_ENCODING_H264},
+         {.view.still_encoding = PROTOCOL_ENCODING_H264},
          "render.still_encoding",
          PROTOCOL_ERROR_UNSUPPORTED},
         {PROTOCOL_JOB_VIEW,
-         {.hidden_layers = 1, .attachments = 2},
+         {.view.hidden_layers = 1, .view.attachments = 2},
          "render.hidden_layers",
          PROTOCOL_ERROR_INVALID},
         {PROTOCOL_JOB_VIEW,
-         {.hidden_layers = 1, .attachments = 1, .aperture = 0.1f},
+         {.view.hidden_layers = 1, .view.attachments = 1, .camera.aperture = 0.1f},
          "render.hidden_layers",
          PROTOCOL_ERROR_UNSUPPORTED},
         {PROTOCOL_JOB_VIEW,
-         {.hidden_layers = 1, .attachments = 1, .shutter = 0.5f},
+         {.view.hidden_layers = 1, .view.attachments = 1, .camera.shutter = 0.5f},
          "render.hidden_layers",
          PROTOCOL_ERROR_UNSUPPORTED},
-        {PROTOCOL_JOB_BATCH, {.attachments = 1}, "render.attachments", PROTOCOL_ERROR_UNSUPPORTED},
-        {PROTOCOL_JOB_BATCH, {.margin = 0.1f}, "render.margin", PROTOCOL_ERROR_UNSUPPORTED},
-        {PROTOCOL_JOB_BATCH, {.hidden_layers = 1}, "render.hidden_layers", PROTOCOL_ERROR_UNSUPPORTED},
+        {PROTOCOL_JOB_BATCH, {.view.attachments = 1}, "render.attachments", PROTOCOL_ERROR_UNSUPPORTED},
+        {PROTOCOL_JOB_BATCH, {.view.margin = 0.1f}, "render.margin", PROTOCOL_ERROR_UNSUPPORTED},
+        {PROTOCOL_JOB_BATCH, {.view.hidden_layers = 1}, "render.hidden_layers", PROTOCOL_ERROR_UNSUPPORTED},
     };
     uint32_t request = 2;
     open_scene(1, 1);
@@ -957,27 +960,28 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
         struct message_render *render = &message.render;
         const struct message_render *wrong = &rows[i].wrong;
         render->kind = rows[i].kind;
-        render->layers = wrong->layers ? wrong->layers : render->layers;
+        render->picture.layers = wrong->picture.layers ? wrong->picture.layers : render->picture.layers;
         render->encoding = wrong->encoding ? wrong->encoding : render->encoding;
-        render->still_encoding = wrong->still_encoding ? wrong->still_encoding : render->still_encoding;
-        render->attachments = wrong->attachments;
-        render->hidden_layers = wrong->hidden_layers;
-        render->aperture = wrong->aperture;
-        render->shutter = wrong->shutter;
-        render->margin = wrong->margin;
+        render->view.still_encoding =
+            wrong->view.still_encoding ? wrong->view.still_encoding : render->view.still_encoding;
+        render->view.attachments = wrong->view.attachments;
+        render->view.hidden_layers = wrong->view.hidden_layers;
+        render->camera.aperture = wrong->camera.aperture;
+        render->camera.shutter = wrong->camera.shutter;
+        render->view.margin = wrong->view.margin;
         expect_refused(request++, &message, rows[i].code, rows[i].field);
         assert_true(rows[i].code == PROTOCOL_ERROR_INVALID || client.message.error.remedy[0] != '\0');
     }
     /* Frames without loss while the view moves leave no quality to raise at rest, of 16 bits or 8. */
     struct message message = view_message(1);
     message.render.encoding = PROTOCOL_ENCODING_RAW;
-    message.render.still_encoding = PROTOCOL_ENCODING_JPEG;
+    message.render.view.still_encoding = PROTOCOL_ENCODING_JPEG;
     expect_refused(request++, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.still_encoding");
-    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    message.render.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
     expect_refused(request++, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.still_encoding");
     message = made(MESSAGE_RENDER); /* a batch has its channel to itself */
     message.render.scene = 1;
-    message.render.width = message.render.height = 1;
+    message.render.picture.width = message.render.picture.height = 1;
     message.render.channel = CHANNEL;
     send_message(request, 0, &message);
     expect_told_start(request++, JOB_BATCH);
@@ -996,18 +1000,18 @@ TEST_WITH(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungree
     assert_int_equal(both, HANDSHAKE_CAN_H264);
     open_scene(1, 1);
     message = view_message(1);
-    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    message.render.picture.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
     message.render.encoding = PROTOCOL_ENCODING_H264;
     expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.encoding");
     message = made(MESSAGE_RENDER);
     message.render.scene = 1;
-    message.render.width = message.render.height = 1;
+    message.render.picture.width = message.render.picture.height = 1;
     message.render.channel = CHANNEL;
     message.render.encoding = PROTOCOL_ENCODING_H264;
     expect_refused(3, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.encoding");
     assert_true(strlen(client.message.error.remedy) > 0);
     message = view_message(1);
-    message.render.encoding = message.render.still_encoding = PROTOCOL_ENCODING_H264;
+    message.render.encoding = message.render.view.still_encoding = PROTOCOL_ENCODING_H264;
     send_message(4, 0, &message);
     struct engine_command *command = told(ENGINE_JOB_START);
     assert_int_equal(command->job.encoding, ENCODING_H264);
@@ -1017,19 +1021,19 @@ SESSION_TEST(what_a_view_asks_to_be_attached_is_forwarded_and_announced)
 {
     open_scene(1, 1);
     struct message message = view_message(4);
-    message.render.attachments = 7;
-    message.render.depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
-    message.render.depth_pixels = 2;
-    message.render.depth_radius = 0.5f;
-    message.render.hidden_layers = 2;
-    message.render.margin = 0.25f;
+    message.render.view.attachments = 7;
+    message.render.view.depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
+    message.render.view.depth_pixels = 2;
+    message.render.view.depth_radius = 0.5f;
+    message.render.view.hidden_layers = 2;
+    message.render.view.margin = 0.25f;
     send_message(3, 0, &message);
     struct engine_command *command = told(ENGINE_JOB_START);
-    assert_int_equal(command->job.depth.form, DEPTH_FORM_INVERSE);
-    assert_true(command->job.depth.pixels == 2.0f && command->job.depth.radius == 0.5f);
+    assert_int_equal(command->job.view.depth_form, DEPTH_FORM_INVERSE);
+    assert_true(command->job.view.depth_pixels == 2.0f && command->job.view.depth_radius == 0.5f);
     assert_int_equal(command->job.frame.attachments,
                      1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS | 1u << ATTACHMENT_STICKING);
-    assert_true(command->job.hidden_layers == 2 && command->job.margin == 0.25f);
+    assert_true(command->job.view.hidden_layers == 2 && command->job.view.margin == 0.25f);
     say_frame_with(3, 1, 30, 20, 10);
     struct message_frame_begin begin;
     expect_frame(3, 1, &begin);
@@ -1046,12 +1050,12 @@ SESSION_TEST(a_margin_goes_with_several_views)
 {
     open_scene(1, 1);
     struct message message = view_message(4);
-    message.render.margin = 0.25f;
-    message.render.views_across = 2;
-    message.render.baseline = 1;
+    message.render.view.margin = 0.25f;
+    message.render.picture.views_across = 2;
+    message.render.picture.baseline = 1;
     send_message(4, 0, &message);
     struct engine_command *command = told(ENGINE_JOB_START);
-    assert_true(command->job.margin == 0.25f && command->job.frame.views_across == 2);
+    assert_true(command->job.view.margin == 0.25f && command->job.frame.picture.views_across == 2);
 }
 
 /* What frames of 512 x 512 may take: 7 of them, the limit is 10 MiB. */
@@ -1059,7 +1063,7 @@ SESSION_TEST(views_have_room_for_their_frames_or_are_refused)
 {
     open_scene(1, 1);
     struct message message = view_message(1);
-    message.render.width = message.render.height = 512;
+    message.render.picture.width = message.render.picture.height = 512;
     send_message(2, 0, &message);
     expect_told_start(2, JOB_VIEW);
     message.render.channel = CHANNEL + 1;

@@ -166,7 +166,7 @@ static void bind_noise(struct denoise_filter *filter, const struct render_frame 
     gpu_buffer_bind_storage(&filter->wider, BIND_DENOISE_OUT_TOO);
     gpu_uniform_uint(program, "one_sample", filter->picture->samples == 1);
     gpu_uniform_float(program, "doubt", mirror_doubt(filter->history, filter->picture->samples));
-    gpu_uniform_float(program, "white", exp2f(-frame->request.exposure_stops));
+    gpu_uniform_float(program, "white", exp2f(-frame->request.picture.exposure_stops));
 }
 
 /* The more samples, the less of what the halves of a picture differ by is noise: edges within pixels stay. With

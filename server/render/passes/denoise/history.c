@@ -16,14 +16,14 @@ static bool may_keep(const struct render_frame *frame)
 {
     const struct frame_request *request = &frame->request;
     return request->history != HISTORY_NONE && denoise_is_wanted(frame) && !frame_has_views(request) &&
-           request->aperture == 0.0f && request->noise == 0.0f && !frame->scene->has_motion;
+           request->aperture == 0.0f && request->sampling.noise == 0.0f && !frame->scene->has_motion;
 }
 
 /* Whether the scene is the same; while it moves, perhaps in another pose. */
 static bool is_followed(const struct denoise_kept *before, const struct denoise_kept *now)
 {
     struct frame_request same = before->request;
-    same.seed = now->request.seed;
+    same.sampling.seed = now->request.sampling.seed;
     const bool posed = before->revision == now->revision && now->request.history == HISTORY_MOVING &&
                        denoise_places_match(&before->places, &now->places);
     return before->whole && (before->showing == now->showing || posed) &&
@@ -84,7 +84,7 @@ bool denoise_history_reserve(struct denoise_history *history, const struct rende
     now->uniforms = frame->uniforms;
     history->is_written = history->is_written && fits;
     history->is_used = history->is_used && fits && (has_motion || !history->things_moved);
-    const size_t bytes = (size_t)request->width * request->height * sizeof(uvec4);
+    const size_t bytes = (size_t)request->picture.width * request->picture.height * sizeof(uvec4);
     return !history->is_written || gpu_buffer_reserve(frame->device->gpu, &now->pixels, bytes, error);
 }
 

@@ -16,9 +16,9 @@
 
 float denoise_strength(const struct frame_request *request, uint32_t samples)
 {
-    if (request->denoise != DENOISE_AUTO)
-        return request->denoise == DENOISE_ON ? 1.0f : 0.0f;
-    if (request->noise > 0.0f) /* the picture is rendered until its noise is below what was asked for */
+    if (request->picture.denoise != DENOISE_AUTO)
+        return request->picture.denoise == DENOISE_ON ? 1.0f : 0.0f;
+    if (request->sampling.noise > 0.0f) /* the picture is rendered until its noise is below what was asked for */
         return 0.0f;
     const float left = 2.0f - 2.0f * (float)samples / (float)AUTO_SAMPLES;
     return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
@@ -33,10 +33,10 @@ bool denoise_is_wanted(const struct render_frame *frame)
 {
     const struct frame_request *request = &frame->request;
     /* How many samples come to one that others will be added to is not known. */
-    const uint32_t samples = request->accumulate ? 1 : request->samples;
+    const uint32_t samples = request->sampling.accumulate ? 1 : request->sampling.samples;
     return denoise_strength(request, samples) > 0.0f && frame->integrator->random &&
            frame_request_planes(request) & 1u << LAYER_BEAUTY && !request->hidden_layer &&
-           request->view_source != VIEW_SOURCE_LAYERS;
+           request->picture.view_source != VIEW_SOURCE_LAYERS;
 }
 
 const struct gpu_program *denoise_use(const struct render_frame *frame, const struct denoise_sums *sums,
@@ -75,7 +75,7 @@ bool denoise_sums_begin(struct denoise_sums *sums, const struct render_frame *fr
     if (!sums->bands)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the sums of a denoised picture");
     sums->band_count = picture->band_count;
-    const bool is_clear = frame->features.clear && frame->request.depth > 0;
+    const bool is_clear = frame->features.clear && frame->request.light.depth > 0;
     sums->follows = samples_before > 0 ? before.follows : is_clear && !history->is_written;
     sums->has_motion = samples_before > 0 ? before.has_motion : sums->follows || history->things_moved;
     for (uint32_t band = 0; band < sums->band_count; band++) {

@@ -97,7 +97,7 @@ static bool shade(struct render_wave *wave, uint32_t first, uint32_t count, stru
     gpu_uniform_uint(program, "batch_rays", count);
     gpu_uniform_uint(program, "own_rays", wave->frame->integrator->shadow_rays_a_hit(wave->frame));
     gpu_uniform_float(program, "reach", context_ao_distance(wave->frame));
-    gpu_uniform_float(program, "falloff", wave->frame->request.ao_falloff);
+    gpu_uniform_float(program, "falloff", wave->frame->request.light.ao_falloff);
     environment_choice_bind(wave->frame->environment_choice, wave->device->gpu, program);
     notes_bind_light(wave->notes, program);
     compact_dispatch(wave, program, WAVE_HITS);
@@ -116,7 +116,7 @@ const struct shading_extra ground_shading = {
 static bool wants(const void *self, const struct render_wave *wave)
 {
     (void)self;
-    return wave->number == 0 && wave->frame->request.view_source != VIEW_SOURCE_LAYERS &&
+    return wave->number == 0 && wave->frame->request.picture.view_source != VIEW_SOURCE_LAYERS &&
            ground_is_shown(wave->frame);
 }
 

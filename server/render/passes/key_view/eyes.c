@@ -143,7 +143,7 @@ void key_eyes_announce(struct key_eyes *eyes, struct render_wave *wave)
 static bool wants(const void *self, const struct render_wave *wave)
 {
     (void)self;
-    return wave->number == 0 && wave->frame->request.view_source == VIEW_SOURCE_LAYERS;
+    return wave->number == 0 && wave->frame->request.picture.view_source == VIEW_SOURCE_LAYERS;
 }
 
 static enum pass_progress begin(struct key_eyes *eyes, struct render_wave *wave, struct error *error)

@@ -22,7 +22,8 @@ bool key_view_is_of(const struct key_view *key, const struct trace_view *view, c
                     uint64_t showing)
 {
     return key->is_made && key->showing == showing && memcmp(&key->view, view, sizeof(*view)) == 0 &&
-           key->request.samples == request->samples && frame_request_same_radiance(&key->request, request);
+           key->request.sampling.samples == request->sampling.samples &&
+           frame_request_same_radiance(&key->request, request);
 }
 
 bool key_view_reserve(struct key_view *key, struct gpu_device *device, const struct trace_view *texels,
@@ -48,25 +49,25 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 {
     const struct trace_view *texels = &key->texels;
     struct frame_request own = *request;
-    own.view_source = VIEW_SOURCE_RAYS;
-    own.views_across = own.views_down = 0;
-    own.baseline = 0.0f;
+    own.picture.view_source = VIEW_SOURCE_RAYS;
+    own.picture.views_across = own.picture.views_down = 0;
+    own.picture.baseline = 0.0f;
     own.has_key = false;
-    own.width = texels->width;
-    own.height = texels->height;
-    own.samples = (request->samples + PIXEL_SAMPLES - 1) / PIXEL_SAMPLES;
+    own.picture.width = texels->width;
+    own.picture.height = texels->height;
+    own.sampling.samples = (request->sampling.samples + PIXEL_SAMPLES - 1) / PIXEL_SAMPLES;
     own.camera.fov_y = texels->fov_y;
     own.camera.ortho_height = texels->ortho_height;
     own.camera.near = texels->near;
     memcpy(own.camera.world_from_view, texels->world_from_view, sizeof(own.camera.world_from_view));
-    own.primary = PRIMARY_TRACE;
+    own.tracing.primary = PRIMARY_TRACE;
     own.aperture = 0.0f;
-    own.format = PIXEL_FORMAT_RGBA32F;
+    own.picture.format = PIXEL_FORMAT_RGBA32F;
     own.ycbcr = YCBCR_NONE;
-    own.layers = 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH;
+    own.picture.layers = 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH;
     own.attachments = 0;
-    own.accumulate = false;
-    own.denoise = DENOISE_OFF;
+    own.sampling.accumulate = false;
+    own.picture.denoise = DENOISE_OFF;
     return own;
 }
 

@@ -40,7 +40,7 @@ void layers_begin(struct layers *layers, const struct render_frame *frame, bool 
     layers->notes.layers = frame_request_planes(request) & ~LAYER_BIT_BEAUTY;
     layers->notes.environment_group = frame->scene->scene->environment.value.light_group;
     layers->notes.covers_by_shading = layers->notes.layers & LAYER_BITS_CRYPTO && is_shaded &&
-                                      (frame->features.blend || request->integrator == INTEGRATOR_RAYCAST);
+                                      (frame->features.blend || request->light.integrator == INTEGRATOR_RAYCAST);
 }
 
 /* Planes of BIND_COVERS. */
@@ -231,7 +231,7 @@ static bool make_ao_rays(struct layers *layers, struct render_wave *wave, uint32
         gpu_uniform_uint(program, "batch_rays", count);
         gpu_uniform_uint(program, "all_rays", context_ao_rays(wave->frame));
         gpu_uniform_float(program, "reach", context_ao_distance(wave->frame));
-        gpu_uniform_float(program, "falloff", wave->frame->request.ao_falloff);
+        gpu_uniform_float(program, "falloff", wave->frame->request.light.ao_falloff);
         compact_dispatch(wave, program, WAVE_HITS);
     }
     context_span_end(wave->device);

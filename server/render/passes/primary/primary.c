@@ -30,7 +30,7 @@ static bool reserve_strip(struct primary *primary, const struct render_frame *fr
                           uint32_t samples, struct error *error)
 {
     struct gpu_device *device = frame->device->gpu;
-    uint32_t width = frame->request.width;
+    uint32_t width = frame->request.picture.width;
     if (has_room(primary, width, rows, samples))
         return true;
     finish_framebuffers(primary, device);
@@ -103,7 +103,8 @@ bool primary_rasterise(struct primary *primary, const struct render_frame *frame
     gpu_push_group(frame->device->gpu, "rasterise primary");
     context_bind_frame(frame);
     /* The viewport is the whole picture, of which the framebuffer has a strip. */
-    glViewport(0, -(GLint)primary->first_row, (GLsizei)primary->visible.width, (GLsizei)frame->request.height);
+    glViewport(0, -(GLint)primary->first_row, (GLsizei)primary->visible.width,
+               (GLsizei)frame->request.picture.height);
     glDepthMask(GL_TRUE); /* clearing heeds both */
     glDisable(GL_SCISSOR_TEST);
     bool whole = false, drawn = draw_part(primary, frame, &whole, error);
@@ -262,7 +263,8 @@ bool primary_find_eyes(struct render_wave *wave, struct error *error)
         .first_slot = wave->slice.first_slot,
         .slot_count = wave->slice.slot_count,
         .spread = wave->frame->spread,
-        .reach = wave->frame->spread ? (float)pixel_filter_radius(wave->frame->request.filter) : 0.0f,
+        .reach =
+            wave->frame->spread ? (float)pixel_filter_radius(wave->frame->request.sampling.pixel_filter) : 0.0f,
         .hits = &wave->hits,
     };
     context_span_begin(wave->device, STAGE_PRIMARY);
@@ -326,7 +328,7 @@ void primary_announce(struct render_wave *wave, bool rasterised)
 static bool wants(const void *self, const struct render_wave *wave)
 {
     (void)self;
-    return wave->number == 0 && wave->frame->request.view_source != VIEW_SOURCE_LAYERS;
+    return wave->number == 0 && wave->frame->request.picture.view_source != VIEW_SOURCE_LAYERS;
 }
 
 static bool reserve(void *self, struct render_wave *wave, uint32_t slice_samples, struct error *error)

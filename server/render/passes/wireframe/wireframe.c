@@ -10,8 +10,8 @@
 static bool wants(const void *self, const struct render_wave *wave)
 {
     (void)self;
-    return wave->number == 0 && wave->frame->request.wireframe > 0.0f &&
-           wave->frame->request.view_source != VIEW_SOURCE_LAYERS;
+    return wave->number == 0 && wave->frame->request.picture.wireframe > 0.0f &&
+           wave->frame->request.picture.view_source != VIEW_SOURCE_LAYERS;
 }
 
 static enum pass_progress run(void *self, struct render_wave *wave, struct error *error)
@@ -24,7 +24,7 @@ static enum pass_progress run(void *self, struct render_wave *wave, struct error
         context_bind_hits(wave);
         gpu_buffer_bind_storage(&wave->hits, BIND_HITS);
         gpu_uniform_uint(program, "ray_count", wave->ray_count);
-        gpu_uniform_float(program, "half_width", wave->frame->request.wireframe / 2.0f);
+        gpu_uniform_float(program, "half_width", wave->frame->request.picture.wireframe / 2.0f);
         gpu_dispatch(wave->device->gpu, program, wave->ray_count);
     }
     context_span_end(wave->device);

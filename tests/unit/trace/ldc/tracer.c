@@ -26,7 +26,7 @@ static void expect_built(const struct fixture *fixture, bool static_cube, bool d
     const bool expected[LDC_CUBES_MAX] = {static_cube, dynamic_cube};
     bool timed[LDC_CUBES_MAX][2] = {{false}}; /* by the CPU's clock and by the GPU's */
     for (uint32_t i = 0; i < fixture->times.count; i++) {
-        const struct stage_span *span = &fixture->times.spans[i];
+        const struct record_stage_time *span = &fixture->times.spans[i];
         assert_int_equal(span->stage, STAGE_BUILD);
         assert_in_range(span->wave, 0, LDC_CUBES_MAX - 1);
         timed[span->wave][span->clock] |= span->duration_ns > 0;
