@@ -155,6 +155,24 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
     progress_tell();
 }
 
+/* A copy in memory of the host; 0: there is no memory for it. A driver may move a buffer that is read directly
+ * into the host's memory, and every later pass then reads it from there (NVIDIA's says "is being copied/moved from
+ * VIDEO memory to HOST memory"). */
+static unsigned copy_for_host(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes,
+                              size_t size_bytes)
+{
+    const unsigned copy = gpu_object_create(device->registry, GPU_BUFFER);
+    if (!copy)
+        return 0;
+    glNamedBufferStorage(copy, (GLsizeiptr)size_bytes, NULL, GL_CLIENT_STORAGE_BIT | GL_MAP_READ_BIT);
+    if (glGetError() != GL_NO_ERROR) {
+        gpu_object_destroy(device->registry, GPU_BUFFER, copy);
+        return 0;
+    }
+    glCopyNamedBufferSubData(buffer->name, copy, (GLintptr)offset_bytes, 0, (GLsizeiptr)size_bytes);
+    return copy;
+}
+
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
                      size_t size_bytes)
 {
@@ -162,7 +180,11 @@ void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer,
         return;
     device->waits++;
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
-    glGetNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
+    const unsigned copy =
+        device->facts.shares_memory ? 0 : copy_for_host(device, buffer, offset_bytes, size_bytes);
+    glGetNamedBufferSubData(copy ? copy : buffer->name, copy ? 0 : (GLintptr)offset_bytes, (GLsizeiptr)size_bytes,
+                            data);
+    gpu_object_destroy(device->registry, GPU_BUFFER, copy);
 }
 
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value)
