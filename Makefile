@@ -341,6 +341,7 @@ help:
 	@echo 'make test-zink  what depends on the driver, on another OpenGL stack   [TESTS=part-of-a-name]'
 	@echo 'make check-sync frames under Vulkan synchronisation validation, to find missing memory barriers'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
+	@echo 'make bench-gpu  measure a GPU in one run; without one, rehearse it   [out/bench-gpu runs on another machine, too]'
 	@echo 'make fidelity   compare pictures with those of known renderers, into out/fidelity   [SAMPLES=256 SMALL=1 ONLY=scene,scene]'
 	@echo 'make equal-time measure noise over time beside Cycles, into out/equal-time   [ONLY=scene,scene OPTIONS="--denoise"]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'

@@ -74,7 +74,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
 
 # ---- what people call ------------------------------------------------------------------------------
-.PHONY: tests tests-all test test-part test-all test-zink check-sync bench fidelity equal-time soak farm-drill breaks farm-test web-test
+.PHONY: tests tests-all test test-part test-all test-zink check-sync bench bench-gpu fidelity equal-time soak farm-drill breaks farm-test web-test
 .PHONY: blender-test siege bench-plot check-headers check-rules lint check analyze coverage format
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 # With the benchmark, whose own tests need it.
@@ -107,6 +107,11 @@ BENCHED = all $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)
+# What a GPU does, in a run of ten minutes; out/bench-gpu can be copied to a machine that has one (tests/bench/bench_gpu.py).
+bench-gpu: test-packages
+	$(MAKE) -j$(JOBS) $(BENCHED)
+	python3 tests/bench/bench_gpu.py pack $(B) out/bench-gpu
+	python3 out/bench-gpu/bench_gpu.py run --out out/bench-gpu
 # Pictures beside those of known renderers, and noise over time beside Cycles, of models below FARLIGHT_SCENES.
 SAMPLES ?= 256
 fidelity: fidelity-packages

@@ -23,7 +23,7 @@ struct bench_contender {
     enum bench_way way;
     bool is_exact; /* its disagreement is a fault, not a property */
     /* of the last wave */
-    struct bench_runs runs;
+    struct bench_runs runs, device_runs; /* by the host's clock, and by the device's where it has one */
     bool is_compared;
     uint32_t differing; /* rays whose answer is not the truth's */
     uint32_t edges;     /* of them: the truth gives that answer to a ray a hair's breadth away */
@@ -47,7 +47,8 @@ struct bench_wave {
 /* The one that is added, zeroed but for the arguments; the array has room for BENCH_CONTENDERS_MAX. */
 struct bench_contender *bench_contest_add(struct bench_contest *contest, struct tracer *tracer,
                                           enum bench_way way);
-/* A warm-up, then the runs; fills what the contenders know of the last wave. */
+/* A warm-up, which keeps hardware at work until its clock has risen, then the runs; fills what the contenders know
+ * of the last wave. */
 bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *wave, struct error *error);
 /* One untimed run through the interface: the hits, for what is made of them. */
 bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,

@@ -143,6 +143,11 @@ static json_t *contender_json(const struct bench_contender *contender, uint32_t 
     json_t *made = json_pack("{s:s, s:s, s:o, s:f}", "tracer", contender->tracer->impl->name, "way",
                              ways[contender->way], "time", figure_json(&contender->runs), "rays_per_s",
                              median_ns > 0 ? 1e9 * (double)ray_count / median_ns : 0.0);
+    const double device_ns = bench_figure(&contender->device_runs).median_ns;
+    if (device_ns > 0) {
+        json_object_set_new(made, "device_time", figure_json(&contender->device_runs));
+        json_object_set_new(made, "device_rays_per_s", json_real(1e9 * (double)ray_count / device_ns));
+    }
     if (contender->is_compared)
         json_object_set_new(made, "agreement",
                             json_pack("{s:I, s:I, s:b}", "differing", (json_int_t)contender->differing, "edges",

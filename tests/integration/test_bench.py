@@ -52,6 +52,22 @@ def children(process):
     return found
 
 
+class OnAGpu(unittest.TestCase):
+    @long_test
+    def test_what_is_packed_runs_and_keeps_all_that_was_printed(self):
+        folder = tempfile.mkdtemp(prefix="farlight-bench-gpu-")
+        self.addCleanup(shutil.rmtree, folder)
+        subprocess.run([sys.executable, BENCH / "bench_gpu.py", "pack", BIN, folder + "/packed"], env=ENVIRONMENT, check=True)
+        subprocess.run([sys.executable, folder + "/packed/bench_gpu.py", "run", "--software", "--out", folder + "/measured"],
+                       env=ENVIRONMENT, timeout=TIMEOUT_S, check=True)
+        table = pathlib.Path(folder, "measured.txt").read_text()
+        self.assertNotIn("failed", table.replace("failed checks", ""))
+        for row in "bvh-links", "bvh-eight alone", "ldc", "abuffer", "quadtree", "rayspace", "whitted, 16", "path, 1":
+            self.assertRegex(table, rf"(?m)^{row} +[\d.]+ ")
+        self.assertLess(len(table.splitlines()), 60)
+        self.assertGreater(pathlib.Path(folder, "measured.tar.gz").stat().st_size, 1000)
+
+
 class Figures(unittest.TestCase):
     def test_a_power_law_is_found_with_its_error_and_two_points_have_no_fit(self):
         slope, error = bench_common.fit_exponent([(n, 3 * n ** 0.25) for n in (1000, 2000, 4000, 8000)])
