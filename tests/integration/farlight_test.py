@@ -172,6 +172,51 @@ class Daemon:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
+class Paced:
+    """`farlight animate` that gets a few frames ahead of its reader at most, so that a test can disturb it between two frames
+    on any machine.
+
+    The client says each file that is complete in a line that begins with `frame N:` and ends with its path. The path is
+    longer than half a page and the pipe has one page: while nobody reads, it holds one line and a part of the next. After
+    until("frame N:") the client stands at the line of frame N + 2 at the latest, and has been given frame N + 3; the daemon
+    may send as many frames more as a job has credit for (protocol/messages.def). AHEAD counts them."""
+
+    AHEAD = 5
+    PAGE = os.sysconf("SC_PAGESIZE")
+
+    def __init__(self, folder, name, *arguments, **options):
+        """Makes folders below `folder`; `name` is the output's there, for example %d.png."""
+        self.folder = pathlib.Path(folder)
+        while len(str(self.folder)) <= self.PAGE // 2:
+            self.folder /= "x" * 200
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.errors = ""
+        self.process = subprocess.Popen([BIN / "farlight", "animate", *map(str, arguments), "-o", self.folder / name],
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, bufsize=0, pipesize=self.PAGE, **options)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.stderr.close()
+        self.process.wait()
+
+    def until(self, words):
+        """Reads up to a line with these words."""
+        while line := self.process.stderr.readline().decode():
+            self.errors += line
+            if words in line:
+                return
+        raise AssertionError(f"it ended with {self.process.wait()} without '{words}': {self.errors}")
+
+    def finish(self):
+        """Reads to the end: the exit status, and all that it said."""
+        self.errors += self.process.stderr.read().decode()
+        return self.process.wait(TIMEOUT_S), self.errors
+
+
 def read_png(path):
     """(width, height, rows of bytes, channels) of an 8-bit PNG without interlacing."""
     data = pathlib.Path(path).read_bytes()

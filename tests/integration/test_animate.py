@@ -20,7 +20,7 @@ import threading
 import time
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, long_test
+from farlight_test import BIN, Case, Daemon, OneDaemon, Paced, bundled_scenes, farlight, long_test
 
 SIZE = ["--size", "48x32"]
 
@@ -205,7 +205,7 @@ class Parts(OneDaemon, Animations):
 class Lost(Animations):
     """The daemon goes away in the middle."""
 
-    FRAMES = ["--frames", "1-24", "--samples", "16"]  # with few samples all are there before a busy machine lets the test act
+    FRAMES = ["--frames", "1-24"]
     reference = {}  # digests of the frames, made once
 
     def whole(self):
@@ -213,67 +213,51 @@ class Lost(Animations):
             self.reference.update(self.animate("whole", self.model, *self.FRAMES)[0])
         return self.reference
 
-    def start(self, folder, *arguments):
-        path = self.folder / folder
-        path.mkdir()
-        child = subprocess.Popen([BIN / "farlight", "animate", self.model, *self.FRAMES, *SIZE, "-o", path / "%04d.exr",
-                                  *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(child.stdout.close)
-        self.addCleanup(child.stderr.close)
-        return child
+    def start(self, folder, *arguments, name="%04d.exr"):
+        return self.enterContext(Paced(self.folder / folder, name, self.model, *self.FRAMES, *SIZE, *arguments))
 
-    def wait_for_files(self, folder, count, child):
-        deadline = time.monotonic() + farlight_test.TIMEOUT_S
-        while len(list((self.folder / folder).glob("*.exr"))) < count:
-            self.assertIsNone(child.poll(), "it ended before it could be disturbed")
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.005)
-
-    def finish(self, child, status):
-        out, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
-        self.assertEqual(child.returncode, status, out + errors)
-        return errors
+    def finish(self, client, status):
+        self.assertEqual(client.finish(), (status, client.errors))
+        return client.errors
 
     def test_a_killed_private_daemon_is_started_again_and_nothing_is_lost(self):
-        child = self.start("killed")
-        for count in (3, 9):
-            self.wait_for_files("killed", count, child)
-            os.kill(children(child.pid, "farlightd")[0], signal.SIGKILL)
-            while children(child.pid, "farlightd") == []:  # until there is another one
-                self.assertIsNone(child.poll())
-                time.sleep(0.005)
-        errors = self.finish(child, 0)
-        self.assertEqual(self.digests("killed"), self.whole())
+        client = self.start("killed")
+        for frame in (3, 9):
+            client.until(f"frame {frame}:")
+            daemon, = children(client.process.pid, "farlightd")
+            os.kill(daemon, signal.SIGKILL)
+            client.until("trying again")
+        errors = self.finish(client, 0)
+        self.assertEqual(self.digests(client.folder), self.whole())
         self.assertEqual(errors.count("trying again"), 2, errors)
-        self.assertEqual([p.name for p in (self.folder / "killed").iterdir() if p.suffix != ".exr"], [])
+        self.assertEqual([p.name for p in client.folder.iterdir() if p.suffix != ".exr"], [])
 
     def test_a_daemon_that_is_killed_or_shuts_down_is_sought_again_until_it_is_back(self):
         for how in (signal.SIGKILL, signal.SIGTERM):
             with self.subTest(how=how), Daemon() as daemon:
-                folder = how.name
-                child = self.start(folder, "--server", daemon.address)
-                self.wait_for_files(folder, 4, child)
+                client = self.start(how.name, "--server", daemon.address)
+                client.until("frame 4:")
                 daemon.stop(how)
-                if how == signal.SIGKILL:
+                with contextlib.suppress(FileNotFoundError):
                     os.unlink(daemon.path)
-                    time.sleep(0.7)  # so that the first attempt finds nobody
+                for _ in range(2):  # the first attempt finds nobody
+                    client.until("trying again")
                 with Daemon(listen=daemon.address):
-                    errors = self.finish(child, 0)
-                self.assertEqual(self.digests(folder), self.whole())
-                self.assertIn("trying again", errors)
+                    self.finish(client, 0)
+                self.assertEqual(self.digests(client.folder), self.whole())
 
     def test_a_daemon_that_falls_silent_is_given_up_after_both_times(self):
         with Daemon() as daemon:
-            child = self.start("silent", "--server", daemon.address, "--lost-after", "3", "--retry-for", "1")
-            self.wait_for_files("silent", 2, child)
+            client = self.start("silent", "--server", daemon.address, "--lost-after", "3", "--retry-for", "1")
+            client.until("frame 2:")
             daemon.signal_all(signal.SIGSTOP)
             try:
-                errors = self.finish(child, 75)
+                errors = self.finish(client, 75)
             finally:
                 daemon.signal_all(signal.SIGCONT)
             self.assertIn("counts as lost: it answered nothing, no ping either, for 3 s", errors)
             self.assertIn("given up after", errors)
-            made = self.digests("silent")
+            made = self.digests(client.folder)
             self.assertEqual(made, {frame: self.whole()[frame] for frame in made})
 
     def test_a_time_that_is_too_short_for_pings_is_refused(self):
@@ -283,48 +267,48 @@ class Lost(Animations):
 
     def test_a_daemon_that_was_silent_goes_on_in_time_or_is_found_again(self):
         """Within one connection, after a ping that waited; and within a second one."""
-        for name, lost_after, is_lost in (("time", "12", False), ("again", "3", True)):
-            with self.subTest(lost_after=lost_after), Daemon() as daemon:
-                child = self.start(name, "--server", daemon.address, "--lost-after", lost_after, "--retry-for", "10m")
-                self.wait_for_files(name, 2, child)
+        often = {**os.environ, "FARLIGHT_NETWORK_IDLE": "3000"}  # a client pings thrice in this time, however late it calls one lost
+        for name, lost_after, is_lost in (("time", "10m", False), ("again", "3", True)):
+            with self.subTest(lost_after=lost_after), Daemon(environment=often) as daemon:
+                client = self.start(name, "--server", daemon.address, "--lost-after", lost_after, "--retry-for", "10m")
+                client.until("frame 2:")
                 daemon.signal_all(signal.SIGSTOP)
                 try:
                     if is_lost:
-                        while "trying again" not in child.stderr.readline():
-                            self.assertIsNone(child.poll())
+                        client.until("trying again")
                     else:
-                        time.sleep(5)
+                        time.sleep(2)
                 finally:
                     daemon.signal_all(signal.SIGCONT)
-                errors = self.finish(child, 0)
-                self.assertEqual(self.digests(name), self.whole())
+                errors = self.finish(client, 0)
+                self.assertEqual(self.digests(client.folder), self.whole())
                 if not is_lost:
                     self.assertNotIn("trying again", errors)
 
     def test_a_private_daemon_that_falls_silent_is_started_again(self):
-        child = self.start("hangs", "--lost-after", "3")
-        self.wait_for_files("hangs", 2, child)
-        os.kill(children(child.pid, "farlightd")[0], signal.SIGSTOP)
-        errors = self.finish(child, 0)
+        client = self.start("hangs", "--lost-after", "3")
+        client.until("frame 2:")
+        os.kill(children(client.process.pid, "farlightd")[0], signal.SIGSTOP)
+        errors = self.finish(client, 0)
         self.assertIn("counts as lost", errors)
-        self.assertEqual(self.digests("hangs"), self.whole())
+        self.assertEqual(self.digests(client.folder), self.whole())
 
     def test_attempts_end_after_the_number_or_the_time_that_was_given(self):
         """With complete files only."""
         for name, options, tries in (("none", ["--retry-for", "0"], 0), ("two", ["--retries", "2"], 2), ("time", ["--retry-for", "1.5s"], None)):
             with self.subTest(options=options), Daemon() as daemon:
-                child = self.start(name, "--server", daemon.address, *options)
-                self.wait_for_files(name, 2, child)
-                daemon.stop(signal.SIGKILL)
+                client = self.start(name, "--server", daemon.address, *options)
+                client.until("frame 2:")
                 begin = time.monotonic()
-                errors = self.finish(child, 75)
+                daemon.stop(signal.SIGKILL)
+                errors = self.finish(client, 75)
                 if tries is None:
-                    self.assertGreater(time.monotonic() - begin, 1.4)
+                    self.assertGreater(time.monotonic() - begin, 1.5)
                     self.assertIn("given up after", errors)
                 else:
                     self.assertEqual(errors.count("trying again"), tries, errors)
-                made = self.digests(name)
-                self.assertLess(len(made), 24)
+                made = self.digests(client.folder)
+                self.assertLessEqual(len(made), 2 + Paced.AHEAD)
                 self.assertEqual(made, {frame: self.whole()[frame] for frame in made})
 
     def test_a_daemon_that_never_was_is_not_waited_for(self):
@@ -344,14 +328,11 @@ class Lost(Animations):
             self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
 
     def test_a_private_daemon_that_is_killed_while_the_scene_is_loading_is_started_again(self):
-        child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-2", *SIZE, "-o", self.folder / "%d.exr"],
-                                 stderr=subprocess.PIPE, text=True)
-        self.addCleanup(child.stderr.close)
-        while not (daemons := children(child.pid, "farlightd")):
-            self.assertIsNone(child.poll())
+        client = self.start("loading")
+        while not (daemons := children(client.process.pid, "farlightd")):
+            self.assertIsNone(client.process.poll())
         os.kill(daemons[0], signal.SIGKILL)
-        errors = child.stderr.read()
-        self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
+        errors = self.finish(client, 0)
         self.assertEqual(errors.count("trying again"), 1, errors)
 
     @long_test
@@ -379,33 +360,25 @@ class Lost(Animations):
 
     def test_an_interrupt_while_waiting_ends_it(self):
         with Daemon() as daemon:
-            child = self.start("interrupted", "--server", daemon.address, "--retries", "100")
-            self.wait_for_files("interrupted", 2, child)
+            client = self.start("interrupted", "--server", daemon.address, "--retries", "100")
+            client.until("frame 2:")
             daemon.stop(signal.SIGKILL)
-            for line in child.stderr:
-                if "trying again" in line:
-                    break
-            child.send_signal(signal.SIGINT)
-            self.finish(child, 130)
-        for path in (self.folder / "interrupted").iterdir():
+            client.until("trying again")
+            client.process.send_signal(signal.SIGINT)
+            self.finish(client, 130)
+        for path in client.folder.iterdir():
             self.assertEqual(path.suffix, ".exr", "an unfinished file was left")
             digest(path)
 
     def test_a_video_continues_after_a_killed_daemon(self):
-        path = self.folder / "movie.mkv"
-        command = [BIN / "farlight", "animate", self.model, *self.FRAMES, *SIZE, "--lossless", "-o"]
-        subprocess.run([*command, self.folder / "whole.mkv"], check=True, stderr=subprocess.DEVNULL,
-                       timeout=farlight_test.TIMEOUT_S)
-        child = subprocess.Popen([*command, path], stderr=subprocess.PIPE, text=True)
-        for line in child.stderr:
-            if line.startswith("1 of 24"):
-                break
-        os.kill(children(child.pid, "farlightd")[0], signal.SIGKILL)
-        _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
-        self.assertEqual(child.returncode, 0, errors)
-        self.assertIn("trying again", errors)
+        whole = self.folder / "whole.mkv"
+        self.expect(farlight("animate", self.model, *self.FRAMES, *SIZE, "--lossless", "-o", whole), 0)
+        client = self.start("movie", "--lossless", name="movie.mkv")
+        client.until("frame 1:")
+        os.kill(children(client.process.pid, "farlightd")[0], signal.SIGKILL)
+        self.assertIn("trying again", self.finish(client, 0))
         hashes = [subprocess.run(["ffmpeg", "-v", "error", "-i", file, "-f", "framemd5", "-"], check=True,
-                                 stdout=subprocess.PIPE).stdout for file in (self.folder / "whole.mkv", path)]
+                                 stdout=subprocess.PIPE).stdout for file in (whole, client.folder / "movie.mkv")]
         self.assertEqual(hashes[0].count(b"\n0,"), 24)
         self.assertEqual(hashes[0], hashes[1])
 
@@ -472,14 +445,10 @@ class Videos(OneDaemon, Animations):
     def test_an_interrupted_video_leaves_nothing(self):
         for name in ("movie.mp4", "movie.gif"):
             with self.subTest(name=name):
-                child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-500", *SIZE, "--fps", "25",
-                                          "-o", self.folder / name], stderr=subprocess.PIPE, text=True)
-                for line in child.stderr:
-                    if line.startswith("1 of 500"):
-                        break
-                child.send_signal(signal.SIGINT)
-                _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
-                self.assertEqual(child.returncode, 130, errors)
+                with Paced(self.folder, name, self.model, "--frames", "1-24", *SIZE, "--fps", "25") as client:
+                    client.until("frame 1:")
+                    client.process.send_signal(signal.SIGINT)
+                    self.assertEqual(client.finish(), (130, client.errors))
                 self.assertEqual(self.leftovers(), [])
 
 

@@ -20,7 +20,7 @@ import time
 import zlib
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, read_png
+from farlight_test import BIN, Case, Daemon, OneDaemon, Paced, bundled_scenes, farlight, read_png
 
 SMALL = ["--size", "48x36", "--integrator", "whitted", "--samples", "1"]
 
@@ -297,33 +297,23 @@ class BadInput(Case):
                 self.assertNotIn("trying again", result.stderr)
 
     def test_an_interrupt_ends_an_animation_cleanly(self):
-        pattern = self.folder / "%04d.png"
-        child = subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--frames", "1-500",
-                                  "--orbit", "--size", "320x240", "-o", pattern], stdout=subprocess.PIPE,
-                                 stderr=subprocess.PIPE, text=True)
-        deadline = time.monotonic() + farlight_test.TIMEOUT_S
-        while not any(self.folder.iterdir()) and time.monotonic() < deadline and child.poll() is None:
-            time.sleep(0.05)
-        child.send_signal(signal.SIGINT)
-        _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
-        self.assertEqual(child.returncode, 130, errors)
+        with Paced(self.folder, "%04d.png", bundled_scenes() / "teapot.glb", "--frames", "1-24", "--size", "320x240") as client:
+            client.until("frame 1:")
+            client.process.send_signal(signal.SIGINT)
+            self.assertEqual(client.finish(), (130, client.errors))
+        self.assertIn(str(client.folder / "0001.png"), map(str, client.folder.iterdir()))
         for name in self.leftovers():
             read_png(self.folder / name)  # complete, or it would not be here
 
     def test_a_hang_up_that_is_ignored_ends_nothing(self):
         """As nohup starts a program."""
-        pattern = self.folder / "%04d.png"
-        with subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--frames", "1-8", "--orbit",
-                               "--size", "96x72", "-o", pattern], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                              preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as child:
-            deadline = time.monotonic() + farlight_test.TIMEOUT_S
-            while not any(self.folder.iterdir()) and time.monotonic() < deadline and child.poll() is None:
-                time.sleep(0.02)
-            self.assertIsNone(child.poll(), "it has ended before the signal came")
-            for process in (child.pid, *(pathlib.Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split())):
+        with Paced(self.folder, "%04d.png", bundled_scenes() / "teapot.glb", "--frames", "1-8", "--size", "96x72",
+                   preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as client:
+            client.until("frame 1:")
+            pid = client.process.pid
+            for process in (pid, *pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text().split()):
                 os.kill(int(process), signal.SIGHUP)
-            _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
-        self.assertEqual(child.returncode, 0, errors)
+            self.assertEqual(client.finish(), (0, client.errors))
         self.assertEqual(len(self.leftovers()), 8)
 
     def test_programs_go_on_without_standard_descriptors(self):

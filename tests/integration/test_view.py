@@ -435,7 +435,7 @@ class Relay:
 class OnADaemon(Viewer):
     def test_a_daemon_that_comes_back_shows_the_scene_again(self):
         size = (240, 136)  # of which a word in the middle leaves the top as it is
-        events = [rest(), *drag(120, 68, 40, 10), rest(), {"state": "before"}, *HIDE, {"screenshot": "before.png"},
+        events = [rest(), *drag(120, 68, 40, 10), rest(2), {"state": "before"}, *HIDE, {"screenshot": "before.png"},
                   {"wait": "lost"}, {"state": "lost"}, {"screenshot": "lost.png"}, {"wait": "live"}, rest(2),
                   {"state": "after"}, {"screenshot": "after.png"}]
         with Daemon() as first:

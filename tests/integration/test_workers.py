@@ -10,7 +10,7 @@ import subprocess
 import time
 
 import tiny_client
-from farlight_test import BIN, Case, Daemon, bundled_scenes, farlight, long_test
+from farlight_test import Case, Daemon, Paced, bundled_scenes, farlight, long_test
 from test_serve import SCENE_ATTACH, is_gone, wait_until
 
 LOOK = (0, 1, 5), (0, 0, 0), (0, 1, 0), 0.8
@@ -66,16 +66,15 @@ class Workers(Case):
             other = self.client(daemon.tcp)
             before = self.renders(other)
             of_other = set(daemon.workers())
-            child = subprocess.Popen([BIN / "farlight", "animate", model, *frames, "-o", self.folder / "%d.png", "--server", daemon.address],
-                                     stderr=subprocess.PIPE, text=True)
-            wait_until((self.folder / "2.png").exists, "no frame comes")
-            killed, = set(daemon.workers()) - of_other
-            os.kill(killed, signal.SIGKILL)
-            self.assertEqual(child.wait(300), 0, child.stderr.read())
-            child.stderr.close()
+            with Paced(self.folder, "%d.png", model, *frames, "--server", daemon.address) as client:
+                client.until("frame 2:")
+                killed, = set(daemon.workers()) - of_other
+                os.kill(killed, signal.SIGKILL)
+                self.assertEqual(client.finish(), (0, client.errors))
+            self.assertIn("trying again", client.errors)
             self.assertEqual(self.renders(other, 3), before)
         for number in range(1, 13):
-            self.assertEqual((self.folder / f"{number}.png").read_bytes(), (self.folder / f"whole-{number}.png").read_bytes())
+            self.assertEqual((client.folder / f"{number}.png").read_bytes(), (self.folder / f"whole-{number}.png").read_bytes())
 
     def test_a_scene_of_another_user_is_attached_to_by_the_first_request(self):
         with self.daemon() as daemon:
