@@ -199,8 +199,9 @@ bool loop_turn(struct loop *loop, struct error *error)
 {
     struct epoll_event events[EVENTS_A_TURN];
     int count = sys.epoll_wait(loop->epoll_fd, events, EVENTS_A_TURN, timeout_ms(loop));
-    if (count < 0 && errno != EINTR)
-        return error_set(error, ERROR_INTERNAL, "loop", "epoll_wait: %s", strerror(errno));
+    /* A process that was stopped continues here: messages that came meanwhile are read before timers are due. */
+    if (count < 0)
+        return errno == EINTR || error_set(error, ERROR_INTERNAL, "loop", "epoll_wait: %s", strerror(errno));
     for (int i = 0; i < count; i++) {
         struct loop_watch *watch = events[i].data.ptr;
         if (!watch->removed)

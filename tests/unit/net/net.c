@@ -387,6 +387,41 @@ TEST(a_watch_that_was_removed_is_not_called_even_in_the_same_turn)
     loop_destroy(scene.loop);
 }
 
+static int interrupted_wait(int fd, struct epoll_event *events, int count, int timeout_ms)
+{
+    (void)fd, (void)events, (void)count, (void)timeout_ms;
+    sys.epoll_wait = epoll_wait;
+    errno = EINTR;
+    return -1;
+}
+
+static void on_message(void *context, uint32_t events)
+{
+    (void)events;
+    struct scene_of_loop *scene = context;
+    note(scene, 'm');
+    loop_watch_remove(scene->watches[0]);
+}
+
+TEST(messages_that_came_while_the_process_was_stopped_are_read_before_timers_are_due)
+{
+    struct error error = {0};
+    struct scene_of_loop scene = {.loop = loop_create(&error)};
+    int ends[2];
+    scene.late = (struct loop_timer){.call = on_late, .context = &scene};
+    assert_int_equal(pipe(ends), 0);
+    assert_int_equal(write(ends[1], "x", 1), 1);
+    scene.watches[0] = loop_watch_add(scene.loop, ends[0], EPOLLIN, on_message, &scene, &error);
+    assert_non_null(scene.watches[0]);
+    loop_timer_start(scene.loop, &scene.late, 0);
+    sys.epoll_wait = interrupted_wait;
+    assert_true(loop_run(scene.loop, &error));
+    assert_string_equal(scene.order, "ml");
+    close(ends[0]);
+    close(ends[1]);
+    loop_destroy(scene.loop);
+}
+
 /* ---- limits of time ---------------------------------------------------------------------------------- */
 
 static void on_turn_end(void *context)
