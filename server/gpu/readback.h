@@ -10,7 +10,8 @@ struct gpu_readback {
     unsigned name;      /* GL buffer that stays mapped, 0: none yet */
     const void *mapped; /* mapped memory of the buffer */
     size_t capacity_bytes, size_bytes;
-    void *fence; /* fence behind the copy; NULL: no copy is pending */
+    uint32_t copies; /* number of copies so far, which the device writes behind the copy */
+    void *fence;     /* fence behind the copy; NULL: no copy is pending */
 };
 
 /* Begins to copy the first bytes of a buffer, in their state after the commands queued so far. Drops a copy
