@@ -213,8 +213,13 @@ class Paced:
 
     def finish(self):
         """Reads to the end: the exit status, and all that it said."""
-        self.errors += self.process.stderr.read().decode()
-        return self.process.wait(TIMEOUT_S), self.errors
+        self.errors += self.process.communicate(timeout=TIMEOUT_S)[1].decode()
+        return self.process.returncode, self.errors
+
+    def go_on(self, seconds):
+        """Reads for so long."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.process.communicate(timeout=seconds)
 
 
 def read_png(path):

@@ -267,7 +267,7 @@ class Lost(Animations):
 
     def test_a_daemon_that_was_silent_goes_on_in_time_or_is_found_again(self):
         """Within one connection, after a ping that waited; and within a second one."""
-        often = {**os.environ, "FARLIGHT_NETWORK_IDLE": "3000"}  # a client pings thrice in this time, however late it calls one lost
+        often = {**os.environ, "FARLIGHT_NETWORK_IDLE": "12000"}  # a client pings thrice in this time, however late it calls one lost
         for name, lost_after, is_lost in (("time", "10m", False), ("again", "3", True)):
             with self.subTest(lost_after=lost_after), Daemon(environment=often) as daemon:
                 client = self.start(name, "--server", daemon.address, "--lost-after", lost_after, "--retry-for", "10m")
@@ -277,7 +277,7 @@ class Lost(Animations):
                     if is_lost:
                         client.until("trying again")
                     else:
-                        time.sleep(2)
+                        client.go_on(5)
                 finally:
                     daemon.signal_all(signal.SIGCONT)
                 errors = self.finish(client, 0)
