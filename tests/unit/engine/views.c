@@ -600,6 +600,9 @@ TEST(a_view_that_cannot_have_what_is_hidden_goes_on_without)
     look(1, true);
     submit(made);
     expect_layer(0, 1, 0, 0, ENCODING_JPEG);
+    for (int i = 0; i < 60000 && atomic_load(&fake.fail_steps) == 0; i++)
+        usleep(1000);
+    assert_true(atomic_load(&fake.fail_steps) < 0); /* the frame of what is hidden has failed */
     expect_silence();
     atomic_store(&fake.fail_from_frame, 0);
     look(2, true);

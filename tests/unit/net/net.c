@@ -14,6 +14,7 @@
 #include "net/out_queue.h"
 #include "net/timeouts.h"
 #include "session/blob_store.h"
+#include "tests/fixtures/stopped_clock.h"
 #include "tests/harness/test.h"
 
 #include <errno.h>
@@ -348,10 +349,16 @@ TEST(timers_come_in_their_order_and_deferred_calls_once)
     scene.early = (struct loop_timer){.call = on_early, .context = &scene};
     scene.late = (struct loop_timer){.call = on_late, .context = &scene};
     scene.deferred = (struct loop_deferred){.call = on_deferred, .context = &scene};
+    clock_stop();
     loop_timer_start(scene.loop, &scene.late, 30000000);
     loop_timer_start(scene.loop, &scene.early, 10000000);
+    clock_let_pass(10000000);
+    assert_true(loop_turn(scene.loop, &error));
+    assert_string_equal(scene.order, "e");
+    clock_let_pass(20000000);
     assert_true(loop_run(scene.loop, &error));
     assert_string_equal(scene.order, "edl");
+    clock_go_on();
     loop_destroy(scene.loop);
 }
 

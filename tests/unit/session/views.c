@@ -312,6 +312,7 @@ static void start_view_with_credit(void)
 
 SESSION_TEST(frames_are_begun_ahead_of_those_sent_and_not_beyond_credit)
 {
+    clock_stop(); /* over a slow link, the next frame would wait for an acknowledgement */
     start_acknowledged_view(2, 5);
     told_credit(2, 4);
     say_frame(2, 1, 0);
@@ -380,21 +381,23 @@ static struct engine_command *let_a_frame_wait(enum encoding encoding)
     message.render.frames_per_second = 100000;
     send_message(2, 0, &message);
     struct engine_command *start = told(ENGINE_JOB_START);
+    clock_stop();
     say_frame(2, 0, 0);
     take_frame(2, 0);
-    usleep(50000);
+    clock_let_pass(50 * MS);
     send_ack(0, true, false); /* so long it took */
     told_credit(2, 2);
     say_frame(2, 1, 0);
     take_frame(2, 1);
     /* The next one is begun when that one is expected to have come, and waits for it. */
+    clock_let_pass(50 * MS);
     told_credit(2, 3);
     struct engine_event *late = frame_of(2, 2, 0, FRAME_BYTES);
     late->frame->encoding = encoding;
     port_say(late);
     send_camera(8, true);
     told(ENGINE_VIEW_CHANGED);
-    usleep(20000);
+    clock_let_pass(20 * MS);
     send_ack(1, true, false);
     return start;
 }
@@ -742,6 +745,7 @@ static struct engine_command *replace_view(uint32_t request, uint32_t width)
 
 SESSION_TEST(a_view_takes_the_place_of_another_on_its_channel)
 {
+    clock_stop();
     struct engine_command *start = start_acknowledged_view(2, 100);
     told_credit(2, 4);
     send_camera(7, true);
@@ -827,6 +831,7 @@ SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
 
 SESSION_TEST(a_refused_view_leaves_the_running_one_unchanged)
 {
+    clock_stop();
     start_view_with_credit();
     struct message message = view_message(0);
     message.render.picture.width = 4096; /* more than the limit: the session says so itself */
@@ -1268,7 +1273,7 @@ static void play_from(uint64_t chance)
         play.asked[request] = true;
         send_message(request++, 0, &message);
     }
-    uint64_t give_up_ns = clock_now_ns() + UINT64_C(20000000000);
+    uint64_t give_up_ns = clock_now_ns() + UINT64_C(60000000000);
     while (!all_answered() && clock_now_ns() < give_up_ns) {
         play_engine();
         play_client();
