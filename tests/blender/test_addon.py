@@ -896,11 +896,11 @@ class Trouble(Case):
         scene = empty((0.5, 0.5, 0.5))
         grid("ground", 20, diffuse(GROUND))
         render()
-        scene.farlight.samples = scene.farlight.step_samples = 4096
+        scene.farlight.samples = scene.farlight.step_samples = 65536
         start = time.monotonic()
         with self.asked(lambda: time.monotonic() > start + 1):
             render()
-        self.assertLess(time.monotonic() - start, 8)
+        self.assertLess(time.monotonic() - start, 60)  # all samples take longer
         only = session._sessions[None, None]
         self.assertEqual(only.wait(only._client.stats()).jobs, 0)
         scene.farlight.samples, scene.farlight.step_samples = 16, 16
@@ -911,7 +911,7 @@ class Trouble(Case):
         grid("ground", 20, diffuse(GROUND))
         first = render()
         link = session._sessions[None, None]._client._link
-        scene.farlight.samples = scene.farlight.step_samples = 4096
+        scene.farlight.samples = scene.farlight.step_samples = 65536
         start = time.monotonic()
 
         def kill():
@@ -957,13 +957,10 @@ class Elsewhere(Case):
         (folder / "ssh").chmod(0o755)
         self.enterContext(unittest.mock.patch.dict(os.environ, {"PATH": f"{folder}:{programs}:{os.environ['PATH']}"}))
         self.path = folder / "socket"
-        daemon = subprocess.Popen([f"{programs}/farlightd", "--listen", f"unix:{self.path}"], stdout=subprocess.DEVNULL)
-        self.addCleanup(daemon.wait)
+        daemon = self.enterContext(subprocess.Popen([f"{programs}/farlightd", "--listen", f"unix:{self.path}"], stdout=subprocess.PIPE))
         self.addCleanup(daemon.kill)
         self.addCleanup(session.close_all)
-        until = time.monotonic() + 20
-        while not self.path.exists() and time.monotonic() < until:
-            time.sleep(0.05)
+        self.assertIn(b"READY", daemon.stdout.readline())
         self.scene = empty((0.5, 0.5, 0.5))
         grid("ground", 20, diffuse(GROUND))
 
@@ -1015,7 +1012,7 @@ class Elsewhere(Case):
         bpy.data.images["Render Result"].save_render(str(left))
         np.testing.assert_allclose(blocks(load(left)), blocks(first), atol=0.02)  # noise of 64 samples is less than 0.01
         with farlight.connect(f"unix:{self.path}") as beside:
-            until = time.monotonic() + 20
+            until = time.monotonic() + 60
             while beside.stats().jobs and time.monotonic() < until:
                 time.sleep(0.05)
             self.assertEqual(beside.stats().jobs, 0, "the job goes on without a client")

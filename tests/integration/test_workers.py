@@ -14,7 +14,7 @@ from farlight_test import Case, Daemon, Paced, bundled_scenes, farlight, long_te
 from test_serve import SCENE_ATTACH, is_gone, wait_until
 
 LOOK = (0, 1, 5), (0, 0, 0), (0, 1, 0), 0.8
-TERM_S = 5  # of SIGTERM, which takes 0.6 s and the time that a busy machine takes
+TERM_S = 20  # of SIGTERM, which takes 0.6 s and the time that a busy machine takes; a worker that is silent for 30 s is killed
 
 
 class Workers(Case):
