@@ -23,6 +23,7 @@ from test_animate import Cut
 from test_sealed import SealedDaemon
 
 PACKAGE = farlight_test.BIN.absolute() / "python"
+EXAMPLES = farlight_test.ROOT / "client/python/examples"
 DEBIANS = "/usr/lib/python3/dist-packages"
 sys.path.insert(0, str(PACKAGE))
 if not importlib.util.find_spec("numpy"):  # another python3 comes before Debian's
@@ -619,7 +620,7 @@ esac
 
     @long_test
     def test_the_examples_run(self):
-        result = self.expect(python(PACKAGE / "examples/training_set.py", bundled_scenes() / "teapot.glb", self.folder / "set", "--count", 2,
+        result = self.expect(python(EXAMPLES / "training_set.py", bundled_scenes() / "teapot.glb", self.folder / "set", "--count", 2,
                                     "--size", 24, "--samples", 1), 0)
         self.assertEqual(len(result.stdout.splitlines()), 2)
         with np.load(self.folder / "set/00001.npz") as made:
@@ -630,7 +631,7 @@ esac
         self.assertEqual([image["file_name"] for image in coco["images"]], ["00000.png", "00001.png"])
         self.assertLessEqual({one["category_id"] for one in coco["annotations"]}, {one["id"] for one in coco["categories"]})
         self.assertTrue(coco["annotations"])
-        self.expect(python(PACKAGE / "examples/turntable.py", bundled_scenes() / "sphereflake-2.nff", self.folder / "turn", 2), 0)
+        self.expect(python(EXAMPLES / "turntable.py", bundled_scenes() / "sphereflake-2.nff", self.folder / "turn", 2), 0)
         self.assertEqual(sorted(path.name for path in (self.folder / "turn").iterdir()), ["000.png", "001.png"])
 
 

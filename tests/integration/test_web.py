@@ -450,11 +450,6 @@ class Model(Case):
             self.assertTrue(json.loads(data)["error"]["again"], data)
             self.assertNotIn(str(self.folder), data.decode(), "where the daemon is")
             self.assertEqual(view.closed_with(), GOING)
-            with Socket(gateway) as late:
-                late.send({"show": SHOW})
-                _, data = late.receive()
-                self.assertTrue(json.loads(data)["error"]["again"], data)
-                self.assertNotIn(str(self.folder), data.decode(), "where the daemon is")
             deadline, frame = time.monotonic() + TIMEOUT_S, None
             while not frame and time.monotonic() < deadline:
                 try:
