@@ -505,7 +505,8 @@ class MovingPictures(OneDaemon, Animations):
 
     @long_test
     def test_a_lossless_webp_has_every_pixel_and_its_alpha(self):
-        _, pictures = self.pictures(model=str(bundled_scenes() / "teapot.glb"), outputs=["%d.png", "around.webp"], lossless=True)
+        _, pictures = self.pictures(model=str(bundled_scenes() / "carousel.glb"), outputs=["%d.png", "around.webp"], lossless=True,
+                                    background="transparent")
         self.assertLess(min(pictures[0][3::4]), 255)
         chunks = list(self.chunks((self.folder / "around.webp").read_bytes()[12:]))
         self.assertEqual([data[4:6] for name, data in chunks if name == b"ANIM"], [b"\0\0"])  # without end
