@@ -167,3 +167,31 @@ TEST(the_driver_is_not_asked_for_a_reset_in_every_pass)
         frame_result_finish(&second);
     }
 }
+
+static unsigned dispatches_of_frame(struct fixture *fixture)
+{
+    struct frame_result first = fixture_render(fixture); /* tells how many waves there are */
+    frame_result_finish(&first);
+    memset(&calls, 0, sizeof(calls));
+    struct frame_result second = fixture_render(fixture);
+    frame_result_finish(&second);
+    return calls.dispatches;
+}
+
+/* Up to four, as far as the device has memory for their shadow rays. */
+TEST(several_lights_take_no_more_passes_than_one)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture); /* two lights */
+    fixture->request.light.integrator = INTEGRATOR_WHITTED;
+    fixture->request.light.depth = 4;
+    fixture->request.tracing.tracer = TRACER_BVH;
+    fixture->request.tracing.primary = PRIMARY_TRACE;
+    frame_renderer_queue_ahead(fixture->renderer, true);
+    const unsigned with_two = dispatches_of_frame(fixture);
+    fixture_light(fixture, LIGHT_POINT, 1.0f, 3.0f, 3.0f, 20.0f);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 3.0f, 3.0f, 20.0f);
+    fixture_commit(fixture);
+    assert_int_equal(dispatches_of_frame(fixture), with_two);
+    frame_renderer_queue_ahead(fixture->renderer, false);
+}

@@ -19,7 +19,7 @@ struct integrator {
     bool always_bounces;     /* hits of any material may have children, unless the depth is 0 */
     bool mirrors;            /* hits of scene_features.mirrors have children */
     bool meets_lights;       /* rays hit area lights, by their weights */
-    uint32_t shadow_waves;   /* how many waves of shadow rays the buffers hold; no more are traced at once */
+    uint32_t shadow_waves;   /* how many waves of shadow rays the buffers hold at least */
     uint32_t straight_waves; /* waves beyond the depth that are left to rays which go straight on */
     uint32_t (*shadow_rays_a_hit)(const struct render_frame *frame); /* shadow rays of each hit in this frame */
     /* The rest may be NULL: none. */

@@ -16,6 +16,8 @@
 
 #include <epoxy/gl.h>
 
+#define SHADOW_WAVES_MAX 4u
+#define SHADOW_MEMORY_PART 32 /* part of the device's memory, at most */
 #define DEFINES_MAX                                                                                               \
     (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + NOTES_LIGHT_DEFINES +                                     \
      3) /* three more and the end of the list */
@@ -25,6 +27,28 @@ static uint32_t shadow_rays(const struct wave_shading *shading, const struct ren
     return shading->extra->shadow_rays(frame);
 }
 
+/* How many waves of shadow rays the buffers hold. Where the device counts hits, a batch needs room for as many as
+ * the wave may have, and fewer batches are fewer passes. Not by the limit in force, which changes with other
+ * frames. */
+static uint32_t shadow_waves(const struct wave_shading *shading, const struct render_wave *wave)
+{
+    const struct gpu_facts *facts = &wave->device->gpu->facts;
+    const uint64_t rays = wave->capacity, texels = notes_have_light(wave->notes) ? 2 : 1,
+                   ray_bytes = sizeof(struct ray) + sizeof(uint) + texels * sizeof(vec4);
+    const uint64_t fitting[] = {
+        shadow_rays(shading, wave->frame),
+        SHADOW_WAVES_MAX,
+        facts->memory.bytes / SHADOW_MEMORY_PART / (rays * ray_bytes),
+        facts->storage_block_bytes_max / (rays * sizeof(struct ray)),
+        facts->texture_buffer_texels_max / (rays * texels),
+    };
+    uint64_t waves = wave->device->counts_on_host ? 0 : UINT32_MAX;
+    for (size_t i = 0; i < sizeof(fitting) / sizeof(fitting[0]); i++)
+        waves = fitting[i] < waves ? fitting[i] : waves;
+    const uint32_t least = wave->frame->integrator->shadow_waves;
+    return waves > least ? (uint32_t)waves : least;
+}
+
 static bool reserve(void *self, struct render_wave *wave, uint32_t slice_samples, struct error *error)
 {
     struct wave_shading *shading = self;
@@ -32,7 +56,7 @@ static bool reserve(void *self, struct render_wave *wave, uint32_t slice_samples
     const struct integrator *integrator = wave->frame->integrator;
     struct gpu_device *device = wave->device->gpu;
     size_t waves = wave->capacity, children = waves * integrator->children_a_hit;
-    size_t shadows = shadow_rays(shading, wave->frame) > 0 ? waves * integrator->shadow_waves : 0;
+    size_t shadows = shadow_rays(shading, wave->frame) > 0 ? waves * shadow_waves(shading, wave) : 0;
     size_t samples = notes_have_light(wave->notes) ? 2 * shadows : shadows;
     size_t shadow_times = wave->frame->scene->has_motion ? shadows : 0;
     if ((integrator->prepare && !integrator->prepare(wave->frame, error)) ||
@@ -260,7 +284,7 @@ static uint32_t batch_of(const struct wave_shading *shading, const struct render
     if (wave->hit_count == 0)
         return 0;
     uint32_t left = shadow_rays(shading, wave->frame) - wave->asked;
-    uint32_t together = wave->capacity * wave->frame->integrator->shadow_waves / wave->hit_count;
+    uint32_t together = wave->capacity * shadow_waves(shading, wave) / wave->hit_count;
     return left < together ? left : together;
 }
 
