@@ -178,10 +178,10 @@ class Paced:
 
     The client says each file that is complete in a line that begins with `frame N:` and ends with its path. The path is
     longer than half a page and the pipe has one page: while nobody reads, it holds one line and a part of the next. After
-    until("frame N:") the client stands at the line of frame N + 2 at the latest, and has been given frame N + 3; the daemon
-    may send as many frames more as a job has credit for (protocol/messages.def). AHEAD counts them."""
+    until("frame N:") the client stops at the line of frame N + 2 at the latest, when it has received frame N + 3, and the
+    daemon may have sent the two frames after that, for which the job has credit (protocol/messages.def)."""
 
-    AHEAD = 5
+    AHEAD = 5  # frames behind the last one that was read
     PAGE = os.sysconf("SC_PAGESIZE")
 
     def __init__(self, folder, name, *arguments, **options):
@@ -216,8 +216,8 @@ class Paced:
         self.errors += self.process.communicate(timeout=TIMEOUT_S)[1].decode()
         return self.process.returncode, self.errors
 
-    def go_on(self, seconds):
-        """Reads for so long."""
+    def drain(self, seconds):
+        """Reads for that time, or until the end."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.communicate(timeout=seconds)
 

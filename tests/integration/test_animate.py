@@ -277,7 +277,7 @@ class Lost(Animations):
                     if is_lost:
                         client.until("trying again")
                     else:
-                        client.go_on(5)
+                        client.drain(5)
                 finally:
                     daemon.signal_all(signal.SIGCONT)
                 errors = self.finish(client, 0)

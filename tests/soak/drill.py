@@ -197,7 +197,7 @@ class Drill:
         if kill.when == "rendering":
             client.until("frame 1:")
         elif kill.when != "loading":
-            client.go_on(kill.when * self.whole_s[kill.kind, kill.ending])
+            client.drain(kill.when * self.whole_s[kill.kind, kill.ending])
 
     def disturb(self, kill, client):
         """Returns the statuses with which the client may end; none: it had ended before."""
