@@ -6,7 +6,7 @@
 #include "warp/trace.h"
 
 #include "warp/colour.h"
-#include "warp/walk.h"
+#include "warp/march.h"
 
 #include <math.h>
 
@@ -142,14 +142,14 @@ LANES_KERNEL static void place_packet(const struct warp_rays *rays, struct warp_
 }
 
 /* Sets the places from which rays without a known hit take their colours. */
-static void go_back(const struct warp_packet *packet, float texels, struct warp_walk *walk)
+static void go_back(const struct warp_packet *packet, float texels, struct warp_march *march)
 {
     for (int k = 0; k < LANES; k++) {
         const float across = packet->shift_x[k], down = packet->shift_y[k];
         const float share = texels / max_of(sqrtf(across * across + down * down), SHIFT_MIN);
-        const bool is_hit = walk->state[k] == WALK_HIT;
-        walk->x[k] = is_hit ? walk->x[k] : walk->before_x[k] + share * across;
-        walk->y[k] = is_hit ? walk->y[k] : walk->before_y[k] + share * down;
+        const bool is_hit = march->state[k] == MARCH_HIT;
+        march->x[k] = is_hit ? march->x[k] : march->before_x[k] + share * across;
+        march->y[k] = is_hit ? march->y[k] : march->before_y[k] + share * down;
     }
 }
 
@@ -160,31 +160,32 @@ struct result {
 };
 
 /* Continues the rays that passed behind the previous layers in this one. */
-static void walk_deeper(const struct warp_task *task, uint32_t l, const struct warp_packet *packet,
-                        float w_begin[LANES], struct result *result)
+static void march_deeper(const struct warp_task *task, uint32_t l, const struct warp_packet *packet,
+                         float w_begin[LANES], struct result *result)
 {
     const struct warp_layer *layer = &task->layers[l];
-    struct warp_walk walk = {.x = {0}};
+    struct warp_march march = {.x = {0}};
     uint32_t colours[LANES];
     uint8_t sticking[LANES];
     for (int k = 0; k < LANES; k++) {
-        walk.state[k] = result->mask[k] == FL_WARP_BEHIND ? WALK_ON : WALK_IDLE;
-        walk.w[k] = min_of(w_begin[k], task->ranges[l][1]);
+        march.state[k] = result->mask[k] == FL_WARP_BEHIND ? MARCH_ON : MARCH_IDLE;
+        march.w[k] = min_of(w_begin[k], task->ranges[l][1]);
     }
-    warp_walk(layer, packet, &walk, max_of(task->ranges[l][0], 0), QUADTREE_TOP);
+    warp_march(layer, packet, &march, max_of(task->ranges[l][0], 0), QUADTREE_TOP);
     for (int k = 0; k < LANES; k++) {
-        const int x = texel_of(walk.x[k], (int)layer->width - 1), y = texel_of(walk.y[k], (int)layer->height - 1);
+        const int x = texel_of(march.x[k], (int)layer->width - 1),
+                  y = texel_of(march.y[k], (int)layer->height - 1);
         const bool is_something = layer->w[(uint32_t)y * layer->padded_width + (uint32_t)x] > 0;
-        if (walk.state[k] == WALK_HIT && !is_something)
-            walk.state[k] = WALK_IDLE;
-        if (walk.state[k] == WALK_BEHIND)
-            w_begin[k] = walk.w[k];
+        if (march.state[k] == MARCH_HIT && !is_something)
+            march.state[k] = MARCH_IDLE;
+        if (march.state[k] == MARCH_BEHIND)
+            w_begin[k] = march.w[k];
     }
-    warp_colour(layer, walk.x, walk.y, colours);
+    warp_colour(layer, march.x, march.y, colours);
     if (task->sticks)
-        warp_sticking(layer, walk.x, walk.y, sticking);
+        warp_sticking(layer, march.x, march.y, sticking);
     for (int k = 0; k < LANES; k++)
-        if (walk.state[k] == WALK_HIT) {
+        if (march.state[k] == MARCH_HIT) {
             result->colours[k] = colours[k];
             result->sticking[k] = task->sticks ? sticking[k] : 0;
             result->mask[k] = FL_WARP_KNOWN;
@@ -192,29 +193,31 @@ static void walk_deeper(const struct warp_task *task, uint32_t l, const struct w
         }
 }
 
-static void walk_packet(const struct warp_task *task, const struct tile *tile, const struct warp_packet *packet,
-                        struct result *result)
+static void march_packet(const struct warp_task *task, const struct tile *tile, const struct warp_packet *packet,
+                         struct result *result)
 {
     const struct warp_layer *layer = &task->layers[0];
-    struct warp_walk walk;
+    struct warp_march march;
     bool any_behind = false;
     for (int k = 0; k < LANES; k++) {
-        walk.state[k] = WALK_ON;
-        walk.w[k] = tile->range[1];
-        walk.x[k] = walk.y[k] = walk.before_x[k] = walk.before_y[k] = 0;
+        march.state[k] = MARCH_ON;
+        march.w[k] = tile->range[1];
+        march.x[k] = march.y[k] = march.before_x[k] = march.before_y[k] = 0;
     }
-    warp_walk(layer, packet, &walk, tile->range[0], tile->level);
+    warp_march(layer, packet, &march, tile->range[0], tile->level);
     for (int k = 0; k < LANES; k++) {
-        const bool is_hit = walk.state[k] == WALK_HIT;
-        result->mask[k] = is_hit ? FL_WARP_KNOWN : walk.state[k] == WALK_BEHIND ? FL_WARP_BEHIND : FL_WARP_OUTSIDE;
-        any_behind |= walk.state[k] == WALK_BEHIND;
+        const bool is_hit = march.state[k] == MARCH_HIT;
+        result->mask[k] = is_hit                           ? FL_WARP_KNOWN
+                          : march.state[k] == MARCH_BEHIND ? FL_WARP_BEHIND
+                                                           : FL_WARP_OUTSIDE;
+        any_behind |= march.state[k] == MARCH_BEHIND;
     }
-    go_back(packet, task->fill_back, &walk);
-    warp_colour(layer, walk.x, walk.y, result->colours);
+    go_back(packet, task->fill_back, &march);
+    warp_colour(layer, march.x, march.y, result->colours);
     if (task->sticks)
-        warp_sticking(layer, walk.x, walk.y, result->sticking);
+        warp_sticking(layer, march.x, march.y, result->sticking);
     for (uint32_t l = 1; l < task->layer_count && any_behind; l++)
-        walk_deeper(task, l, packet, walk.w, result);
+        march_deeper(task, l, packet, march.w, result);
 }
 
 /* ---- out ---- */
@@ -286,17 +289,17 @@ static void trace_packet(const struct warp_task *task, const struct tile *tile, 
                          uint32_t y, struct warp_tally *tally)
 {
     struct warp_packet packet;
-    struct warp_walk walk;
+    struct warp_march march;
     struct result result;
     if (x >= task->width || y >= task->height)
         return;
     const bool is_whole = x + PACKET_COLUMNS <= task->width && y + PACKET_ROWS <= task->height;
     place_packet(&task->rays, &packet, (float)x, (float)y);
-    const bool is_solved = is_smooth && warp_solve(&task->layers[0], &packet, tile->range, &walk);
+    const bool is_solved = is_smooth && warp_solve(&task->layers[0], &packet, tile->range, &march);
     if (is_solved)
-        warp_colour(&task->layers[0], walk.x, walk.y, result.colours);
+        warp_colour(&task->layers[0], march.x, march.y, result.colours);
     if (is_solved && task->sticks)
-        warp_sticking(&task->layers[0], walk.x, walk.y, result.sticking);
+        warp_sticking(&task->layers[0], march.x, march.y, result.sticking);
     if (is_solved && is_whole) {
         store_known(task, x, y, &result, tally);
         return;
@@ -304,8 +307,8 @@ static void trace_packet(const struct warp_task *task, const struct tile *tile, 
     memset(result.mask, FL_WARP_KNOWN, sizeof(result.mask));
     result.deeper = 0;
     if (!is_solved) {
-        walk_packet(task, tile, &packet, &result);
-        tally->walked += LANES;
+        march_packet(task, tile, &packet, &result);
+        tally->marched += LANES;
         tally->deeper += result.deeper;
     }
     for (uint32_t row = 0; row < PACKET_ROWS; row++) {

@@ -26,7 +26,7 @@ struct warp_task {
 
 /* Sums over pixels. */
 struct warp_tally {
-    uint64_t by_mask[FL_WARP_OUTSIDE + 1], deeper, walked;
+    uint64_t by_mask[FL_WARP_OUTSIDE + 1], deeper, marched;
     uint64_t sticking; /* sum of 255 times the shares */
 };
 

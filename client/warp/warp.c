@@ -306,7 +306,7 @@ static void make_row(void *context, unsigned item, unsigned worker)
     for (int i = 0; i <= FL_WARP_OUTSIDE; i++)
         sum->by_mask[i] += tally.by_mask[i];
     sum->deeper += tally.deeper;
-    sum->walked += tally.walked;
+    sum->marched += tally.marched;
     sum->sticking += tally.sticking;
 }
 
@@ -318,7 +318,7 @@ static struct fl_warp_counts counts_of(const struct fl_warp *warp, const struct 
         for (int i = 0; i <= FL_WARP_OUTSIDE; i++)
             sum.by_mask[i] += work->tallies[w].by_mask[i];
         sum.deeper += work->tallies[w].deeper;
-        sum.walked += work->tallies[w].walked;
+        sum.marched += work->tallies[w].marched;
         sum.sticking += work->tallies[w].sticking;
     }
     const float *a = warp->camera.world_from_view, *b = view->camera.world_from_view;
@@ -329,7 +329,7 @@ static struct fl_warp_counts counts_of(const struct fl_warp *warp, const struct 
         .behind = (float)((double)sum.by_mask[FL_WARP_BEHIND] / pixels),
         .outside = (float)((double)sum.by_mask[FL_WARP_OUTSIDE] / pixels),
         .deeper = (float)((double)sum.deeper / pixels),
-        .walked = (float)((double)sum.walked / pixels),
+        .marched = (float)((double)sum.marched / pixels),
         .sticking = (float)((double)sum.sticking / (255 * pixels)),
         .bound_pixels =
             view->quality == FL_WARP_TREE && away <= warp->radius ? warp->pixels + warp->off_pixels : INFINITY,

@@ -111,7 +111,7 @@ struct fl_warp_view {
 struct fl_warp_counts {
     float known, behind, outside; /* shares of the pixels */
     float deeper;                 /* share of the pixels that come from the second or the third layer */
-    float walked;                 /* share of the pixels whose rays were traced node by node */
+    float marched;                /* share of the pixels whose rays were traced node by node */
     float sticking;               /* mean share of sticking over known pixels */
     /* Maximum displacement of a known point from this eye, in texels of the key view; infinite for an eye
      * beyond the radius, and for FL_WARP_ITERATIVE */

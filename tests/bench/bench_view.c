@@ -184,7 +184,7 @@ static bool look(struct viewer *viewer, uint64_t now, struct fl_error *error)
     camera_orbit(&camera, SWAY_RADIANS * sin(phase), SWAY_RADIANS / 4 * cos(phase));
     camera_export(&camera, &seen);
     viewer->sent_ns[(viewer->last_command + 1) % LOOKS_REMEMBERED] = monotonic_now_ns();
-    return fl_view_look(viewer->view, &seen, &viewer->last_command, error);
+    return fl_view_set_camera(viewer->view, &seen, &viewer->last_command, error);
 }
 
 /* Sends the camera if it is time for one, and takes what has come. */

@@ -95,7 +95,7 @@ static void add_counts(struct fl_warp_counts *sum, const struct fl_warp_counts *
     sum->behind += share * of_eye->behind;
     sum->outside += share * of_eye->outside;
     sum->deeper += share * of_eye->deeper;
-    sum->walked += share * of_eye->walked;
+    sum->marched += share * of_eye->marched;
     sum->sticking += share * of_eye->sticking;
     sum->bound_pixels = of_eye->bound_pixels > sum->bound_pixels ? of_eye->bound_pixels : sum->bound_pixels;
     sum->processor_ns += of_eye->processor_ns;

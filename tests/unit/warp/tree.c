@@ -4,7 +4,7 @@
 
 #include "warp/node.h"
 #include "warp/tree.h"
-#include "warp/walk.h"
+#include "warp/march.h"
 
 /* ---- a layer of planes, and rays in double precision ---- */
 
@@ -128,25 +128,25 @@ static struct proof prove(float pixels, float radius)
     for (uint32_t e = 0; e < EYES; e++) {
         double eye[3];
         struct warp_packet packet;
-        struct warp_walk walk = {.w = {0}};
+        struct warp_march march = {.w = {0}};
         random_eye(&seed, radius, eye);
         random_packet(&seed, eye, &packet);
         for (int k = 0; k < LANES; k++)
-            walk.w[k] = 1.0f;
-        warp_walk(&layer, &packet, &walk, 0.01f, QUADTREE_TOP);
+            march.w[k] = 1.0f;
+        warp_march(&layer, &packet, &march, 0.01f, QUADTREE_TOP);
         for (int k = 0; k < LANES; k++) {
-            assert_true(walk.state[k] != WALK_ON);
-            proof.behind += walk.state[k] == WALK_BEHIND;
-            if (walk.state[k] != WALK_HIT)
+            assert_true(march.state[k] != MARCH_ON);
+            proof.behind += march.state[k] == MARCH_BEHIND;
+            if (march.state[k] != MARCH_HIT)
                 continue;
-            const double x = walk.x[k], y = walk.y[k];
+            const double x = march.x[k], y = march.y[k];
             assert_true(x > -0.01 && y > -0.01 && x < WIDTH + 0.01 && y < HEIGHT + 0.01);
-            const double off = pixels_off(x, y, walk.w[k], eye);
-            /* The walk allows itself 2^-12 of w more, for what rounds. */
+            const double off = pixels_off(x, y, march.w[k], eye);
+            /* The march allows itself 2^-12 of w more, for what rounds. */
             const double rounding =
-                FOCAL * (double)radius * (double)walk.w[k] / 4096 / pow(1 - (double)(radius * walk.w[k]), 2);
+                FOCAL * (double)radius * (double)march.w[k] / 4096 / pow(1 - (double)(radius * march.w[k]), 2);
             if (!(off <= (double)pixels + rounding))
-                fail_msg("eye %u: the hit at %g, %g with w %g is off by %g pixels", e, x, y, (double)walk.w[k],
+                fail_msg("eye %u: the hit at %g, %g with w %g is off by %g pixels", e, x, y, (double)march.w[k],
                          off);
             proof.worst_pixels = fmax(proof.worst_pixels, off);
             proof.hits++;
@@ -267,7 +267,7 @@ static void expect_same(struct fl_warp *a, struct fl_warp *b, uint32_t layers)
         make(b, &view, &of_b);
         assert_memory_equal(of_a.colours, of_b.colours, sizeof(of_a.colours));
         assert_memory_equal(of_a.mask, of_b.mask, sizeof(of_a.mask));
-        assert_true(of_a.counts.walked == of_b.counts.walked);
+        assert_true(of_a.counts.marched == of_b.counts.marched);
     }
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Stackless traversal of the quadtree (Widmer and others, section 4): the way up the tree follows from the bits
  * in which two neighbours differ. */
-#include "warp/walk.h"
+#include "warp/march.h"
 
 #include "warp/node.h"
 
@@ -49,7 +49,7 @@ LANES_INLINE float inverse_of(float shift)
 }
 
 LANES_KERNEL static void begin(const struct ground *ground, const struct warp_packet *packet,
-                               struct warp_walk *walk, struct lanes *lanes, const float w_low, const int level)
+                               struct warp_march *march, struct lanes *lanes, const float w_low, const int level)
 {
     const float right = (float)(ground->last_x + 1), bottom = (float)(ground->last_y + 1);
 #pragma omp simd
@@ -58,10 +58,10 @@ LANES_KERNEL static void begin(const struct ground *ground, const struct warp_pa
         const float a = -packet->x[k] * inverse_x, b = (right - packet->x[k]) * inverse_x;
         const float c = -packet->y[k] * inverse_y, d = (bottom - packet->y[k]) * inverse_y;
         const float enters = min_of(max_of(a, b), max_of(c, d)), leaves = max_of(min_of(a, b), min_of(c, d));
-        const float w = min_of(walk->w[k], enters), w_end = max_of(w_low, leaves);
+        const float w = min_of(march->w[k], enters), w_end = max_of(w_low, leaves);
         const float x = clamp(packet->x[k] + packet->shift_x[k] * w, 0, right - 1);
         const float y = clamp(packet->y[k] + packet->shift_y[k] * w, 0, bottom - 1);
-        const uint32_t is_active = mask_of(walk->state[k] == WALK_ON);
+        const uint32_t is_active = mask_of(march->state[k] == MARCH_ON);
         lanes->inverse_x[k] = inverse_x;
         lanes->inverse_y[k] = inverse_y;
         lanes->w_end[k] = w_end;
@@ -69,12 +69,12 @@ LANES_KERNEL static void begin(const struct ground *ground, const struct warp_pa
         lanes->x[k] = (int)x >> level;
         lanes->y[k] = (int)y >> level;
         lanes->is_first[k] = -1;
-        lanes->is_clipped[k] = (int)mask_of(enters < walk->w[k]);
+        lanes->is_clipped[k] = (int)mask_of(enters < march->w[k]);
         lanes->leaves[k] = (int)mask_of(leaves > w_low);
-        walk->state[k] = pick_int(is_active & mask_of(w < w_end), WALK_OUTSIDE, walk->state[k]);
-        walk->w[k] = pick(is_active, w, walk->w[k]);
-        walk->before_x[k] = pick(is_active, x, walk->before_x[k]);
-        walk->before_y[k] = pick(is_active, y, walk->before_y[k]);
+        march->state[k] = pick_int(is_active & mask_of(w < w_end), MARCH_OUTSIDE, march->state[k]);
+        march->w[k] = pick(is_active, w, march->w[k]);
+        march->before_x[k] = pick(is_active, x, march->before_x[k]);
+        march->before_y[k] = pick(is_active, y, march->before_y[k]);
     }
 }
 
@@ -85,13 +85,13 @@ LANES_INLINE float slack_at(const struct ground *ground, float w)
 }
 
 /* Moves a ray through the node `head`, `tail`; returns all bits if it continues. */
-LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet *packet, struct warp_walk *walk,
+LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet *packet, struct warp_march *march,
                            struct lanes *lanes, const int k, const uint32_t head, const uint32_t tail)
 {
     const int level = lanes->level[k], x = lanes->x[k], y = lanes->y[k];
     const float from_x = packet->x[k], from_y = packet->y[k], shift_x = packet->shift_x[k];
-    const float shift_y = packet->shift_y[k], w = walk->w[k], w_end = lanes->w_end[k];
-    const uint32_t is_active = mask_of(walk->state[k] == WALK_ON), is_first = (uint32_t)lanes->is_first[k];
+    const float shift_y = packet->shift_y[k], w = march->w[k], w_end = lanes->w_end[k];
+    const uint32_t is_active = mask_of(march->state[k] == MARCH_ON), is_first = (uint32_t)lanes->is_first[k];
     /* w decreases, so the ray moves against its shift. */
     const int to_right = shift_x < 0, to_below = shift_y < 0;
     const float exit_x = ((float)((x + to_right) << level) - from_x) * lanes->inverse_x[k];
@@ -130,23 +130,23 @@ LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet
     const int differ = ((x ^ next_x) | (y ^ next_y)) & NODE_COLUMNS_MASK;
     const int up = (int)(bits_of((float)differ) >> 23) - 127; /* index of the highest set bit */
     const int higher = min_int(level + up, QUADTREE_TOP), by = higher - level;
-    const int where_behind = pick_int(is_first & (uint32_t)lanes->is_clipped[k], WALK_OUTSIDE, WALK_BEHIND);
-    const int where_ends = pick_int((uint32_t)lanes->leaves[k], WALK_OUTSIDE, WALK_BEHIND);
+    const int where_behind = pick_int(is_first & (uint32_t)lanes->is_clipped[k], MARCH_OUTSIDE, MARCH_BEHIND);
+    const int where_ends = pick_int((uint32_t)lanes->leaves[k], MARCH_OUTSIDE, MARCH_BEHIND);
     const int state = pick_int(is_behind, where_behind,
-                               pick_int(is_met, WALK_HIT, pick_int(passes & ends, where_ends, WALK_ON)));
-    const uint32_t goes_on = is_active & mask_of(state == WALK_ON), meets = is_active & is_met;
+                               pick_int(is_met, MARCH_HIT, pick_int(passes & ends, where_ends, MARCH_ON)));
+    const uint32_t continues = is_active & mask_of(state == MARCH_ON), meets = is_active & is_met;
     const float w_passed = 0.5f * (w + w_out);
-    walk->before_x[k] = pick(is_active & passes, from_x + shift_x * w_passed, walk->before_x[k]);
-    walk->before_y[k] = pick(is_active & passes, from_y + shift_y * w_passed, walk->before_y[k]);
-    walk->x[k] = pick(meets, from_x + shift_x * w_met, walk->x[k]);
-    walk->y[k] = pick(meets, from_y + shift_y * w_met, walk->y[k]);
-    walk->w[k] = pick(is_active, pick(is_met, w_met, pick(passes, w_out, w)), w);
-    walk->state[k] = pick_int(is_active, state, walk->state[k]);
+    march->before_x[k] = pick(is_active & passes, from_x + shift_x * w_passed, march->before_x[k]);
+    march->before_y[k] = pick(is_active & passes, from_y + shift_y * w_passed, march->before_y[k]);
+    march->x[k] = pick(meets, from_x + shift_x * w_met, march->x[k]);
+    march->y[k] = pick(meets, from_y + shift_y * w_met, march->y[k]);
+    march->w[k] = pick(is_active, pick(is_met, w_met, pick(passes, w_out, w)), w);
+    march->state[k] = pick_int(is_active, state, march->state[k]);
     lanes->is_first[k] = (int)(is_first & (~is_active | goes_down));
-    lanes->level[k] = pick_int(goes_on, pick_int(goes_down, lower, higher), level);
-    lanes->x[k] = pick_int(goes_on, pick_int(goes_down, child_x, next_x >> by), x);
-    lanes->y[k] = pick_int(goes_on, pick_int(goes_down, child_y, next_y >> by), y);
-    return goes_on;
+    lanes->level[k] = pick_int(continues, pick_int(goes_down, lower, higher), level);
+    lanes->x[k] = pick_int(continues, pick_int(goes_down, child_x, next_x >> by), x);
+    lanes->y[k] = pick_int(continues, pick_int(goes_down, child_y, next_y >> by), y);
+    return continues;
 }
 
 /* Loads the nodes of the rays one by one, since a gather is no faster. */
@@ -161,8 +161,8 @@ static inline void load_nodes(const struct ground *ground, const int places[LANE
 }
 
 /* Moves all rays a step. False: no ray continues. */
-LANES_KERNEL static bool walk_step(const struct ground *ground, const struct warp_packet *restrict packet,
-                                   struct warp_walk *restrict walk, struct lanes *restrict lanes)
+LANES_KERNEL static bool march_step(const struct ground *ground, const struct warp_packet *restrict packet,
+                                    struct warp_march *restrict march, struct lanes *restrict lanes)
 {
     struct nodes nodes;
     int places[LANES];
@@ -176,17 +176,17 @@ LANES_KERNEL static bool walk_step(const struct ground *ground, const struct war
     load_nodes(ground, places, &nodes);
 #pragma omp simd reduction(| : any)
     for (int k = 0; k < LANES; k++)
-        any |= step(ground, packet, walk, lanes, k, nodes.words[k][0], nodes.words[k][1]);
+        any |= step(ground, packet, march, lanes, k, nodes.words[k][0], nodes.words[k][1]);
     return any != 0;
 }
 
-void warp_walk(const struct warp_layer *layer, const struct warp_packet *packet, struct warp_walk *walk,
-               float w_low, uint32_t level)
+void warp_march(const struct warp_layer *layer, const struct warp_packet *packet, struct warp_march *march,
+                float w_low, uint32_t level)
 {
     const struct ground ground = ground_of(layer);
     struct lanes lanes;
-    begin(&ground, packet, walk, &lanes, w_low, (int)level);
-    while (walk_step(&ground, packet, walk, &lanes))
+    begin(&ground, packet, march, &lanes, w_low, (int)level);
+    while (march_step(&ground, packet, march, &lanes))
         continue;
 }
 
@@ -222,17 +222,17 @@ LANES_KERNEL static bool solve_step(const struct ground *ground, const struct wa
 }
 
 bool warp_solve(const struct warp_layer *layer, const struct warp_packet *packet, const float range[2],
-                struct warp_walk *walk)
+                struct warp_march *march)
 {
     const struct ground ground = ground_of(layer);
     bool has_moved = true;
     for (int k = 0; k < LANES; k++)
-        walk->w[k] = 0.5f * (range[0] + range[1]);
+        march->w[k] = 0.5f * (range[0] + range[1]);
     for (int i = 0; i < ITERATIONS_MAX && has_moved; i++)
-        has_moved = solve_step(&ground, packet, walk->w, range);
+        has_moved = solve_step(&ground, packet, march->w, range);
     for (int k = 0; k < LANES; k++) {
-        walk->x[k] = packet->x[k] + packet->shift_x[k] * walk->w[k];
-        walk->y[k] = packet->y[k] + packet->shift_y[k] * walk->w[k];
+        march->x[k] = packet->x[k] + packet->shift_x[k] * march->w[k];
+        march->y[k] = packet->y[k] + packet->shift_y[k] * march->w[k];
     }
     return !has_moved;
 }
