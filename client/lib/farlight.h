@@ -499,9 +499,9 @@ struct fl_frame {
         *structure; /* the tracer's report on its structure; one block of memory with its strings */
     /* Views only, down to `sticking`. Times of the daemon's clock compare with fl_ping's; `command_sent_ns`,
      * `begun_ns` and `whole_ns` are of this process' monotonic clock. */
-    uint64_t command; /* the last fl_view_look that the frame shows; 0: none yet, and its times are 0 */
+    uint64_t command; /* the last fl_view_set_camera that the frame shows; 0: none yet, and its times are 0 */
     uint64_t command_received_ns, command_applied_ns, rendered_ns; /* the daemon's clock */
-    uint64_t command_sent_ns;                                      /* time of that fl_view_look */
+    uint64_t command_sent_ns;                                      /* time of that fl_view_set_camera */
     uint64_t begun_ns, whole_ns;                                   /* first byte, and decoded */
     uint64_t change; /* number of fl_view_change calls that the frame shows */
     bool moving, key_frame;
@@ -590,8 +590,8 @@ FL_API struct fl_view *fl_view_start(struct fl_scene *scene, const struct messag
 /* Changes the request (size, tracer, integrator, exposure ..); camera and frame numbers continue. */
 FL_API bool fl_view_change(struct fl_view *view, const struct message_render *options, struct fl_error *error);
 /* Sends a camera and returns; *command (may be NULL) is the number under which frames report it. */
-FL_API bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
-                         struct fl_error *error);
+FL_API bool fl_view_set_camera(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
+                               struct fl_error *error);
 /* The next complete frame, after a wait of at most timeout_ms; 0: no wait. NULL with error->code FL_ERROR_NONE:
  * none so far. The caller destroys it. A frame in H.264 is not decoded: it has `encoded` instead of `pixels`. */
 FL_API struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct fl_error *error);

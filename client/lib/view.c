@@ -164,8 +164,8 @@ bool fl_view_change(struct fl_view *view, const struct message_render *wanted, s
     return ask(view, wanted, error) && grant_credit(view, error);
 }
 
-bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
-                  struct fl_error *error)
+bool fl_view_set_camera(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
+                        struct fl_error *error)
 {
     struct message message = {.type = MESSAGE_VIEW_CAMERA};
     struct message_view_camera *look = &message.view_camera;

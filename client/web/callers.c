@@ -23,7 +23,7 @@ struct web_caller *web_callers_add(struct web_callers *callers, const char *peer
         struct web_caller *caller = &callers->all[i];
         if (caller->is_there)
             continue;
-        *caller = (struct web_caller){.is_there = true, .right = WEB_LOOKS};
+        *caller = (struct web_caller){.is_there = true, .right = WEB_READS};
         snprintf(caller->peer, sizeof(caller->peer), "%s", peer);
         return caller;
     }

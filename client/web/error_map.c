@@ -78,7 +78,7 @@ static void mark(struct fl_frame *frame, const struct fl_frame *reference)
 }
 
 /* Starts the same picture with the reference. */
-static bool go_on(struct error_map *map, struct fl_scene *scene, struct fl_error *error)
+static bool start_reference(struct error_map *map, struct fl_scene *scene, struct fl_error *error)
 {
     map->render.comparison.compare = 0;
     map->render.tracing.tracer = PROTOCOL_TRACER_REFERENCE;
@@ -96,7 +96,7 @@ bool error_map_step(struct error_map *map, struct fl_scene *scene, struct fl_err
     map->job = NULL;
     if (!map->frame) {
         map->frame = frame;
-        go_on(map, scene, error);
+        start_reference(map, scene, error);
         return false;
     }
     const bool fits = frame->width == map->frame->width && frame->height == map->frame->height &&

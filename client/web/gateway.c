@@ -207,7 +207,7 @@ static int refuse(struct lws *wsi, enum lws_close_status status, const char *why
 
 static int on_upgrade(struct gateway *gateway, struct lws *wsi, const char *to)
 {
-    enum web_right right = WEB_LOOKS;
+    enum web_right right = WEB_READS;
     const unsigned status = refuse_socket(gateway, wsi, &right);
     if (strcmp(to, "websocket") != 0)
         return -1;
@@ -426,12 +426,12 @@ static bool listen_at(struct gateway *gateway, const struct web_address *address
 static void announce(const struct gateway *gateway)
 {
     static const char *const gives[WEB_RIGHT_COUNT] = {
-        [WEB_LOOKS] = "  to look", [WEB_EDITS] = "  to look and edit"};
+        [WEB_READS] = "  to look", [WEB_EDITS] = "  to look and edit"};
     const bool has_several = gateway->options->allow_edit;
     const struct web_address *address = gateway->options->listens;
     char host[NAME_BYTES];
     web_address_print(address, host, sizeof(host));
-    for (int right = 0; right <= (has_several ? WEB_EDITS : WEB_LOOKS); right++)
+    for (int right = 0; right <= (has_several ? WEB_EDITS : WEB_READS); right++)
         printf("http://%s:%d/%s/%s\n", address->is_any ? gateway->machine : host, gateway->port,
                gateway->links.tokens[right], has_several ? gives[right] : "");
     fflush(stdout);

@@ -8,8 +8,8 @@ static struct web_request *place_of(struct web_inbox *inbox, enum web_request_ki
     switch (kind) {
     case WEB_SHOW:
         return &inbox->show;
-    case WEB_LOOK:
-        return &inbox->look;
+    case WEB_CAMERA:
+        return &inbox->camera;
     case WEB_KEY:
         return &inbox->key;
     case WEB_COMPARE:

@@ -8,7 +8,7 @@
 
 /* Slots by kind; WEB_NONE, zero, means empty. */
 struct web_inbox {
-    struct web_request show, look, key, compare, edit;
+    struct web_request show, camera, key, compare, edit;
 };
 
 /* Stores a request. False: the browser may not make it, or its last edit is still waiting; nothing is changed.

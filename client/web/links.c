@@ -26,10 +26,10 @@ const char *web_links_find(const struct web_links *links, const char *path, enum
 {
     if (strlen(path) < WEB_TOKEN_LENGTH + 2 || path[0] != '/' || path[WEB_TOKEN_LENGTH + 1] != '/')
         return NULL;
-    const bool looks = sodium_memcmp(path + 1, links->tokens[WEB_LOOKS], WEB_TOKEN_LENGTH) == 0;
+    const bool reads = sodium_memcmp(path + 1, links->tokens[WEB_READS], WEB_TOKEN_LENGTH) == 0;
     const bool edits = sodium_memcmp(path + 1, links->tokens[WEB_EDITS], WEB_TOKEN_LENGTH) == 0;
-    *right = edits && links->allow_edit ? WEB_EDITS : WEB_LOOKS;
-    return looks || *right == WEB_EDITS ? path + WEB_TOKEN_LENGTH + 2 : NULL;
+    *right = edits && links->allow_edit ? WEB_EDITS : WEB_READS;
+    return reads || *right == WEB_EDITS ? path + WEB_TOKEN_LENGTH + 2 : NULL;
 }
 
 void web_links_forget(struct web_links *links)

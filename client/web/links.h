@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-enum web_right { WEB_LOOKS, WEB_EDITS, WEB_RIGHT_COUNT };
+enum web_right { WEB_READS, WEB_EDITS, WEB_RIGHT_COUNT };
 
 #define WEB_TOKEN_LENGTH 43 /* 32 random bytes in base 64 without padding */
 

@@ -66,7 +66,7 @@ static bool is_sound(const double eye[3], const double at[3], const double up[3]
     return into_square > 0 && up_square > 0 && cross_square > PARALLEL * PARALLEL * into_square * up_square;
 }
 
-static bool read_look(json_t *json, struct web_request *request, struct fl_error *error)
+static bool read_camera(json_t *json, struct web_request *request, struct fl_error *error)
 {
     json_error_t why;
     json_int_t id = 0, node = 0;
@@ -76,13 +76,13 @@ static bool read_look(json_t *json, struct web_request *request, struct fl_error
     if (json_unpack_ex(json, &why, JSON_STRICT, "{s:I,s:[F,F,F!],s:[F,F,F!],s:[F,F,F!],s:F,s:F,s:b,s:I}", "id",
                        &id, "eye", &eye[0], &eye[1], &eye[2], "at", &at[0], &at[1], &at[2], "up", &up[0], &up[1],
                        &up[2], "fov", &fov, "time", &time, "moving", &moving, "node", &node) != 0)
-        return refuse(error, "look", why.text);
+        return refuse(error, "camera", why.text);
     if (id < 0 || id > UINT32_MAX || node < 0 || node > UINT32_MAX)
-        return refuse(error, "look.id", "is no number of 32 bits");
+        return refuse(error, "camera.id", "is no number of 32 bits");
     if (!is_sound(eye, at, up))
-        return refuse(error, "look", "the camera looks nowhere");
+        return refuse(error, "camera", "the camera looks nowhere");
     if (!(fov >= FOV_MIN && fov <= FOV_MAX) || !(fabs(time) <= TIME_MAX))
-        return refuse(error, "look.fov", "field of view or time is out of range");
+        return refuse(error, "camera.fov", "field of view or time is out of range");
     for (int i = 0; i < 3; i++) {
         camera->eye_world[i] = (float)eye[i];
         camera->look_at_world[i] = (float)at[i];
@@ -185,9 +185,9 @@ static bool read_one(const char *name, json_t *value, struct web_request *reques
         request->kind = WEB_SHOW;
         return read_show(value, &request->show, error);
     }
-    if (strcmp(name, "look") == 0) {
-        request->kind = WEB_LOOK;
-        return read_look(value, request, error);
+    if (strcmp(name, "camera") == 0) {
+        request->kind = WEB_CAMERA;
+        return read_camera(value, request, error);
     }
     if (strcmp(name, "key") == 0 && json_is_true(value)) {
         request->kind = WEB_KEY;

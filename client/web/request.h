@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Requests of the page, read once and checked: JSON with one of "show", "look", "shown", "key", "compare",
+/* Requests of the page, read once and checked: JSON with one of "show", "camera", "shown", "key", "compare",
  * "list", "read", "edit", "undo", "redo". No I/O. */
 #ifndef FARLIGHT_CLIENT_WEB_REQUEST_H
 #define FARLIGHT_CLIENT_WEB_REQUEST_H
@@ -13,7 +13,7 @@
 enum web_request_kind {
     WEB_NONE,    /* no request */
     WEB_SHOW,    /* {"show": {"width", "height", "h264", "tracer", "integrator", "clip"}} */
-    WEB_LOOK,    /* {"look": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
+    WEB_CAMERA,  /* {"camera": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
     WEB_SHOWN,   /* {"shown": N}: another N frames are visible */
     WEB_KEY,     /* {"key": true}: a frame in H.264 could not be decoded */
     WEB_COMPARE, /* {"compare": N}: compare the picture's tracer with the reference; the answer carries N */

@@ -22,7 +22,7 @@
 #include <unistd.h>
 
 #define MOVING_RATE 15.0f
-#define LOOKS_REMEMBERED 256u
+#define CAMERAS_REMEMBERED 256u
 #define IDLE_MS 1000
 /* Seconds of idling after which the seat pings the daemon, which disconnects silent clients */
 #define PING_ROUNDS 8u
@@ -50,7 +50,7 @@ struct seat {
     char *described;                             /* the last description of the scene that was sent */
     uint64_t described_revision, shown_revision; /* its revision, and the newest frame's */
     unsigned idle_rounds;
-    uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo the size */
+    uint32_t ids[CAMERAS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo the size */
 };
 
 /* ---- to the browser ---- */
@@ -147,13 +147,13 @@ static bool show(struct seat *seat, const struct web_show *wanted, struct fl_err
     return seat->view != NULL;
 }
 
-static bool look(struct seat *seat, const struct web_request *wanted, struct fl_error *error)
+static bool set_camera(struct seat *seat, const struct web_request *wanted, struct fl_error *error)
 {
     uint64_t command = 0;
     error_map_end(&seat->errors);
-    if (!fl_view_look(seat->view, &wanted->camera, &command, error))
+    if (!fl_view_set_camera(seat->view, &wanted->camera, &command, error))
         return false;
-    seat->ids[command % LOOKS_REMEMBERED] = wanted->id;
+    seat->ids[command % CAMERAS_REMEMBERED] = wanted->id;
     seat->camera = wanted->camera;
     seat->has_camera = true;
     return true;
@@ -173,7 +173,7 @@ static bool pass_frames(struct seat *seat, struct fl_error *error)
         struct fl_frame *frame = fl_view_next(seat->view, 0, error);
         if (!frame)
             return error->code == FL_ERROR_NONE;
-        const uint32_t id = frame->command == 0 ? 0 : seat->ids[frame->command % LOOKS_REMEMBERED];
+        const uint32_t id = frame->command == 0 ? 0 : seat->ids[frame->command % CAMERAS_REMEMBERED];
         const bool sent = post(seat, web_describe_frame(frame, id), frame->encoded, frame->encoded_bytes, error);
         seat->shown_revision = frame->revision;
         fl_frame_destroy(frame);
@@ -242,13 +242,13 @@ static bool begin_requests(struct seat *seat, struct fl_error *error)
     const bool wants_scene = seat->shown_revision > seat->described_revision && may_answer;
     const struct web_request shown = web_inbox_take(&seat->inbox.show, true),
                              key = web_inbox_take(&seat->inbox.key, true),
-                             looked = web_inbox_take(&seat->inbox.look, seat->view || shown.kind != WEB_NONE),
+                             moved = web_inbox_take(&seat->inbox.camera, seat->view || shown.kind != WEB_NONE),
                              compared = web_inbox_take(&seat->inbox.compare, seat->view && may_answer),
                              edited = web_inbox_take(&seat->inbox.edit, seat->view && may_answer);
     pthread_mutex_unlock(&seat->lock);
     if (shown.kind != WEB_NONE && !show(seat, &shown.show, error))
         return false;
-    if (looked.kind != WEB_NONE && !look(seat, &looked, error))
+    if (moved.kind != WEB_NONE && !set_camera(seat, &moved, error))
         return false;
     if (compared.kind != WEB_NONE && !compare(seat, compared.id, error))
         return false;

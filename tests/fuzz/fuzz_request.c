@@ -61,7 +61,7 @@ static void check_request(const uint8_t *data, size_t size)
     FUZZ_REQUIRE(error.code == FL_ERROR_NONE);
     if (request.kind == WEB_SHOW)
         check_show(&request.show);
-    else if (request.kind == WEB_LOOK)
+    else if (request.kind == WEB_CAMERA)
         check_camera(&request.camera);
     else if (request.kind == WEB_SHOWN)
         FUZZ_REQUIRE(request.shown > 0);

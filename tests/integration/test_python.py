@@ -550,7 +550,7 @@ esac
         client, (scene, _) = self.connect(), triangle()
         with client.view(scene, STRAIGHT, width=16, height=12, samples=2) as view:
             self.assertEqual(view.next_frame().begin.command, 0)
-            number = view.look(farlight.Camera((1, 1, 6)))
+            number = view.set_camera(farlight.Camera((1, 1, 6)))
             while (picture := view.next_frame()).begin.command != number or picture.begin.samples != 2:
                 pass
         np.testing.assert_allclose(picture.world_from_view[:3, 3], (1, 1, 6), atol=1e-6)

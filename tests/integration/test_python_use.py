@@ -362,7 +362,7 @@ class WithDaemon(OneDaemon):
         self.assertEqual(client.scenes(), [])
         self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8, first_frame=7).number, 7)
         for attempt, field in ((lambda: client.frames(scene, width=0), "render.width"), (lambda: client.ask(3), "message"),
-                               (lambda: client.view(scene, STRAIGHT, width=8, height=8).look((0, 0, 3)), "camera")):
+                               (lambda: client.view(scene, STRAIGHT, width=8, height=8).set_camera((0, 0, 3)), "camera")):
             with self.assertRaises(farlight.InvalidValue) as raised:
                 attempt()
             self.assertEqual(raised.exception.field, field)

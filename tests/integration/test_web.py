@@ -145,7 +145,7 @@ class Web(Case):
         self.assertGreater(max(errors), 10)
         # Another camera, and another tracer, which has hardly any.
         view.send({"show": {**SHOW, "tracer": "bvh"}})
-        view.send({"look": {**LOOK, "moving": False}})
+        view.send({"camera": {**LOOK, "moving": False}})
         told, errors = self.errors(view, 6)
         self.assertEqual((told["compare"], told["tracer"]), (6, "bvh"))
         self.assertGreater(told["all"]["agree"], 0.9999)
@@ -155,7 +155,7 @@ class Web(Case):
     def test_moving_on_ends_a_comparison(self):
         view = self.view(tracer="abuffer")
         view.send({"compare": 1})
-        view.send({"look": {**LOOK, "moving": False}})
+        view.send({"camera": {**LOOK, "moving": False}})
         told, _ = self.errors(view, 2)
         self.assertEqual(told["compare"], 2)
 
@@ -163,7 +163,7 @@ class Web(Case):
         first, second = self.view(), self.view()
         eyes = {}
         for view, eye in ((first, [6, 4, 8]), (second, [-6, 5, 7])):
-            view.send({"look": {**LOOK, "eye": eye}})
+            view.send({"camera": {**LOOK, "eye": eye}})
         for view in (first, second):
             frame = {"id": 0}
             while frame["id"] != LOOK["id"]:
@@ -184,8 +184,8 @@ class Web(Case):
         self.assertEqual(status, 101)
 
     def test_wrong_messages_end_the_connection(self):
-        def look(**changes):
-            return {"look": {**LOOK, **changes}}
+        def camera(**changes):
+            return {"camera": {**LOOK, **changes}}
         wrong = (
             (b"{", TEXT, POLICY), (b"[1]", TEXT, POLICY), (b"{}", TEXT, POLICY),
             (b'{"shown": 1, "key": true}', TEXT, POLICY), (b'{"shown": 0}', TEXT, POLICY), (b'{"shown": 1e9}', TEXT, POLICY),
@@ -193,9 +193,9 @@ class Web(Case):
             (b'{"compare": true}', TEXT, POLICY), (b'{"compare": 4294967296}', TEXT, POLICY),
             ({"show": {**SHOW, "width": 100000}}, TEXT, POLICY), ({"show": {**SHOW, "width": -1}}, TEXT, POLICY),
             ({"show": {**SHOW, "tracer": "x"}}, TEXT, POLICY), ({"show": {**SHOW, "more": 1}}, TEXT, POLICY),
-            (look(eye=LOOK["at"]), TEXT, POLICY), (look(eye=[1, 2]), TEXT, POLICY), (look(up=[0, 0, 0]), TEXT, POLICY),
-            (look(eye=[1e300, 0, 0]), TEXT, POLICY), (look(fov=0), TEXT, POLICY), (look(time=1e9), TEXT, POLICY),
-            (look(id=-1), TEXT, POLICY), (b'{"look": {"fov": NaN}}', TEXT, POLICY),
+            (camera(eye=LOOK["at"]), TEXT, POLICY), (camera(eye=[1, 2]), TEXT, POLICY), (camera(up=[0, 0, 0]), TEXT, POLICY),
+            (camera(eye=[1e300, 0, 0]), TEXT, POLICY), (camera(fov=0), TEXT, POLICY), (camera(time=1e9), TEXT, POLICY),
+            (camera(id=-1), TEXT, POLICY), (b'{"camera": {"fov": NaN}}', TEXT, POLICY),
             ({"list": {"kind": "mesh", "match": ""}}, TEXT, POLICY), ({"list": {"kind": "node", "match": "x" * 200}}, TEXT, POLICY),
             ({"read": {"kind": "node", "id": 0}}, TEXT, POLICY), ({"undo": False}, TEXT, POLICY),
             ({"edit": {"kind": "material", "id": 1, "field": "roughness", "values": []}}, TEXT, POLICY),
@@ -222,7 +222,7 @@ class Web(Case):
 
     def test_message_may_come_in_pieces(self):
         view = self.view()
-        text = json.dumps({"look": LOOK}).encode()
+        text = json.dumps({"camera": LOOK}).encode()
         view.send(text[:20], TEXT, final=False)
         view.send(text[20:], 0)
         frame = {"id": 0}
@@ -385,7 +385,7 @@ class Edit(Case):
             self.assertTrue(told["refused"]["edit"], field)
         self.assertIn("refused", self.ask(view, {"read": {"kind": "light", "id": 4000000000}}))
         self.assertEqual(self.ask(view, {"list": {"kind": "material", "match": "no such name"}})["objects"]["list"], [])
-        view.send({"look": LOOK})
+        view.send({"camera": LOOK})
         view.frame()
 
     def test_other_link_may_not_edit(self):
@@ -479,7 +479,7 @@ class Model(Case):
         model.write_text(tile)
         with Gateway(model, "--watch", "--edit", "node.0.translate=0,0,1", environment=self.environment) as gateway:
             view, frame = self.view(gateway)
-            view.send({"look": {**LOOK, "moving": False}})
+            view.send({"camera": {**LOOK, "moving": False}})
             while frame["id"] != LOOK["id"]:
                 frame, _ = view.frame()
             camera, revision = frame["camera"], frame["revision"]
@@ -495,7 +495,7 @@ class Model(Case):
             for line in gateway.process.stderr:
                 if "tile.obj" in line and "new" not in line:
                     break
-            view.send({"look": LOOK})
+            view.send({"camera": LOOK})
             self.assertEqual(view.frame()[0]["revision"], revision, "what cannot be read leaves the view as it is")
 
     def described(self, view):

@@ -76,7 +76,7 @@ class Viewport:
                "clamp": settings.clamp_of(chosen), "denoise": chosen.denoise, "format": PixelFormat.RGBA16F, "moving_rate": 10}
         self._wanted = job, camera
         if self._view is not None and job == self._asked and camera != self._camera:
-            self._view.look(camera)
+            self._view.set_camera(camera)
             self._camera = camera
         if self._pixels is not None:
             height, width = self._pixels.shape[:2]

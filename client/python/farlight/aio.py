@@ -29,9 +29,9 @@ class AsyncView:
     def __init__(self, client: AsyncClient, job: Job) -> None:
         self._client, self._job, self._core = client, job, client._core
 
-    def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
-        """Moves the camera; see View.look()."""
-        number = self._core.look(self._job, command(camera, moving, time_s))
+    def set_camera(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
+        """Moves the camera; see View.set_camera()."""
+        number = self._core.set_camera(self._job, command(camera, moving, time_s))
         self._client._flush(self._core)
         return number
 

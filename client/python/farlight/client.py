@@ -78,9 +78,9 @@ class View:
     def __init__(self, client: Client, job: Job) -> None:
         self._client, self._job, self._core = client, job, client._core
 
-    def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
+    def set_camera(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
         """Moves the camera; returns the number that frames carry as begin.command. moving: more cameras will follow soon."""
-        number = self._core.look(self._job, command(camera, moving, time_s))
+        number = self._core.set_camera(self._job, command(camera, moving, time_s))
         self._client._flush()
         return number
 

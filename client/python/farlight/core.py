@@ -298,7 +298,7 @@ class Core(Connection):
         render.credit = FRAMES_AHEAD
         return (yield from self._render_of(scene, render))
 
-    def look(self, job: Job, camera: messages.ViewCamera) -> int:
+    def set_camera(self, job: Job, camera: messages.ViewCamera) -> int:
         """Moves a view's camera; returns the number that frames carry."""
         if self.failure is not None:
             raise self.failure

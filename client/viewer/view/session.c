@@ -424,12 +424,12 @@ bool session_show(struct session *session, const struct message_render *options,
     return session->view || fail(session, &error, &ignored);
 }
 
-bool session_look(struct session *session, const struct fl_view_camera *camera, uint64_t *command)
+bool session_set_camera(struct session *session, const struct fl_view_camera *camera, uint64_t *command)
 {
     struct fl_error error = {0}, ignored;
     if (!session->view)
         return false;
-    return fl_view_look(session->view, camera, command, &error) || fail(session, &error, &ignored);
+    return fl_view_set_camera(session->view, camera, command, &error) || fail(session, &error, &ignored);
 }
 
 void session_want_key_frame(struct session *session)

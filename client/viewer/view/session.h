@@ -65,7 +65,7 @@ bool session_is_local(const struct session *session);
 bool session_can_h264(const struct session *session);
 /* Shows the picture with these options. *change is the number of its frames in fl_frame.change. */
 bool session_show(struct session *session, const struct message_render *options, uint64_t *change);
-bool session_look(struct session *session, const struct fl_view_camera *camera, uint64_t *command);
+bool session_set_camera(struct session *session, const struct fl_view_camera *camera, uint64_t *command);
 void session_want_key_frame(struct session *session);
 void session_deliver_parts(struct session *session, bool deliver); /* see fl_view_deliver_parts */
 /* The next frame; NULL: none within the time, or *refusal (code not NONE) says that the view or its last change

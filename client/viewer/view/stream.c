@@ -96,7 +96,7 @@ static void send_camera(struct view *view, bool moving, uint64_t now_ns)
     view_aim(view, moving, now_ns, &aimed);
     camera_export(&aimed, &camera);
     camera.node = view_follows(view) ? view->eye.followed : 0;
-    if (!session_look(view->session, &camera, &view->sent.command))
+    if (!session_set_camera(view->session, &camera, &view->sent.command))
         return;
     view->sent.must_send_camera = false;
     view->sent.has_sent_camera = true;

@@ -60,7 +60,7 @@ function sendCamera(moving) {
   forgetErrors();
   id += 1;
   const { eye, at, up, fov } = from;
-  const isSent = send({ look: { id, eye, at, up, fov, time, moving, node: camera ? 0 : node || 0 } });
+  const isSent = send({ camera: { id, eye, at, up, fov, time, moving, node: camera ? 0 : node || 0 } });
   if (isSent && movedAt) inputs.set(id, movedAt);
 }
 

@@ -48,11 +48,11 @@ TEST(an_edit_waits_until_it_is_taken_and_no_other_takes_its_place)
 TEST(a_newer_camera_takes_the_place_of_one_that_waits)
 {
     struct web_inbox inbox = {0};
-    struct web_request look = {.kind = WEB_LOOK, .id = 1};
-    assert_true(web_inbox_put(&inbox, &look, false));
-    look.id = 2;
-    assert_true(web_inbox_put(&inbox, &look, false));
-    assert_int_equal(web_inbox_take(&inbox.look, true).id, 2);
+    struct web_request camera = {.kind = WEB_CAMERA, .id = 1};
+    assert_true(web_inbox_put(&inbox, &camera, false));
+    camera.id = 2;
+    assert_true(web_inbox_put(&inbox, &camera, false));
+    assert_int_equal(web_inbox_take(&inbox.camera, true).id, 2);
 }
 
 TEST(a_request_without_a_kind_undoes_nothing)

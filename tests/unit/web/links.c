@@ -20,19 +20,19 @@ TEST(each_token_gives_its_right)
     struct web_links links;
     enum web_right right = WEB_RIGHT_COUNT;
     assert_true(web_links_make(&links, true));
-    assert_int_equal(strlen(links.tokens[WEB_LOOKS]), WEB_TOKEN_LENGTH);
-    assert_string_not_equal(links.tokens[WEB_LOOKS], links.tokens[WEB_EDITS]);
-    assert_string_equal(find(&links, links.tokens[WEB_LOOKS], "/page.js", &right), "page.js");
-    assert_int_equal(right, WEB_LOOKS);
+    assert_int_equal(strlen(links.tokens[WEB_READS]), WEB_TOKEN_LENGTH);
+    assert_string_not_equal(links.tokens[WEB_READS], links.tokens[WEB_EDITS]);
+    assert_string_equal(find(&links, links.tokens[WEB_READS], "/page.js", &right), "page.js");
+    assert_int_equal(right, WEB_READS);
     assert_string_equal(find(&links, links.tokens[WEB_EDITS], "/", &right), "");
     assert_int_equal(right, WEB_EDITS);
-    assert_null(find(&links, links.tokens[WEB_LOOKS], "", &right));
-    assert_null(find(&links, links.tokens[WEB_LOOKS], "x/", &right));
-    assert_null(find(&links, links.tokens[WEB_LOOKS] + 1, "/", &right));
-    links.tokens[WEB_LOOKS][0] ^= 1;
+    assert_null(find(&links, links.tokens[WEB_READS], "", &right));
+    assert_null(find(&links, links.tokens[WEB_READS], "x/", &right));
+    assert_null(find(&links, links.tokens[WEB_READS] + 1, "/", &right));
+    links.tokens[WEB_READS][0] ^= 1;
     char other[sizeof(links.tokens[0])];
-    memcpy(other, links.tokens[WEB_LOOKS], sizeof(other));
-    links.tokens[WEB_LOOKS][0] ^= 1;
+    memcpy(other, links.tokens[WEB_READS], sizeof(other));
+    links.tokens[WEB_READS][0] ^= 1;
     assert_null(find(&links, other, "/", &right));
     web_links_forget(&links);
 }
@@ -43,8 +43,8 @@ TEST(no_token_edits_unless_that_is_allowed)
     enum web_right right = WEB_RIGHT_COUNT;
     assert_true(web_links_make(&links, false));
     assert_null(find(&links, links.tokens[WEB_EDITS], "/", &right));
-    assert_non_null(find(&links, links.tokens[WEB_LOOKS], "/", &right));
-    assert_int_equal(right, WEB_LOOKS);
+    assert_non_null(find(&links, links.tokens[WEB_READS], "/", &right));
+    assert_int_equal(right, WEB_READS);
 }
 
 TEST(an_address_has_so_many_connections_and_others_have_theirs)
