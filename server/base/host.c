@@ -29,7 +29,7 @@ uint64_t host_memory_bytes(void)
     return group_bytes < bytes ? group_bytes : bytes;
 }
 
-void host_thread_gives_way(void)
+void host_thread_lower_priority(void)
 {
     setpriority(PRIO_PROCESS, 0, NICENESS);
 }

@@ -18,7 +18,7 @@ uint64_t host_memory_bytes(void);
 
 /* Lowers the priority of the calling thread, and of those that it starts later, so that frames have priority. On
  * Linux each thread has a priority of its own. */
-void host_thread_gives_way(void);
+void host_thread_lower_priority(void);
 
 /* Finds the threads of this process with this in their names, at most `max`; 0: there is none, or the system
  * does not list them. */

@@ -26,7 +26,7 @@ static void *work_off(void *argument)
         if (i >= parallel->count)
             return NULL;
         parallel->work(parallel->context, i);
-        progress_tell();
+        progress_report();
     }
 }
 

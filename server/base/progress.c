@@ -6,12 +6,12 @@
 
 static atomic_uint_fast64_t told;
 
-void progress_tell(void)
+void progress_report(void)
 {
     atomic_fetch_add_explicit(&told, 1, memory_order_relaxed);
 }
 
-uint64_t progress_told(void)
+uint64_t progress_reports(void)
 {
     return atomic_load_explicit(&told, memory_order_relaxed);
 }

@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 /* Reports progress. Call it from time to time, on any thread. */
-void progress_tell(void);
+void progress_report(void);
 /* Number of reports so far, by all threads of the process. */
-uint64_t progress_told(void);
+uint64_t progress_reports(void);
 
 #endif

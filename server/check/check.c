@@ -12,7 +12,7 @@
 
 #define WRITTEN_BYTES ((size_t)64 << 20)
 
-static void tell(struct check_report *report, const char *check, const char *name, const char *text)
+static void add_line(struct check_report *report, const char *check, const char *name, const char *text)
 {
     check_report_row(report, &(struct check_row){.verdict = CHECK_NOTE, .check = check, .name = name}, "%s", text);
 }
@@ -22,16 +22,17 @@ static void report_facts(struct check_report *report, const struct gpu_device *d
     const struct gpu_facts *facts = &device->facts;
     check_report_row(report, &(struct check_row){.verdict = CHECK_OK, .check = "device", .name = "is opened"},
                      "number %d, OpenGL 4.5 core over EGL without a window system", device->info.index);
-    tell(report, "device", "renderer", device->info.name);
-    tell(report, "device", "vendor", device->info.vendor);
-    tell(report, "device", "version", device->info.version);
-    tell(report, "device", "kind", device->info.software ? "software: measures say nothing of a GPU" : "hardware");
-    tell(report, "extension", "loss of the context",
-         facts->robust ? "is told" : "is not told: a reset ends the daemon or hangs it");
-    tell(report, "extension", "binaries of programs",
-         facts->has_program_binary ? "are kept between starts" : "there are none: each start compiles");
-    tell(report, "extension", "time stamps",
-         facts->time_stamp_bits ? "are there" : "there are none: steps on the device have no measured length");
+    add_line(report, "device", "renderer", device->info.name);
+    add_line(report, "device", "vendor", device->info.vendor);
+    add_line(report, "device", "version", device->info.version);
+    add_line(report, "device", "kind",
+             device->info.software ? "software: measures say nothing of a GPU" : "hardware");
+    add_line(report, "extension", "loss of the context",
+             facts->robust ? "is told" : "is not told: a reset ends the daemon or hangs it");
+    add_line(report, "extension", "binaries of programs",
+             facts->has_program_binary ? "are kept between starts" : "there are none: each start compiles");
+    add_line(report, "extension", "time stamps",
+             facts->time_stamp_bits ? "are there" : "there are none: steps on the device have no measured length");
 }
 
 static void report_limits(struct check_report *report, const struct gpu_device *device)

@@ -60,11 +60,11 @@ static double rate_factor(unsigned quality)
 }
 
 /* Sets the rate, which the encoder reads before each picture. */
-static void set_rate(struct encoder_stream *stream, const struct encoder_wish *wish)
+static void set_rate(struct encoder_stream *stream, const struct encoder_request *request)
 {
     AVCodecContext *codec = stream->codec;
     uint64_t maximum = (uint64_t)stream->width * stream->height * BYTES_PER_PIXEL_UNLIMITED;
-    uint64_t bytes = wish->bytes && wish->bytes < maximum ? wish->bytes : maximum;
+    uint64_t bytes = request->bytes && request->bytes < maximum ? request->bytes : maximum;
     double bits = 8.0 * (double)(bytes < BYTES_MIN ? BYTES_MIN : bytes);
     double bits_per_second = bits * stream->rate_numerator / RATE_DENOMINATOR;
     codec->rc_buffer_size = (int)fmin(bits, (double)BITS_MAX);
@@ -72,7 +72,7 @@ static void set_rate(struct encoder_stream *stream, const struct encoder_wish *w
     if (stream->which == CODEC_NVENC)
         codec->bit_rate = codec->rc_max_rate;
     else
-        stream->av->av_opt_set_double(codec->priv_data, "crf", rate_factor(wish->quality), 0);
+        stream->av->av_opt_set_double(codec->priv_data, "crf", rate_factor(request->quality), 0);
 }
 
 static void describe_pictures(struct encoder_stream *stream)
@@ -131,7 +131,7 @@ static enum outcome outcome_of(int status)
 }
 
 static enum outcome open_codec(struct encoder_stream *stream, const AVCodec *codec,
-                               const struct encoder_wish *wish)
+                               const struct encoder_request *request)
 {
     AVDictionary *options = NULL;
     stream->codec = stream->av->avcodec_alloc_context3(codec);
@@ -139,7 +139,7 @@ static enum outcome open_codec(struct encoder_stream *stream, const AVCodec *cod
         return OUTCOME_NO_MEMORY;
     describe_pictures(stream);
     set_latency(stream, &options);
-    set_rate(stream, wish);
+    set_rate(stream, request);
     int status = stream->av->avcodec_open2(stream->codec, codec, &options);
     stream->av->av_dict_free(&options);
     return outcome_of(status);
@@ -159,7 +159,7 @@ static enum outcome open_frame(struct encoder_stream *stream)
 }
 
 static bool stream_open(struct encoder_stream *stream, const struct picture *picture,
-                        const struct encoder_wish *wish)
+                        const struct encoder_request *request)
 {
     stream->width = picture->width;
     stream->height = picture->height;
@@ -169,7 +169,7 @@ static bool stream_open(struct encoder_stream *stream, const struct picture *pic
         if (!codec || atomic_load(&codec_fails[which]))
             continue;
         stream->which = which;
-        enum outcome outcome = open_codec(stream, codec, wish);
+        enum outcome outcome = open_codec(stream, codec, request);
         if (outcome == OUTCOME_DONE)
             outcome = open_frame(stream);
         if (outcome == OUTCOME_DONE)
@@ -224,13 +224,13 @@ static bool fill_frame(struct encoder_stream *stream, const struct picture *pict
 
 /* Encodes one picture into one packet. */
 static enum outcome encode_picture(struct encoder_stream *stream, const struct picture *picture,
-                                   const struct encoder_wish *wish, struct encoded_picture *out)
+                                   const struct encoder_request *request, struct encoded_picture *out)
 {
     if (!fill_frame(stream, picture))
         return OUTCOME_NO_MEMORY;
-    set_rate(stream, wish);
+    set_rate(stream, request);
     stream->frame->pts = stream->next_picture++;
-    stream->frame->pict_type = wish->key_frame ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
+    stream->frame->pict_type = request->key_frame ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
     int status = stream->av->avcodec_send_frame(stream->codec, stream->frame);
     if (status >= 0)
         status = stream->av->avcodec_receive_packet(stream->codec, stream->packet);
@@ -247,7 +247,7 @@ static enum outcome encode_picture(struct encoder_stream *stream, const struct p
 }
 
 bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *picture,
-                           const struct encoder_wish *wish, struct encoded_picture *out, struct error *error)
+                           const struct encoder_request *request, struct encoded_picture *out, struct error *error)
 {
     *out = (struct encoded_picture){0};
     bool is_open = stream->codec && stream->width == picture->width && stream->height == picture->height;
@@ -260,11 +260,11 @@ bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *
     for (;;) {
         if (!is_open) {
             stream_close(stream);
-            if (!stream_open(stream, picture, wish))
+            if (!stream_open(stream, picture, request))
                 return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no encoder of H.264 opens for %ux%u",
                                  picture->width, picture->height);
         }
-        enum outcome outcome = encode_picture(stream, picture, wish, out);
+        enum outcome outcome = encode_picture(stream, picture, request, out);
         if (outcome == OUTCOME_DONE)
             return true;
         enum codec which = stream->which;

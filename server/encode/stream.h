@@ -9,7 +9,7 @@
 struct encoder_stream;
 
 /* Parameters of a picture. */
-struct encoder_wish {
+struct encoder_request {
     unsigned quality; /* 1 .. 100, as for JPEG */
     uint64_t bytes;   /* target size; 0: as many as the quality needs */
     bool key_frame;   /* decodable without earlier pictures; the first picture always is */
@@ -29,7 +29,8 @@ struct encoder_stream *encoder_stream_create(enum encoding encoding, float frame
 /* Encodes RGBA8, or the planes that encoder_takes() names. Each picture is returned at once. A picture of
  * another size than the one before is a key frame. */
 bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *picture,
-                           const struct encoder_wish *wish, struct encoded_picture *out, struct error *error);
+                           const struct encoder_request *request, struct encoded_picture *out,
+                           struct error *error);
 void encoder_stream_destroy(struct encoder_stream *stream); /* accepts NULL */
 
 #endif

@@ -80,14 +80,14 @@ static void carry_out(struct aside_commit *commit)
     engine_command_release_edits(command);
     commit->start_ns = start_ns;
     commit->duration_ns = clock_now_ns() - start_ns;
-    progress_tell();
+    progress_report();
 }
 
 static void *run_thread(void *context)
 {
     struct aside *aside = context;
     pthread_setname_np(pthread_self(), "commit");
-    host_thread_gives_way();
+    host_thread_lower_priority();
     pthread_mutex_lock(&aside->lock);
     const unsigned self = aside->numbered++;
     while (!aside->closed) {

@@ -131,11 +131,11 @@ static bool encode_in_stream(struct encode_lane *lane, const struct picture *pic
                              struct error *error)
 {
     struct encoded_picture encoded;
-    const struct encoder_wish wish = {
+    const struct encoder_request request = {
         .quality = frame->quality, .bytes = frame->wanted_bytes, .key_frame = frame->wants_key};
     if (!lane->stream)
         lane->stream = encoder_stream_create(frame->encoding, lane->frames_per_second, error);
-    if (!lane->stream || !encoder_stream_encode(lane->stream, picture, &wish, &encoded, error))
+    if (!lane->stream || !encoder_stream_encode(lane->stream, picture, &request, &encoded, error))
         return false;
     frame->bytes = encoded.bytes;
     frame->size_bytes = encoded.size_bytes;

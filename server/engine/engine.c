@@ -360,6 +360,6 @@ void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_
 bool engine_is_alive(const struct engine *engine, uint64_t *turns)
 {
     uint64_t before = *turns;
-    *turns = atomic_load(&engine->turns) + progress_told();
+    *turns = atomic_load(&engine->turns) + progress_reports();
     return atomic_load(&engine->waits) || *turns != before;
 }

@@ -65,7 +65,7 @@ static void *run_thread(void *context)
 {
     struct keep *keep = context;
     pthread_setname_np(pthread_self(), "keep");
-    host_thread_gives_way();
+    host_thread_lower_priority();
     pthread_mutex_lock(&keep->lock);
     for (struct order *order; (order = take_first(keep)) || !keep->closed;) {
         if (!order) {

@@ -84,7 +84,7 @@ static void mark_ready(struct scheduler *scheduler, const struct schedule_entry 
         group_add(&scheduler->clients, scheduler, &entries[i].client->share);
 }
 
-static bool entry_goes_before(const struct schedule_entry *a, const struct schedule_entry *b)
+static bool entry_precedes(const struct schedule_entry *a, const struct schedule_entry *b)
 {
     return a->client != b->client ? goes_before(&a->client->share, &b->client->share)
                                   : goes_before(a->job, b->job);
@@ -102,7 +102,7 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
         group_advance(&entry->client->jobs);
         share_settle(&entry->client->share, scheduler, &scheduler->clients);
         share_settle(entry->job, scheduler, &entry->client->jobs);
-        if (entry->ready && (best == SCHEDULE_NONE || entry_goes_before(entry, &entries[best])))
+        if (entry->ready && (best == SCHEDULE_NONE || entry_precedes(entry, &entries[best])))
             best = i;
     }
     scheduler->turn_ns = 0;

@@ -152,7 +152,7 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
     wait_for_clear(device, buffer);
     if (size_bytes)
         glNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
-    progress_tell();
+    progress_report();
 }
 
 /* A copy in memory of the host; 0: there is no memory for it. A driver may move a buffer that is read directly

@@ -389,7 +389,7 @@ bool gpu_reserve_end(struct gpu_device *device)
     return put_off;
 }
 
-bool gpu_reserve_goes_on(struct gpu_device *device, struct error *error)
+bool gpu_reserve_in_time(struct gpu_device *device, struct error *error)
 {
     if (!device->reserve_until_ns)
         return true;
@@ -403,7 +403,7 @@ bool gpu_reserve_memory(struct gpu_device *device, size_t bytes, const char *wha
 {
     if (!gpu_memory_take(device, bytes, what, error))
         return false;
-    if (gpu_reserve_goes_on(device, error))
+    if (gpu_reserve_in_time(device, error))
         return true;
     gpu_memory_give(device, bytes);
     return false;

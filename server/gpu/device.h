@@ -161,7 +161,7 @@ void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns);
 bool gpu_reserve_end(struct gpu_device *device);
 /* Called before a reservation on the device or the host, or other work of milliseconds for it. False:
  * postponed. */
-bool gpu_reserve_goes_on(struct gpu_device *device, struct error *error);
+bool gpu_reserve_in_time(struct gpu_device *device, struct error *error);
 /* Takes memory of the device, unless that is postponed or too little is left. */
 bool gpu_reserve_memory(struct gpu_device *device, size_t bytes, const char *what, struct error *error);
 

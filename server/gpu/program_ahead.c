@@ -124,7 +124,7 @@ static void *run(void *context)
     struct gpu_ahead *ahead = worker->ahead;
     struct gpu_egl beside;
     pthread_setname_np(pthread_self(), "compile");
-    host_thread_gives_way(); /* builds go first; a program that is waited for takes no time here */
+    host_thread_lower_priority(); /* builds go first; a program that is waited for takes no time here */
     const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
     if (opened) {
         compile_items(ahead, worker->stands_in);

@@ -97,7 +97,7 @@ bool gpu_build_end(struct gpu_build *build, unsigned program, struct error *erro
     GLint linked = GL_FALSE;
     bool compiled = true;
     glGetProgramiv(program, GL_LINK_STATUS, &linked);
-    progress_tell();
+    progress_report();
     for (unsigned i = 0; i < build->stage_count; i++) {
         struct gpu_stage *stage = &build->stages[i];
         compiled = linked || (compiled && stage_compiled(stage, error));

@@ -50,7 +50,7 @@ static void write_all(struct packing *packing)
 static void *run_thread(void *context)
 {
     struct packing *packing = context;
-    host_thread_gives_way();
+    host_thread_lower_priority();
     write_all(packing);
     pthread_mutex_lock(&packing->lock);
     packing->has_ended = true;

@@ -129,7 +129,7 @@ void greeting_refuse_key(struct connection *connection)
     refuse_link(connection);
 }
 
-static void go_on_with_seal(struct connection *connection)
+static void continue_with_seal(struct connection *connection)
 {
     struct decode_error error = {0};
     switch (sealed_link_handshake(connection->link, &error)) {
@@ -208,7 +208,7 @@ void greeting_process(struct connection *connection)
     if (is_sealed && !connection->link && connection->seal_due_ns <= clock_now_ns())
         begin_seal(connection);
     if (connection->state == CONNECTION_HELLO && connection->link && !sealed_is_open(connection->link->sealed))
-        go_on_with_seal(connection);
+        continue_with_seal(connection);
     if (connection->state == CONNECTION_HELLO &&
         (!is_sealed || (connection->link && sealed_is_open(connection->link->sealed))))
         answer_hello(connection);

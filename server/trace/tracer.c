@@ -117,11 +117,11 @@ uint64_t tracer_device_bytes(const struct tracer *tracer)
     return tracer->stats.device_bytes + (tracer->state ? trace_state_device_bytes(tracer->state) : 0);
 }
 
-void tracer_tell(const struct tracer *tracer, struct structure_rows *rows)
+void tracer_report(const struct tracer *tracer, struct structure_rows *rows)
 {
     *rows = (struct structure_rows){0};
-    if (tracer->impl->tell)
-        tracer->impl->tell(tracer, rows);
+    if (tracer->impl->report)
+        tracer->impl->report(tracer, rows);
 }
 
 /* Resets the stats of the last update. */

@@ -139,7 +139,7 @@ struct tracer_impl {
      * always one step. */
     void (*abandon)(struct tracer *tracer);
     /* Adds rows that describe the structure after the last update, at most STRUCTURE_ROWS_MAX. NULL: none. */
-    void (*tell)(const struct tracer *tracer, struct structure_rows *rows);
+    void (*report)(const struct tracer *tracer, struct structure_rows *rows);
     /* Whether the next step of the update would only wait for threads of the tracer's own. NULL: never. */
     bool (*waits)(struct tracer *tracer);
 
@@ -154,7 +154,7 @@ struct tracer_impl {
     /* Describe the waves since the reset, of which there is at least one: the first begins to copy the device's
      * counts, the second adds rows from the copy, and waits for no more than that. Both NULL: none. */
     bool (*state_copy_counts)(struct trace_state *state, struct error *error);
-    bool (*state_tell)(struct trace_state *state, struct structure_rows *rows, struct error *error);
+    bool (*state_report)(struct trace_state *state, struct structure_rows *rows, struct error *error);
     /* Begins state->wave: decides what holds for the whole wave. NULL: nothing to do. */
     bool (*trace_begin)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                         struct error *error);
@@ -234,7 +234,7 @@ void tracer_update_abandon(struct tracer *tracer);
 bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct tracer_update *update,
                    struct error *error);
 /* Adds rows that describe the structure after the last update. */
-void tracer_tell(const struct tracer *tracer, struct structure_rows *rows);
+void tracer_report(const struct tracer *tracer, struct structure_rows *rows);
 
 /* ---- tracing, resumable ---- */
 
@@ -262,7 +262,7 @@ enum tracer_progress tracer_trace_step(struct tracer *tracer, struct gpu_scene *
 /* Begins to copy the counts of the waves since the reset. */
 bool trace_state_copy_counts(struct trace_state *state, struct error *error);
 /* Adds rows from the copied counts. It does not wait where the host has waited for a later command. */
-bool trace_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error);
+bool trace_state_report(struct trace_state *state, struct structure_rows *rows, struct error *error);
 
 /* Intersects the rays of a wave with one layer of a structure that is a picture of a view
  * (tracer_impl.layer_hits). The scene's buffers are bound. */

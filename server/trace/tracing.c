@@ -64,9 +64,9 @@ bool trace_state_copy_counts(struct trace_state *state, struct error *error)
     return !state->impl->state_copy_counts || !state->has_traced || state->impl->state_copy_counts(state, error);
 }
 
-bool trace_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error)
+bool trace_state_report(struct trace_state *state, struct structure_rows *rows, struct error *error)
 {
-    return !state->impl->state_tell || !state->has_traced || state->impl->state_tell(state, rows, error);
+    return !state->impl->state_report || !state->has_traced || state->impl->state_report(state, rows, error);
 }
 
 /* ---- checks ---- */

@@ -95,10 +95,10 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
     float end = found.end + BESIDE_BEHIND / w.ray.scale;
     end = end < limit ? end : limit;
     line_intersection own;
-    bool is_own = true, passes = false, is_hit = false, goes_on = true;
+    bool is_own = true, passes = false, is_hit = false, continues = true;
     // The loop breaks inside and not by its condition at the end: with that, llvmpipe let rays that had left the loop run
     // on with their neighbours.
-    while (goes_on) {
+    while (continues) {
         line_intersection c = intersect_line_triangle(o, d, id - drawn.y);
         if (is_own)
             own = c;
@@ -110,7 +110,7 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
             found.end = c.distance;
             found.sample_index = index;
         }
-        goes_on = !is_hit && !(is_own && is_inside) && next_beside(b, index, id);
+        continues = !is_hit && !(is_own && is_inside) && next_beside(b, index, id);
         is_own = false;
     }
 #ifdef ANY_HIT
@@ -132,13 +132,13 @@ void search_voxels(trace_ray r, inout voxel_traversal w, inout abuffer_found fou
         found_voxel here = next_voxel(w);
 #ifdef OFFERS_LATER
         found.met.first = 0;
-        bool goes_on = here.what != 0u;
-        while (goes_on) {
+        bool continues = here.what != 0u;
+        while (continues) {
             found.met.count = 0;
             search_planes(r, w, found, here);
             offer_met(r, w, found);
             found.met.first += MET_MAX;
-            goes_on = found.met.count > found.met.first;
+            continues = found.met.count > found.met.first;
         }
 #else
         if (here.what != 0u)
@@ -177,14 +177,14 @@ void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found f
 {
     float s_end = w.s_end, s_limit = w.s_limit;
     abuffer_found nothing = found;
-    bool goes_on;
+    bool continues;
     int passes = 0;
     w.beyond = BEYOND_FIRST;
     do {
         search_voxels(r, w, found);
         float s = w.s_limit;
-        goes_on = found.sample_index >= 0 && !is_verified(r, w, nothing.end, found) && ++passes < PASSES_MAX;
-        if (goes_on) {
+        continues = found.sample_index >= 0 && !is_verified(r, w, nothing.end, found) && ++passes < PASSES_MAX;
+        if (continues) {
             // A plane extended beyond its texel may have hidden the plane of the next texel at the same point.
             w.s_behind = found.is_within ? s + AGAIN : w.s_behind;
             w.beyond = found.is_within ? BEYOND_FIRST : ABUFFER_SLACK;
@@ -194,7 +194,7 @@ void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found f
             enter(w);
             found = nothing;
         }
-    } while (goes_on);
+    } while (continues);
 #ifdef ANY_HIT
     found.optical_depth = found.sample_index >= 0 ? vec3(OPTICAL_DEPTH_MAX) : found.optical_depth;
 #endif

@@ -58,10 +58,10 @@ void search_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found fou
     float s = max(here.s_in, march.s_least), s_end = min(here.s_out, w.s_limit);
     ivec2 texel = texel_of(o.xy + s * d.xy), forward = ivec2(greaterThan(d.xy, vec2(0.0)));
     vec2 inverse = 1.0 / d.xy, border = (vec2(texel + forward) - o.xy) * inverse;
-    bool goes_on = s < s_end;
-    if (goes_on && !march.is_known)
+    bool continues = s < s_end;
+    if (continues && !march.is_known)
         march = parity_march(true, is_inside(axis, texel, o + s * d), march.s_least);
-    while (goes_on) {
+    while (continues) {
         bool along_u = border.x < border.y;
         float s_next = along_u ? border.x : border.y, s_out = min(s_next, s_end);
         bool now = is_inside(axis, texel, o + s_out * d);
@@ -70,7 +70,7 @@ void search_parity(trace_ray r, inout voxel_traversal w, inout abuffer_found fou
         march.is_inside = now;
         s = s_next;
         texel += along_u ? ivec2(2 * forward.x - 1, 0) : ivec2(0, 2 * forward.y - 1);
-        goes_on = s < s_end && s < w.s_limit && all(lessThan(uvec2(texel), uvec2(abuffer_resolution)));
+        continues = s < s_end && s < w.s_limit && all(lessThan(uvec2(texel), uvec2(abuffer_resolution)));
         border = (vec2(texel + forward) - o.xy) * inverse;
     }
 }

@@ -42,7 +42,7 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
     vec2 inverse = 1.0 / d.xy;
     vec2 border = (vec2(texel + forward) - o.xy) * inverse;
     float s = s_in;
-    bool any_intersected = false, goes_on;
+    bool any_intersected = false, continues;
     do {
         bool along_u = border.x < border.y;
         float s_next = along_u ? border.x : border.y;
@@ -74,12 +74,12 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
                 any_intersected = true;
             }
         } while (c.next < c.end && !is_behind);
-        goes_on = s_next < s_out && s_next < w.s_limit;
+        continues = s_next < s_out && s_next < w.s_limit;
         s = s_next;
         texel += along_u ? ivec2(2 * forward.x - 1, 0) : ivec2(0, 2 * forward.y - 1);
-        goes_on = goes_on && all(lessThan(uvec2(texel), uvec2(abuffer_resolution)));
+        continues = continues && all(lessThan(uvec2(texel), uvec2(abuffer_resolution)));
         border = (vec2(texel + forward) - o.xy) * inverse;
-    } while (goes_on);
+    } while (continues);
     return any_intersected;
 }
 

@@ -267,7 +267,7 @@ uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance insi
 }
 
 #ifdef ASK_MATERIALS
-void settle_and_go_on(inout tree_traversal traversal, inout noted_primitive noted, inout trace_ray r[PACKET_RAYS],
+void settle_and_continue(inout tree_traversal traversal, inout noted_primitive noted, inout trace_ray r[PACKET_RAYS],
                       inout answer found[PACKET_RAYS])
 {
     settle(noted, r, found);
@@ -411,7 +411,7 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], int leading, inout answer foun
     noted.bits = 0u;
 #ifdef ASK_MATERIALS
     while (traverse_instances(traversal, world_traversal, b, world_bundle, leading, inside, o, rays, r, found, noted))
-        settle_and_go_on(traversal, noted, r, found);
+        settle_and_continue(traversal, noted, r, found);
 #else
     traverse_instances(traversal, world_traversal, b, world_bundle, leading, inside, o, rays, r, found, noted);
 #endif

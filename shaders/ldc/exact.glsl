@@ -113,7 +113,7 @@ bool settle(trace_ray r, cell_traversal w, float limit, inout ldc_found found)
 
 // Continues from a rejected intersection up to s_end. A plane extended beyond its texel may have hidden the plane of the
 // next texel at the same point.
-void go_on(inout cell_traversal w, float s, float s_end)
+void advance(inout cell_traversal w, float s, float s_end)
 {
     w.beside_max = w.is_within ? LDC_BEYOND : LDC_SLACK;
     s = w.is_within ? s + AGAIN : s - AGAIN;

@@ -67,15 +67,15 @@ void traverse(trace_ray r, inout answer a)
         float s_end = w.s_end, s_limit = w.s_limit;
         found.sample_index = HIT_NO_PRIMITIVE;
         w.beside_max = LDC_BEYOND;
-        bool goes_on = w.s < w.s_end;
-        for (int tries = 0; goes_on; tries++) {
+        bool continues = w.s < w.s_end;
+        for (int tries = 0; continues; tries++) {
             traverse_cube(w, found);
             float s = w.s_limit;
-            goes_on = found.sample_index != HIT_NO_PRIMITIVE && !settle(r, w, before.end, found) && tries < TRIES_MAX;
-            if (goes_on) {
+            continues = found.sample_index != HIT_NO_PRIMITIVE && !settle(r, w, before.end, found) && tries < TRIES_MAX;
+            if (continues) {
                 found = ldc_found(before.end, HIT_NO_PRIMITIVE);
                 w.s_limit = s_limit;
-                go_on(w, s, s_end);
+                advance(w, s, s_end);
             }
         }
         if (found.sample_index == HIT_NO_PRIMITIVE)

@@ -131,8 +131,8 @@ vec4 trace_sample(vec3 eye, vec2 place, vec4 beam, out uint code)
     float w_leaves_or_ends = march.w_end;
     float w_hit = NEVER, w_unknown = NEVER, w_first = march.w;
     uint hit_layer = 0u, layers = 1u;
-    bool has_left = false, goes_on = true;
-    for (uint layer = 0u; layer < QUADTREE_LAYERS && goes_on; layer++) {
+    bool has_left = false, continues = true;
+    for (uint layer = 0u; layer < QUADTREE_LAYERS && continues; layer++) {
         layers = layer + 1u;
         trace_layer(layer, march);
         // A ray that enters the view behind the first surface has passed that beside the view.
@@ -141,8 +141,8 @@ vec4 trace_sample(vec3 eye, vec2 place, vec4 beam, out uint code)
             march.w_end = w_hit = march.w_met;
             hit_layer = layer;
         }
-        goes_on = march.w_behind > march.w_end;
-        w_unknown = goes_on ? march.w_behind : NEVER;
+        continues = march.w_behind > march.w_end;
+        w_unknown = continues ? march.w_behind : NEVER;
         march.w = march.w_behind;
         march.level = START;
         march.is_before = false;

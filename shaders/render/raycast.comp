@@ -69,10 +69,10 @@ void main()
         through = vec3(1.0 - layer_opacity);
     }
     vec3 rest = weight * through;
-    bool goes_on = max_component(rest) >= PATH_WEIGHT_MIN; // false for NaN
-    if (goes_on)
+    bool continues = max_component(rest) >= PATH_WEIGHT_MIN; // false for NaN
+    if (continues)
         add_child(j, p, s, h.distance, direction, rest, true, 0.0);
     radiance[k] = vec4(weight * opacity * (s.unlit ? s.base : lit(p, s, direction, h.distance)),
-                       goes_on ? weight.r - rest.r : weight.r);
+                       continues ? weight.r - rest.r : weight.r);
     note_children(j, true, 0u);
 }

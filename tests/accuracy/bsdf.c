@@ -32,7 +32,7 @@ static void visit_materials(struct bsdf_probe probes[2], const float *roughnesse
                         c.roughness = roughnesses[r];
                         c.anisotropy = anisotropies[a];
                         c.base = 1.0f;
-                        look_from(&c, cosines[v]);
+                        set_eye(&c, cosines[v]);
                         look_at(&probes[ward], &c, ward, seen);
                     }
 }
@@ -139,7 +139,7 @@ TEST_LONG(ggx_is_that_of_the_other_integrators)
                                       .coat = 0.5f,
                                       .coat_roughness = 0.4f,
                                       .coat_turn = 0.3f};
-                look_from(&c, cosines[v]);
+                set_eye(&c, cosines[v]);
                 struct bsdf_probe *probe = &probes[kind == 4 ? COATED : GGX];
                 bsdf_probe_run(probe, &c, false, DIRECTIONS, answers);
                 for (int i = 0; i < DIRECTIONS; i++)
@@ -195,7 +195,7 @@ TEST_LONG(layers_follow_their_density_and_keep_the_light)
                 struct bsdf_case c = layered[k].c;
                 c.roughness = roughnesses[r];
                 c.base = 1.0f;
-                look_from(&c, cosines[v]);
+                set_eye(&c, cosines[v]);
                 sum_up(&probes[layered[k].probe], &c, false, &albedos);
                 if (v == 1 && r > 0 &&
                     (c.coat <= 0.0f || c.coat_roughness > 0.0f)) /* smooth lobes have no density */

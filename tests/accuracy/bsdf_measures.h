@@ -73,7 +73,7 @@ static inline const char *case_name(const struct bsdf_case *c, bool ward)
     return name;
 }
 
-static inline void look_from(struct bsdf_case *c, double cosine)
+static inline void set_eye(struct bsdf_case *c, double cosine)
 {
     double sine = sqrt(1.0 - cosine * cosine);
     c->view[0] = (float)(sine * cos(0.7)); /* neither along the grain nor across it */

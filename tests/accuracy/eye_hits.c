@@ -171,7 +171,7 @@ static void find_eyes(struct room *room, struct tracer *tracer, struct structure
     expect_ok(tracer_eye_hits(tracer, &room->gpu, state, &eyes, &error), &error);
     gpu_buffer_read(device, &room->found, 0, room->eye_hits, sizeof(room->eye_hits));
     *rows = (struct structure_rows){0};
-    expect_ok(trace_state_copy_counts(state, &error) && trace_state_tell(state, rows, &error), &error);
+    expect_ok(trace_state_copy_counts(state, &error) && trace_state_report(state, rows, &error), &error);
     trace_state_destroy(state);
 }
 

@@ -79,7 +79,7 @@ static struct scene *scene_of_a_room(void)
 
 /* ---- rays ---- */
 
-static void look_from(struct room *room, float x, float y, float z)
+static void set_eye(struct room *room, float x, float y, float z)
 {
     room->view = (struct trace_view){
         .world_from_view = {1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z}, .fov_y = FOV, .width = SIDE, .height = SIDE};
@@ -254,7 +254,7 @@ TEST(what_stands_beside_the_view_is_not_taken_for_what_the_view_shows)
     skip_without_quadtree();
     struct scene *scene = scene_of_posts();
     room_init(room, scene);
-    look_from(room, 0, 0, 0);
+    set_eye(room, 0, 0, 0);
     room->radius = options.quadtree.radius;
     room->exact = bring_exact(room);
     struct tracer *tracer = bring(room, TRACER_QUADTREE, &options);
@@ -363,7 +363,7 @@ static void expect_seen_of(struct scene *scene, const char *name, const float pl
         eye[k] = room->gpu.lower_world[k] + place[k] * size;
         longest = fmaxf(longest, size);
     }
-    look_from(room, eye[0], eye[1], eye[2]);
+    set_eye(room, eye[0], eye[1], eye[2]);
     room->radius = radius * longest;
     room->exact = bring_exact(room);
     for (uint32_t i = 0; i < EYES; i++) {

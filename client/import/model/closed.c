@@ -152,7 +152,7 @@ struct sheets {
     bool none;
 };
 
-static void *look_for_sheets(void *context)
+static void *find_sheets(void *context)
 {
     struct sheets *sheets = context;
 
@@ -172,15 +172,14 @@ bool import_triangles_closed(const float *positions, uint32_t vertex_count, cons
         return false;
     for (size_t v = 0; v < vertex_count; v++)
         of_vertex[v] = place_of(positions + v * 3);
-    bool helped =
-        triangle_count >= TRIANGLES_SHARED && pthread_create(&helper, NULL, look_for_sheets, &sheets) == 0;
+    bool helped = triangle_count >= TRIANGLES_SHARED && pthread_create(&helper, NULL, find_sheets, &sheets) == 0;
     bool paired = edges_paired(&places);
 
     atomic_store(&sheets.stop, !paired);
     if (helped)
         pthread_join(helper, NULL);
     else if (paired)
-        look_for_sheets(&sheets);
+        find_sheets(&sheets);
     free(of_vertex);
     return paired && sheets.none;
 }

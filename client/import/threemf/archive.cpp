@@ -50,7 +50,7 @@ uLong write_nothing(void *, void *, const void *, uLong)
     return 0;
 }
 
-ZPOS64_T tell_memory(void *opaque, void *)
+ZPOS64_T report_memory(void *opaque, void *)
 {
     return static_cast<memory *>(opaque)->at;
 }
@@ -175,7 +175,7 @@ void each_model(reader &r, const unsigned char *bytes, size_t size_bytes,
                 const std::function<taker(const std::string &name, bool is_main)> &begin)
 {
     memory m = {bytes, size_bytes, 0};
-    zlib_filefunc64_def functions = {open_memory, read_memory, write_nothing, tell_memory,
+    zlib_filefunc64_def functions = {open_memory, read_memory, write_nothing, report_memory,
                                      seek_memory, do_nothing,  do_nothing,    &m};
     const std::unique_ptr<void, close_archive> zip(unzOpen2_64("", &functions));
     uint64_t left = FILES_BYTES_MAX;

@@ -34,7 +34,7 @@ static enum tracer_progress bring_key(struct frame_renderer *renderer, struct er
         return progress;
     renderer->result.uploaded_bytes += tracer->stats.uploaded_bytes;
     renderer->result.structure_bytes += tracer->stats.device_bytes;
-    tracer_tell(tracer, &renderer->result.structure);
+    tracer_report(tracer, &renderer->result.structure);
     return progress;
 }
 
@@ -49,7 +49,7 @@ static enum pass_progress build(struct frame_renderer *renderer, struct error *e
         renderer->built = true;
         renderer->result.uploaded_bytes += stats->uploaded_bytes;
         renderer->result.structure_bytes = stats->device_bytes;
-        tracer_tell(renderer->tracer, &renderer->result.structure);
+        tracer_report(renderer->tracer, &renderer->result.structure);
     }
     if (renderer->second && !renderer->second_built) {
         progress = bring(renderer, renderer->second, error);

@@ -59,8 +59,8 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     if (work->frame.comparison && !comparison_take(work->frame.comparison, &renderer->result.comparisons,
                                                    &renderer->result.comparison_count, error))
         return false;
-    if (!trace_state_tell(work->trace_state, &renderer->result.structure, error) ||
-        (frame_is_from_layers(&renderer->request) && !frame_key_tell(renderer, error)))
+    if (!trace_state_report(work->trace_state, &renderer->result.structure, error) ||
+        (frame_is_from_layers(&renderer->request) && !frame_key_report(renderer, error)))
         return false;
     context_collect(&work->device);
     stage_times_add(&work->device.times, STAGE_FRAME, CLOCK_CPU, 0, work->device.times.origin_ns,

@@ -288,12 +288,12 @@ static void warn_of_unknown(struct structure_row *row, const struct frame_reques
                                    : "choose a smaller --aperture, or --lens rays");
 }
 
-bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
+bool frame_key_report(struct frame_renderer *renderer, struct error *error)
 {
     const struct frame_request *request = &renderer->request;
     struct structure_rows *rows = &renderer->result.structure;
     uint32_t unknown = 0;
-    if (!trace_state_tell(renderer->work->key_trace_state, rows, error))
+    if (!trace_state_report(renderer->work->key_trace_state, rows, error))
         return false;
     /* A picture that had all its samples has asked for none. */
     if (renderer->work->frame.request.sampling.samples == 0)

@@ -28,6 +28,6 @@ void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_re
 /* Keeps a layer whose samples are complete, a band a step. */
 extern const struct pass keep_pass;
 /* Adds rows of the structure: what the eyes' rays were like. */
-bool frame_key_tell(struct frame_renderer *renderer, struct error *error);
+bool frame_key_report(struct frame_renderer *renderer, struct error *error);
 
 #endif

@@ -154,7 +154,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     renderer->picture.denoised = NULL;
     if (!samples_reserve(renderer, error))
         return false;
-    compact_go_on(&work->wave);
+    compact_repeat(&work->wave);
     return true;
 }
 

@@ -98,7 +98,7 @@ static bool split_slice(struct frame_renderer *renderer, struct error *error)
     renderer->result.splits++;
     if (work->frame.comparison)
         comparison_drop_slice(work->frame.comparison);
-    compact_go_on(&work->wave);
+    compact_repeat(&work->wave);
     renderer->samples_phase = SAMPLES_SLICE;
     if (slices_split(&renderer->slices, &work->wave.slice))
         return true;
@@ -132,7 +132,7 @@ static bool do_again(struct frame_renderer *renderer, const struct slice_ahead *
             renderer->waves_needed = work->wave.waves_queued;
         }
         slices_put_back(&renderer->slices, &work->wave.slice);
-        compact_go_on(&work->wave);
+        compact_repeat(&work->wave);
     }
     renderer->samples_phase = SAMPLES_SLICE;
     if (work->primary.rasterises)

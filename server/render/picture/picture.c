@@ -135,7 +135,7 @@ static bool reserve_bands(struct picture *picture, struct gpu_device *device, st
 static bool clear_bands(struct picture *picture, struct gpu_device *device, struct error *error)
 {
     for (; picture->cleared < picture->band_count * picture->plane_count; picture->cleared++) {
-        if (!gpu_reserve_goes_on(device, error))
+        if (!gpu_reserve_in_time(device, error))
             return false;
         gpu_buffer_clear(device, &picture->bands[picture->cleared], 0);
     }

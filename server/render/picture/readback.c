@@ -23,7 +23,7 @@ static size_t band_bytes(const struct picture *picture, const struct render_fram
 bool picture_reserve_pixels(struct picture *picture, const struct render_frame *frame, struct error *error)
 {
     const size_t size_bytes = (size_t)frame_request_bytes(&frame->request);
-    if (!gpu_reserve_goes_on(frame->device->gpu, error))
+    if (!gpu_reserve_in_time(frame->device->gpu, error))
         return false;
     picture->pixels = malloc(size_bytes);
     picture->size_bytes = size_bytes;

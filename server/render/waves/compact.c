@@ -30,7 +30,7 @@ void compact_begin(struct render_wave *wave)
     gpu_buffer_write(wave->device->gpu, &wave->state, 0, state, offsetof(struct wave_state, stopped));
 }
 
-void compact_go_on(struct render_wave *wave)
+void compact_repeat(struct render_wave *wave)
 {
     const uint32_t nothing = 0;
     gpu_buffer_write(wave->device->gpu, &wave->state, offsetof(struct wave_state, stopped), &nothing,

@@ -13,7 +13,7 @@ enum wave_list { WAVE_RAYS, WAVE_RAY_BLOCKS, WAVE_HITS, WAVE_HIT_BLOCKS, WAVE_SH
 /* A slice begins: sets the state of its first wave, of wave->ray_count rays. */
 void compact_begin(struct render_wave *wave);
 /* A slice that the device stopped is done again. */
-void compact_go_on(struct render_wave *wave);
+void compact_repeat(struct render_wave *wave);
 /* Dispatches an invocation of the program for each item of the list. */
 void compact_dispatch(struct render_wave *wave, const struct gpu_program *program, enum wave_list list);
 /* Lists the hits of the wave: hit_list, hit_places and hit_count. */

@@ -200,12 +200,12 @@ static void abuffer_abandon(struct tracer *tracer)
     fill_stats(abuffer);
 }
 
-static void abuffer_tell(const struct tracer *tracer, struct structure_rows *rows)
+static void abuffer_report(const struct tracer *tracer, struct structure_rows *rows)
 {
     const struct abuffer_store *store = &((const struct abuffer *)tracer)->store;
     if (store->resolution == 0)
         return;
-    axes_fit_tell(structure_number(rows, "resolution", store->resolution), store->resolution_wanted);
+    axes_fit_warn(structure_number(rows, "resolution", store->resolution), store->resolution_wanted);
     structure_metres(rows, "cell", store->cell_world);
     structure_number(rows, "samples", store->sample_count);
     structure_number(rows, "longest_list", store->depth_max);
@@ -240,7 +240,7 @@ const struct tracer_impl tracer_abuffer_impl = {
     .destroy = abuffer_destroy,
     .update = abuffer_update,
     .abandon = abuffer_abandon,
-    .tell = abuffer_tell,
+    .report = abuffer_report,
     .trace_range = abuffer_trace_range,
     .announce = abuffer_announce,
     .surfaces = abuffer_make_surfaces,

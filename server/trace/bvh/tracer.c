@@ -58,9 +58,9 @@ static void bvh_abandon(struct tracer *tracer)
     bvh_reset((struct bvh *)tracer);
 }
 
-static void bvh_tell(const struct tracer *tracer, struct structure_rows *rows)
+static void bvh_report(const struct tracer *tracer, struct structure_rows *rows)
 {
-    scene_tree_tell(&((const struct bvh *)tracer)->tree, rows);
+    scene_tree_report(&((const struct bvh *)tracer)->tree, rows);
 }
 
 static bool bvh_waits(struct tracer *tracer)
@@ -262,7 +262,7 @@ const struct tracer_impl tracer_bvh_impl = {
     .destroy = bvh_destroy,
     .update = bvh_update,
     .abandon = bvh_abandon,
-    .tell = bvh_tell,
+    .report = bvh_report,
     .waits = bvh_waits,
     .state_create = bvh_state_create,
     .state_destroy = bvh_state_destroy,

@@ -53,7 +53,7 @@ static void warn_of_uncounted_samples(const struct ldc_cube *cube, const char *n
              (unsigned long long)cube->samples_lost, name);
 }
 
-void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, struct structure_rows *rows)
+void ldc_cube_report(const struct ldc_store *store, unsigned which, bool built, struct structure_rows *rows)
 {
     static const char *const names[LDC_CUBES_MAX] = {"static", "dynamic"};
     const struct ldc_cube *cube = &store->cubes[which];
@@ -61,7 +61,7 @@ void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, st
         return;
     rows->part = which;
     rows->part_name = names[which];
-    axes_fit_tell(structure_number(rows, "resolution", cube->resolution), cube->resolution_wanted);
+    axes_fit_warn(structure_number(rows, "resolution", cube->resolution), cube->resolution_wanted);
     structure_metres(rows, "cell", cube->cell_world);
     structure_number(rows, "layers_needed", cube->layers_needed);
     struct structure_row *kept = structure_number(rows, "layers_kept", cube->layers_kept);

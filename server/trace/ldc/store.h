@@ -40,7 +40,7 @@ void ldc_store_init(struct ldc_store *store, struct gpu_device *device);
 void ldc_store_finish(struct ldc_store *store); /* leaves it empty */
 uint64_t ldc_store_bytes(const struct ldc_store *store);
 /* Adds the rows of a cube; none if its resolution is 0. */
-void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, struct structure_rows *rows);
+void ldc_cube_report(const struct ldc_store *store, unsigned which, bool built, struct structure_rows *rows);
 /* Enlarges the buffer to size_bytes and keeps its first kept_bytes. On failure all of it stays. */
 bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,
                     struct error *error);

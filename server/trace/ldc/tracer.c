@@ -245,10 +245,10 @@ static void ldc_abandon(struct tracer *tracer)
     fill_stats(ldc);
 }
 
-static void ldc_tell(const struct tracer *tracer, struct structure_rows *rows)
+static void ldc_report(const struct tracer *tracer, struct structure_rows *rows)
 {
     for (unsigned i = 0; i < LDC_CUBES_MAX; i++)
-        ldc_cube_tell(&((const struct ldc *)tracer)->store, i, tracer->stats.parts_built >> i & 1, rows);
+        ldc_cube_report(&((const struct ldc *)tracer)->store, i, tracer->stats.parts_built >> i & 1, rows);
 }
 
 static bool ldc_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
@@ -280,7 +280,7 @@ const struct tracer_impl tracer_ldc_impl = {
     .destroy = ldc_destroy,
     .update = ldc_update,
     .abandon = ldc_abandon,
-    .tell = ldc_tell,
+    .report = ldc_report,
     .trace_range = ldc_trace_range,
     .announce = ldc_announce,
     .surfaces = ldc_make_surfaces,

@@ -52,8 +52,8 @@ bool quadtree_state_copy_counts(struct trace_state *state, struct error *error)
            gpu_readback_fence(&own->copied_counts, error);
 }
 
-static void tell_kind(const struct quadtree_counts *counts, enum ray_kind kind, uint32_t layers,
-                      struct structure_rows *rows)
+static void describe_kind(const struct quadtree_counts *counts, enum ray_kind kind, uint32_t layers,
+                          struct structure_rows *rows)
 {
     const float rays = (float)counts->rays;
     rows->part = 1 + (uint32_t)kind;
@@ -80,7 +80,7 @@ static void add_eyes(struct counts *counts, uint64_t samples)
     }
 }
 
-bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error)
+bool quadtree_state_report(struct trace_state *state, struct structure_rows *rows, struct error *error)
 {
     struct quadtree_state *own = (struct quadtree_state *)state;
     struct counts counts;
@@ -89,8 +89,8 @@ bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows,
     add_eyes(&counts, own->eye_samples);
     for (unsigned kind = 0; kind < RAY_COUNT; kind++)
         if (counts.kinds[kind].rays > 0)
-            tell_kind(&counts.kinds[kind], (enum ray_kind)kind, quadtree_layer_count(&state->options.quadtree),
-                      rows);
+            describe_kind(&counts.kinds[kind], (enum ray_kind)kind, quadtree_layer_count(&state->options.quadtree),
+                          rows);
     return true;
 }
 

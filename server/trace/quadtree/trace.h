@@ -20,7 +20,7 @@ struct trace_state *quadtree_state_create(struct gpu_device *device, const struc
 void quadtree_state_destroy(struct trace_state *state);
 uint64_t quadtree_state_device_bytes(const struct trace_state *state);
 bool quadtree_state_copy_counts(struct trace_state *state, struct error *error);
-bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error);
+bool quadtree_state_report(struct trace_state *state, struct structure_rows *rows, struct error *error);
 
 /* Prepares the counts before a wave, and clears them before the first wave of a frame. */
 bool quadtree_trace_begin(struct trace_state *state, struct error *error);

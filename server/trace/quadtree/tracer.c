@@ -149,7 +149,7 @@ static void quadtree_abandon(struct tracer *tracer)
     fill_stats((struct quadtree *)tracer);
 }
 
-static void quadtree_tell(const struct tracer *tracer, struct structure_rows *rows)
+static void quadtree_report(const struct tracer *tracer, struct structure_rows *rows)
 {
     const struct quadtree_uniforms *u = &((const struct quadtree *)tracer)->store.uniforms;
     const struct quadtree_settings *settings = &tracer->options.quadtree;
@@ -223,12 +223,12 @@ const struct tracer_impl tracer_quadtree_impl = {
     .destroy = quadtree_destroy,
     .update = quadtree_update,
     .abandon = quadtree_abandon,
-    .tell = quadtree_tell,
+    .report = quadtree_report,
     .state_create = quadtree_state_create,
     .state_destroy = quadtree_state_destroy,
     .state_device_bytes = quadtree_state_device_bytes,
     .state_copy_counts = quadtree_state_copy_counts,
-    .state_tell = quadtree_state_tell,
+    .state_report = quadtree_state_report,
     .trace_begin = trace_begin,
     .trace_range = trace_range,
     .announce = announce,

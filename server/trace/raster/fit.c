@@ -244,7 +244,7 @@ bool axes_fit_depth(const struct tracer *tracer, double layers, uint32_t maximum
     return error_remedy(error, "choose another tracer, such as bvh");
 }
 
-void axes_fit_tell(struct structure_row *resolution, uint32_t wanted)
+void axes_fit_warn(struct structure_row *resolution, uint32_t wanted)
 {
     if (resolution->number < wanted)
         snprintf(resolution->warning, sizeof(resolution->warning),

@@ -61,6 +61,6 @@ bool axes_fit_depth(const struct tracer *tracer, double layers, uint32_t maximum
 uint32_t axes_wanted_resolution(const struct tracer *tracer, const struct axes_request *request);
 
 /* Adds a warning to the row of a structure's resolution where a higher one was wanted. */
-void axes_fit_tell(struct structure_row *resolution, uint32_t wanted);
+void axes_fit_warn(struct structure_row *resolution, uint32_t wanted);
 
 #endif

@@ -34,7 +34,7 @@ static double sum_of(uint32_t low, uint32_t high)
 }
 
 /* Adds the rows of a kind of rays, as a part of its own behind the trees over the scene. */
-static void tell_kind(const struct rayspace_counts *counts, enum ray_kind kind, struct structure_rows *rows)
+static void describe_kind(const struct rayspace_counts *counts, enum ray_kind kind, struct structure_rows *rows)
 {
     const double rays = sum_of(counts->rays_low, counts->rays_high);
     rows->part = 1 + (uint32_t)kind;
@@ -50,13 +50,13 @@ static void tell_kind(const struct rayspace_counts *counts, enum ray_kind kind, 
     structure_number(rows, "halvings", counts->halvings);
 }
 
-bool rayspace_counts_tell(struct trace_state *state, struct structure_rows *rows, struct error *error)
+bool rayspace_counts_report(struct trace_state *state, struct structure_rows *rows, struct error *error)
 {
     struct rayspace_counts counts[WAVE_RAY_KINDS];
     if (!gpu_readback_take(state->device, &((struct rayspace_state *)state)->copied_counts, counts, error))
         return false;
     for (unsigned kind = 0; kind < RAY_COUNT; kind++)
         if (counts[kind].waves > 0)
-            tell_kind(&counts[kind], (enum ray_kind)kind, rows);
+            describe_kind(&counts[kind], (enum ray_kind)kind, rows);
     return true;
 }

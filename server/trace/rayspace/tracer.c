@@ -76,9 +76,9 @@ static enum tracer_progress rayspace_update(struct tracer *tracer, struct gpu_sc
     return progress;
 }
 
-static void rayspace_tell(const struct tracer *tracer, struct structure_rows *rows)
+static void rayspace_report(const struct tracer *tracer, struct structure_rows *rows)
 {
-    scene_tree_tell(&((const struct rayspace *)tracer)->tree, rows);
+    scene_tree_report(&((const struct rayspace *)tracer)->tree, rows);
 }
 
 static bool rayspace_waits(struct tracer *tracer)
@@ -158,13 +158,13 @@ const struct tracer_impl tracer_rayspace_impl = {
     .destroy = rayspace_destroy,
     .update = rayspace_update,
     .abandon = rayspace_abandon,
-    .tell = rayspace_tell,
+    .report = rayspace_report,
     .waits = rayspace_waits,
     .state_create = rayspace_state_create,
     .state_destroy = rayspace_state_destroy,
     .state_device_bytes = rayspace_state_bytes,
     .state_copy_counts = rayspace_counts_copy,
-    .state_tell = rayspace_counts_tell,
+    .state_report = rayspace_counts_report,
     .trace_begin = rayspace_trace_begin,
     .trace_step = rayspace_trace_step,
 };

@@ -75,7 +75,7 @@ bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, 
 /* Adds the cost of a traced wave to the sums of the frame; the other two implement tracer_impl's functions. */
 bool rayspace_counts_add(struct rayspace_state *state, struct gpu_scene *scene, struct error *error);
 bool rayspace_counts_copy(struct trace_state *state, struct error *error);
-bool rayspace_counts_tell(struct trace_state *state, struct structure_rows *rows, struct error *error);
+bool rayspace_counts_report(struct trace_state *state, struct structure_rows *rows, struct error *error);
 
 /* Whether the descent is the paper's, not the joint one of both hierarchies. */
 bool rayspace_is_flat(const struct tracer_options *options);

@@ -92,7 +92,7 @@ static bool on_progress(void *context, double share)
 {
     const struct reference *reference = context;
     (void)share;
-    progress_tell();
+    progress_report();
     return !atomic_load(&reference->is_abandoned);
 }
 

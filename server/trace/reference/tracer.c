@@ -162,7 +162,7 @@ static void build(struct reference *reference)
 
 static void *run_builder(void *context)
 {
-    host_thread_gives_way();
+    host_thread_lower_priority();
     build(context);
     return NULL;
 }

@@ -103,7 +103,7 @@ static void traverse(struct reference_wave *wave)
 
 static void *run_thread(void *context)
 {
-    host_thread_gives_way();
+    host_thread_lower_priority();
     traverse(context);
     return NULL;
 }

@@ -271,7 +271,7 @@ static void build_range(struct builder *builder, struct place *place, struct ran
     while (!bvh_is_stopped(builder->stop)) {
         struct range left, right;
         if (size_of(&range) >= TASK_PRIMITIVES)
-            progress_tell();
+            progress_report();
         if (split_range(builder, place, NULL, &range, &left, &right)) {
             bool left_is_larger = size_of(&left) > size_of(&right);
             struct range *larger = left_is_larger ? &left : &right;

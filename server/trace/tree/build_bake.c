@@ -169,7 +169,7 @@ bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const floa
         choose_elements(&bake, areas, list);
         count_below(&bake);
     }
-    progress_tell();
+    progress_report();
     ok = ok && place_all(&bake, octants, threads);
     free(list);
     free(bake.steps);

@@ -68,7 +68,7 @@ static void run_to_end(struct bvh_run *run)
 
 static void *run_thread(void *argument)
 {
-    host_thread_gives_way();
+    host_thread_lower_priority();
     run_to_end(argument);
     return NULL;
 }

@@ -303,7 +303,7 @@ bool scene_tree_waits(struct scene_tree *tree)
     return bvh_store_waits(&tree->store);
 }
 
-void scene_tree_tell(const struct scene_tree *tree, struct structure_rows *rows)
+void scene_tree_report(const struct scene_tree *tree, struct structure_rows *rows)
 {
     structure_number(rows, "nodes", tree->stats->nodes);
     structure_number(rows, "nodes_rebuilt", tree->stats->nodes_rebuilt);

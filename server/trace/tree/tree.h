@@ -36,7 +36,7 @@ enum tracer_progress scene_tree_update(struct scene_tree *tree, struct gpu_scene
                                        const struct tracer_update *update, uint64_t step_end_ns,
                                        struct error *error);
 bool scene_tree_waits(struct scene_tree *tree); /* implements tracer_impl.waits */
-void scene_tree_tell(const struct scene_tree *tree, struct structure_rows *rows);
+void scene_tree_report(const struct scene_tree *tree, struct structure_rows *rows);
 uint64_t scene_tree_bytes(const struct scene_tree *tree);
 /* The number of the only instance, whose tree is the scene's; otherwise BVH_NONE. */
 uint32_t scene_tree_only_instance(const struct scene_tree *tree);

@@ -16,7 +16,7 @@ static int empty(void **state)
     return 0;
 }
 
-static void see_node(uint32_t id, const char *name, enum protocol_node_kind kind, uint32_t object)
+static void add_node(uint32_t id, const char *name, enum protocol_node_kind kind, uint32_t object)
 {
     struct message message;
     message_init(&message, MESSAGE_SET_NODE);
@@ -27,7 +27,7 @@ static void see_node(uint32_t id, const char *name, enum protocol_node_kind kind
     assert_true(fl_catalogue_observe(&catalogue, &message, &error));
 }
 
-static void see_light(uint32_t id, const char *name, enum protocol_light_kind kind)
+static void add_light(uint32_t id, const char *name, enum protocol_light_kind kind)
 {
     struct message message;
     message_init(&message, MESSAGE_SET_LIGHT);
@@ -37,7 +37,7 @@ static void see_light(uint32_t id, const char *name, enum protocol_light_kind ki
     assert_true(fl_catalogue_observe(&catalogue, &message, &error));
 }
 
-static void see_clip(uint32_t id, const char *name, float duration_s)
+static void add_clip(uint32_t id, const char *name, float duration_s)
 {
     struct message message;
     message_init(&message, MESSAGE_IMPORT_CLIP);
@@ -58,10 +58,10 @@ EACH_TEST(empty, NULL)
 
 TEST(an_object_is_found_by_name_before_number)
 {
-    see_node(10, "arm", PROTOCOL_NODE_GROUP, 0);
-    see_node(20, "", PROTOCOL_NODE_GROUP, 0);
-    see_node(30, "0", PROTOCOL_NODE_GROUP, 0);
-    see_node(40, "arm", PROTOCOL_NODE_GROUP, 0);
+    add_node(10, "arm", PROTOCOL_NODE_GROUP, 0);
+    add_node(20, "", PROTOCOL_NODE_GROUP, 0);
+    add_node(30, "0", PROTOCOL_NODE_GROUP, 0);
+    add_node(40, "arm", PROTOCOL_NODE_GROUP, 0);
     assert_int_equal(find(PROTOCOL_OBJECT_NODE, "arm"), 10);
     assert_int_equal(find(PROTOCOL_OBJECT_NODE, "0"), 30);
     assert_int_equal(find(PROTOCOL_OBJECT_NODE, "1"), 20);
@@ -73,10 +73,10 @@ TEST(an_object_is_found_by_name_before_number)
 
 TEST(a_light_is_also_known_by_the_node_that_shows_it)
 {
-    see_light(7, "", PROTOCOL_LIGHT_POINT);
-    see_light(8, "light", PROTOCOL_LIGHT_SPHERE);
-    see_node(1, "ceiling", PROTOCOL_NODE_LIGHT, 7);
-    see_node(2, "light", PROTOCOL_NODE_LIGHT, 7);
+    add_light(7, "", PROTOCOL_LIGHT_POINT);
+    add_light(8, "light", PROTOCOL_LIGHT_SPHERE);
+    add_node(1, "ceiling", PROTOCOL_NODE_LIGHT, 7);
+    add_node(2, "light", PROTOCOL_NODE_LIGHT, 7);
     assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "ceiling"), 7);
     assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "light"), 8);
     assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "0"), 7);
@@ -85,12 +85,12 @@ TEST(a_light_is_also_known_by_the_node_that_shows_it)
 TEST(lights_and_environments_light_a_scene)
 {
     const struct message environment = {.type = MESSAGE_SET_ENVIRONMENT};
-    see_node(1, "ceiling", PROTOCOL_NODE_GROUP, 0);
+    add_node(1, "ceiling", PROTOCOL_NODE_GROUP, 0);
     assert_false(catalogue.is_lit);
     assert_true(fl_catalogue_observe(&catalogue, &environment, &error));
     assert_true(catalogue.is_lit);
     fl_catalogue_finish(&catalogue);
-    see_light(7, "", PROTOCOL_LIGHT_POINT);
+    add_light(7, "", PROTOCOL_LIGHT_POINT);
     assert_true(catalogue.is_lit);
 }
 
@@ -98,7 +98,7 @@ TEST(only_some_lights_have_a_size)
 {
     for (int kind = 0; kind < PROTOCOL_LIGHT_COUNT; kind++) {
         bool has_size = kind == PROTOCOL_LIGHT_RECTANGLE || kind == PROTOCOL_LIGHT_SPHERE;
-        see_light(10 + (uint32_t)kind, "", (enum protocol_light_kind)kind);
+        add_light(10 + (uint32_t)kind, "", (enum protocol_light_kind)kind);
         assert_int_equal(fl_catalogue_light_has_size(&catalogue, 10 + (uint32_t)kind), has_size);
     }
     assert_false(fl_catalogue_light_has_size(&catalogue, 1));
@@ -109,20 +109,20 @@ TEST(an_unknown_name_is_refused_with_the_known_ones)
     uint32_t clip = 0;
     assert_false(fl_catalogue_find_clip(&catalogue, "0", &clip, NULL, &error));
     assert_string_equal(error.remedy, "it has no clip at all");
-    see_clip(1, "Survey", 1);
+    add_clip(1, "Survey", 1);
     assert_false(fl_catalogue_find_clip(&catalogue, "Jump", &clip, NULL, &error));
     assert_int_equal(error.code, FL_ERROR_ARGUMENT);
     assert_string_equal(error.text, "the model has no clip 'Jump'");
     assert_string_equal(error.remedy, "it has 1 clip: 'Survey'");
-    see_clip(2, "", 1);
-    see_clip(3, "Walk", 1);
+    add_clip(2, "", 1);
+    add_clip(3, "Walk", 1);
     assert_false(fl_catalogue_find_clip(&catalogue, "3", &clip, NULL, &error));
     assert_string_equal(error.remedy, "it has 3 clips: 'Survey', 'Walk'");
     for (uint32_t i = 0; i < 100; i++) {
         char name[129];
         memset(name, 'a' + (int)i % 26, 128);
         name[128 - i] = '\0';
-        see_node(i + 1, name, PROTOCOL_NODE_GROUP, 0);
+        add_node(i + 1, name, PROTOCOL_NODE_GROUP, 0);
     }
     assert_int_equal(find(PROTOCOL_OBJECT_NODE, "?"), 0);
     assert_memory_equal(error.remedy, "it has 100 nodes: 'aaa", 22);
@@ -133,9 +133,9 @@ TEST(a_clip_tells_its_identifier_and_length)
 {
     const struct fl_clip_info *info = NULL;
     uint32_t clip = 0;
-    see_clip(0, "nothing", 2);
-    see_clip(5, "1", 3);
-    see_clip(6, "run", 4);
+    add_clip(0, "nothing", 2);
+    add_clip(5, "1", 3);
+    add_clip(6, "run", 4);
     assert_true(fl_catalogue_find_clip(&catalogue, "run", &clip, &info, &error));
     assert_int_equal(clip, 6);
     assert_float_equal(info->duration_s, 4, 0);
@@ -149,12 +149,12 @@ TEST(a_clip_tells_its_identifier_and_length)
 
 TEST(a_new_identifier_is_one_that_the_import_has_not_used)
 {
-    see_node(9, "a", PROTOCOL_NODE_GROUP, 0);
-    see_node(4, "b", PROTOCOL_NODE_GROUP, 0);
+    add_node(9, "a", PROTOCOL_NODE_GROUP, 0);
+    add_node(4, "b", PROTOCOL_NODE_GROUP, 0);
     assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_NODE), 10);
     assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_NODE), 11);
     assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_CLIP), 1);
-    see_node(UINT32_MAX, "c", PROTOCOL_NODE_GROUP, 0);
+    add_node(UINT32_MAX, "c", PROTOCOL_NODE_GROUP, 0);
     assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_NODE), 0);
 }
 
@@ -166,7 +166,7 @@ TEST_WITH(a_flood_of_names_is_held_in_bounded_memory, empty, empty)
     for (uint32_t i = 1; i <= (1u << 20) + 10; i++) {
         snprintf(name, 9, "%08u", i);
         name[8] = 'x';
-        see_node(i, name, PROTOCOL_NODE_GROUP, 0);
+        add_node(i, name, PROTOCOL_NODE_GROUP, 0);
     }
     assert_in_range(catalogue.text_capacity, 1, 64u << 20);
     assert_int_equal(catalogue.lists[FL_CATALOGUE_NODES].count, 1u << 20);

@@ -23,7 +23,7 @@ static void play_pong(struct daemon *daemon)
         tell(daemon, 0, &between);
         between = (struct message){.type = MESSAGE_PING};
         tell(daemon, 77, &between);
-        tell_type(daemon, header.request, MESSAGE_PONG);
+        send_type(daemon, header.request, MESSAGE_PONG);
         if (!take(daemon) || asked.type != MESSAGE_PONG || header.request != 77)
             return;
     }
@@ -139,7 +139,7 @@ static void play_only_pongs(struct daemon *daemon)
     greet(daemon);
     while (take(daemon)) {
         pings += asked.type == MESSAGE_PING;
-        tell_type(daemon, header.request, MESSAGE_PONG);
+        send_type(daemon, header.request, MESSAGE_PONG);
     }
 }
 
@@ -317,7 +317,7 @@ TEST(a_refusal_keeps_its_code_field_remedy_and_the_connection)
 #define EDGE 16u
 static uint8_t pixels[EDGE * EDGE * 4];
 
-static void tell_frame(struct daemon *daemon, uint32_t request, uint32_t number)
+static void send_frame(struct daemon *daemon, uint32_t request, uint32_t number)
 {
     struct message message = {.type = MESSAGE_FRAME_BEGIN};
     message.frame_begin = (struct message_frame_begin){.frame = number,
@@ -360,9 +360,9 @@ static void play_job(struct daemon *daemon)
             request = 0;
         }
         for (; request != 0 && next <= last && sent < credit; next += step, sent++)
-            tell_frame(daemon, request, next);
+            send_frame(daemon, request, next);
         if (request != 0 && next > last) {
-            tell_type(daemon, request, MESSAGE_OK);
+            send_type(daemon, request, MESSAGE_OK);
             request = 0;
         }
     }
@@ -432,8 +432,8 @@ static void play_wrong_frame(struct daemon *daemon)
     greet(daemon);
     if (!take(daemon))
         return;
-    tell_frame(daemon, header.request, 0);
-    tell_frame(daemon, header.request, 0); /* twice */
+    send_frame(daemon, header.request, 0);
+    send_frame(daemon, header.request, 0); /* twice */
     while (more(daemon))
         continue;
 }
@@ -449,7 +449,7 @@ static void play_early_end(struct daemon *daemon)
     greet(daemon);
     if (!take(daemon))
         return;
-    tell_frame(daemon, header.request, 0);
+    send_frame(daemon, header.request, 0);
     tell(daemon, header.request, &done);
     while (more(daemon))
         continue;

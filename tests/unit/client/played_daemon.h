@@ -149,7 +149,7 @@ static inline void tell(struct daemon *daemon, uint32_t request, const struct me
     put(daemon, bytes, pack(bytes, sizeof(bytes), request, message));
 }
 
-static inline void tell_type(struct daemon *daemon, uint32_t request, enum message_type type)
+static inline void send_type(struct daemon *daemon, uint32_t request, enum message_type type)
 {
     const struct message message = {.type = type};
     tell(daemon, request, &message);

@@ -40,7 +40,7 @@ static void tell_description(struct daemon *daemon, uint32_t request)
     tell(daemon, request, &message);
 }
 
-static void tell_list(struct daemon *daemon, uint32_t request)
+static void send_list(struct daemon *daemon, uint32_t request)
 {
     static struct record_scene_entry scenes[2] = {
         {.revision = 5, .triangles = 12, .clients = 1, .sharing = PROTOCOL_SHARING_SHARED, .name = "model"},
@@ -61,7 +61,7 @@ static void tell_unknown(struct daemon *daemon, uint32_t request)
     tell(daemon, request, &message);
 }
 
-static void tell_ok(struct daemon *daemon, uint32_t request, uint64_t revision)
+static void send_ok(struct daemon *daemon, uint32_t request, uint64_t revision)
 {
     struct message message = {.type = MESSAGE_OK};
     message.ok.revision = revision;
@@ -77,7 +77,7 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
         snprintf(seen.attached, sizeof(seen.attached), "%s", message->scene_attach.name);
         seen.scene = message->scene_attach.scene;
         if (strcmp(message->scene_attach.name, "model") == 0)
-            tell_ok(daemon, request, 4);
+            send_ok(daemon, request, 4);
         else
             tell_unknown(daemon, request);
         return;
@@ -85,7 +85,7 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
         tell_description(daemon, request);
         return;
     case MESSAGE_SCENE_LIST:
-        tell_list(daemon, request);
+        send_list(daemon, request);
         return;
     case MESSAGE_PING:
         tell_changed(daemon, seen.scene, 8);
@@ -105,11 +105,11 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
         return;
     case MESSAGE_EDIT_COMMIT:
         seen.committed = seen.removed != 0;
-        tell_ok(daemon, request, 9);
+        send_ok(daemon, request, 9);
         return;
     case MESSAGE_SCENE_CLOSE:
         seen.closed = message->scene_close.scene;
-        tell_ok(daemon, request, 0);
+        send_ok(daemon, request, 0);
         return;
     default:
         return;

@@ -63,7 +63,7 @@ static void play_pieces(struct daemon *daemon)
             piece.frame_data.data_bytes = (uint32_t)sizeof(data) - 1000 * i;
             tell(daemon, 1000 + i, &piece);
         }
-        tell_type(daemon, header.request, MESSAGE_PONG);
+        send_type(daemon, header.request, MESSAGE_PONG);
     }
 }
 

@@ -64,7 +64,7 @@ static struct message_frame_begin some_frame(uint32_t number, uint64_t command)
                                         .digest = XXH3_64bits(pixels, FRAME_BYTES)};
 }
 
-static void tell_begin(struct daemon *daemon, uint32_t request, const struct message_frame_begin *frame)
+static void send_begin(struct daemon *daemon, uint32_t request, const struct message_frame_begin *frame)
 {
     struct message message = {.type = MESSAGE_FRAME_BEGIN, .frame_begin = *frame};
     tell(daemon, request, &message);
@@ -81,9 +81,9 @@ static void tell_rest(struct daemon *daemon, uint32_t request, const struct mess
     tell(daemon, request, &message);
 }
 
-static void tell_frame(struct daemon *daemon, uint32_t request, const struct message_frame_begin *frame)
+static void send_frame(struct daemon *daemon, uint32_t request, const struct message_frame_begin *frame)
 {
-    tell_begin(daemon, request, frame);
+    send_begin(daemon, request, frame);
     tell_rest(daemon, request, frame);
 }
 
@@ -131,18 +131,18 @@ static void play_view(struct daemon *daemon)
         if (asked.type == MESSAGE_RENDER && asked.render.kind == PROTOCOL_JOB_VIEW) {
             const struct message_frame_begin frame = some_frame(number++, seen.last_command);
             if (request != 0)
-                tell_type(daemon, request, MESSAGE_OK);
+                send_type(daemon, request, MESSAGE_OK);
             request = header.request;
-            tell_frame(daemon, request, &frame);
+            send_frame(daemon, request, &frame);
         } else if (asked.type == MESSAGE_RENDER) {
             const struct message_frame_begin frame = some_frame(asked.render.first_frame, 0);
-            tell_frame(daemon, header.request, &frame);
-            tell_type(daemon, header.request, MESSAGE_OK);
+            send_frame(daemon, header.request, &frame);
+            send_type(daemon, header.request, MESSAGE_OK);
         } else if (asked.type == MESSAGE_VIEW_CAMERA) {
             const struct message_frame_begin frame = some_frame(number++, asked.view_camera.command);
-            tell_frame(daemon, request, &frame);
+            send_frame(daemon, request, &frame);
         } else if (asked.type == MESSAGE_PING) {
-            tell_type(daemon, header.request, MESSAGE_PONG);
+            send_type(daemon, header.request, MESSAGE_PONG);
         }
     }
 }
@@ -199,7 +199,7 @@ TEST(cameras_are_sent_and_frames_name_them_with_their_times)
     for (uint64_t i = 1; i <= 5; i++) {
         uint64_t command = 0;
         const uint64_t before_ns = monotonic_now_ns();
-        assert_true(fl_view_look(view, &some_camera, &command, &error));
+        assert_true(fl_view_set_camera(view, &some_camera, &command, &error));
         assert_int_equal(command, i);
         struct fl_frame *frame = next_frame(view);
         assert_int_equal(frame->frame, i);
@@ -235,7 +235,7 @@ TEST(frames_are_acknowledged_and_credit_follows_the_frames_consumed)
     assert_true(fl_view_want_key_frame(view, &error)); /* the first one stands alone anyway */
     fl_frame_destroy(next_frame(view));
     for (unsigned i = 0; i < 2; i++)
-        assert_true(fl_view_look(view, &some_camera, NULL, &error));
+        assert_true(fl_view_set_camera(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
     uint64_t ns = 0;
     assert_true(fl_ping(connection, &ns, &error)); /* the third frame comes meanwhile and is kept */
@@ -263,10 +263,10 @@ static void play_changes(struct daemon *daemon)
                 tell_frame(daemon, request, &frame);
             number += request != 0 && asked.render.picture.width > EDGE;
             if (request != 0)
-                tell_type(daemon, request, MESSAGE_OK);
+                send_type(daemon, request, MESSAGE_OK);
             request = header.request;
         } else if (asked.type == MESSAGE_VIEW_CAMERA) {
-            tell_frame(daemon, request, &frame); /* smaller than what was asked for, as one that adapts */
+            send_frame(daemon, request, &frame); /* smaller than what was asked for, as one that adapts */
             number++;
         }
     }
@@ -294,7 +294,7 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
         options.picture.width = EDGE;
         assert_true(fl_view_change(view, &options, &error));
     }
-    assert_true(fl_view_look(view, &some_camera, NULL, &error));
+    assert_true(fl_view_set_camera(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
     end_view(view);
     assert_int_equal(seen.renders, 61);
@@ -357,7 +357,7 @@ static void play_refused_change(struct daemon *daemon)
         if (asked.type == MESSAGE_RENDER && request == 0)
             request = header.request;
         if (asked.type == MESSAGE_VIEW_CAMERA) {
-            tell_frame(daemon, request, &frame);
+            send_frame(daemon, request, &frame);
             number++;
         }
     }
@@ -369,7 +369,7 @@ TEST(a_refused_change_is_reported_once_and_the_view_continues_unchanged)
     assert_true(fl_view_change(view, &usual_options, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_REFUSED, "not in this build");
-    assert_true(fl_view_look(view, &some_camera, NULL, &error));
+    assert_true(fl_view_set_camera(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
     end_view(view);
     assert_int_equal(seen.cancels, 1);
@@ -390,7 +390,7 @@ TEST(a_refused_view_stays_refused_and_the_connection_can_be_used)
         assert_null(fl_view_next(view, 10000, &error));
         check_error(FL_ERROR_REFUSED, "not in this build");
     }
-    assert_false(fl_view_look(view, &some_camera, NULL, &error));
+    assert_false(fl_view_set_camera(view, &some_camera, NULL, &error));
     fl_view_destroy(view);
     view = start_view(&scene);
     assert_null(fl_view_next(view, 10000, &error));
@@ -410,9 +410,9 @@ static void play_wrong(struct daemon *daemon)
     while (look(daemon)) {
         if (asked.type != MESSAGE_RENDER)
             continue;
-        tell_frame(daemon, header.request, &good);
+        send_frame(daemon, header.request, &good);
         for (unsigned i = 0; i < wrong_count; i++)
-            tell_frame(daemon, header.request, &wrong_frame);
+            send_frame(daemon, header.request, &wrong_frame);
     }
 }
 
@@ -425,7 +425,7 @@ static void expect_broken(const struct message_frame_begin *frame, unsigned coun
     while ((whole = fl_view_next(view, 10000, &error)))
         fl_frame_destroy(whole);
     check_error(FL_ERROR_PROTOCOL, part);
-    assert_false(fl_view_look(view, &some_camera, NULL, &error));
+    assert_false(fl_view_set_camera(view, &some_camera, NULL, &error));
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
     end_view(view);
 }
@@ -457,10 +457,10 @@ static void play_flood(struct daemon *daemon)
         if (asked.type == MESSAGE_RENDER)
             for (uint32_t i = 0; i <= IN_FLIGHT; i++) {
                 const struct message_frame_begin frame = some_frame(i, 0);
-                tell_frame(daemon, header.request, &frame);
+                send_frame(daemon, header.request, &frame);
             }
         if (asked.type == MESSAGE_PING)
-            tell_type(daemon, header.request, MESSAGE_PONG);
+            send_type(daemon, header.request, MESSAGE_PONG);
     }
 }
 
@@ -482,7 +482,7 @@ static void play_h264(struct daemon *daemon)
     greet(daemon);
     while (look(daemon))
         if (asked.type == MESSAGE_RENDER)
-            tell_frame(daemon, header.request, &frame);
+            send_frame(daemon, header.request, &frame);
 }
 
 TEST(a_frame_in_h264_is_left_to_the_caller)
@@ -510,7 +510,7 @@ static void play_abandoned(struct daemon *daemon)
     while (look(daemon)) {
         if (asked.type != MESSAGE_RENDER)
             continue;
-        tell_begin(daemon, header.request, &wrong_frame);
+        send_begin(daemon, header.request, &wrong_frame);
         struct message part = {.type = MESSAGE_FRAME_DATA};
         part.frame_data.data = pixels;
         part.frame_data.data_bytes = (uint32_t)wrong_frame.size_bytes / 2;
@@ -519,7 +519,7 @@ static void play_abandoned(struct daemon *daemon)
         part.frame_end.frame = wrong_frame.frame;
         part.frame_end.abandoned = 1;
         tell(daemon, header.request, &part);
-        tell_frame(daemon, header.request, &next);
+        send_frame(daemon, header.request, &next);
     }
 }
 
@@ -554,7 +554,7 @@ static void play_parts(struct daemon *daemon)
             request = header.request;
             next.frame_parts.parts = parts;
             next.frame_parts.parts_count = 2;
-            tell_begin(daemon, request, &frame);
+            send_begin(daemon, request, &frame);
             tell(daemon, request, &next);
             next = (struct message){.type = MESSAGE_FRAME_DATA};
             next.frame_data.data = pixels;
@@ -583,7 +583,7 @@ TEST(first_parts_are_delivered_at_once_and_again_at_the_end_for_one_credit)
         assert_memory_equal(frame->pixels, pixels, FRAME_BYTES);
         assert_null(frame->normals);
         fl_frame_destroy(frame);
-        assert_true(i > 0 || fl_view_look(view, &some_camera, NULL, &error));
+        assert_true(i > 0 || fl_view_set_camera(view, &some_camera, NULL, &error));
     }
     end_view(view);
     assert_int_equal(seen.begun_acks, 1);
@@ -608,7 +608,7 @@ static void play_half(struct daemon *daemon)
     greet(daemon);
     while (look(daemon)) {
         if (asked.type == MESSAGE_RENDER)
-            tell_begin(daemon, header.request, &frame);
+            send_begin(daemon, header.request, &frame);
         if (asked.type == MESSAGE_VIEW_CAMERA)
             return;
     }
@@ -619,7 +619,7 @@ TEST(a_connection_lost_within_a_frame_is_reported_and_nothing_waits_forever)
     struct fl_view *view = begin_view(play_half);
     assert_null(fl_view_next(view, 20, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
-    assert_true(fl_view_look(view, &some_camera, NULL, &error));
+    assert_true(fl_view_set_camera(view, &some_camera, NULL, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_CONNECTION, "closed");
     assert_false(fl_view_change(view, &usual_options, &error));
@@ -639,13 +639,13 @@ static void play_busy(struct daemon *daemon)
     if (!look(daemon))
         return;
     const uint32_t request = header.request;
-    tell_frame(daemon, request, &frame);
+    send_frame(daemon, request, &frame);
     sem_wait(&may_read);
     while (look(daemon)) {
         if (number > 1 || seen.acks == 0 || seen.credit <= IN_FLIGHT)
             continue;
         frame = some_frame(number++, 0);
-        tell_frame(daemon, request, &frame);
+        send_frame(daemon, request, &frame);
     }
 }
 
@@ -654,7 +654,7 @@ TEST(what_had_no_room_beside_much_else_is_acknowledged_later)
     sem_init(&may_read, 0, 0);
     struct fl_view *view = begin_view(play_busy);
     /* Sending ends where there is no room for a message of any size. */
-    while (fl_view_look(view, &some_camera, NULL, &error))
+    while (fl_view_set_camera(view, &some_camera, NULL, &error))
         continue;
     check_error(FL_ERROR_TIMEOUT, "no more messages");
     fl_frame_destroy(next_frame(view));
@@ -674,10 +674,10 @@ static void play_busy_until_the_end(struct daemon *daemon)
     while (look(daemon)) {
         seen.closed_after_cancel |= asked.type == MESSAGE_SCENE_CLOSE && seen.cancels == 1;
         if (asked.type == MESSAGE_CANCEL || asked.type == MESSAGE_SCENE_CLOSE)
-            tell_type(daemon, header.request, MESSAGE_OK);
+            send_type(daemon, header.request, MESSAGE_OK);
         if (asked.type != MESSAGE_PING)
             continue;
-        tell_type(daemon, header.request, MESSAGE_PONG);
+        send_type(daemon, header.request, MESSAGE_PONG);
     }
 }
 
@@ -688,7 +688,7 @@ TEST(what_ends_beside_much_else_is_given_back_later)
     struct fl_scene *own = fl_scene_create(connection, &error);
     assert_non_null(own);
     struct fl_view *view = start_view(own);
-    while (fl_view_look(view, &some_camera, NULL, &error))
+    while (fl_view_set_camera(view, &some_camera, NULL, &error))
         continue;
     check_error(FL_ERROR_TIMEOUT, "no more messages");
     fl_view_destroy(view);

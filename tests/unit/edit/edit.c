@@ -19,14 +19,14 @@ static struct {
     struct message_set_material set;
 } world;
 
-static void tell_done(struct daemon *daemon, uint32_t request)
+static void send_done(struct daemon *daemon, uint32_t request)
 {
     struct message message = {.type = MESSAGE_OK};
     message.ok.revision = world.revision;
     tell(daemon, request, &message);
 }
 
-static void tell_list(struct daemon *daemon, uint32_t request, const struct message_scene_objects *question)
+static void send_list(struct daemon *daemon, uint32_t request, const struct message_scene_objects *question)
 {
     struct record_object_entry entry = {.object = STEEL, .name = "steel"};
     struct message message;
@@ -49,7 +49,7 @@ static void tell_material(struct daemon *daemon, uint32_t request, uint32_t obje
     message.set_material.value.metallic = world.metallic;
     message.set_material.name = "steel";
     tell(daemon, request, &message);
-    tell_done(daemon, request);
+    send_done(daemon, request);
 }
 
 /* Another client adds to the other field each time before this one is told of the conflict. */
@@ -58,7 +58,7 @@ static void answer_commit(struct daemon *daemon, uint32_t request)
     world.commits++;
     if (world.commits > world.conflicts) {
         world.revision++;
-        tell_done(daemon, request);
+        send_done(daemon, request);
         return;
     }
     world.metallic += world.metallic < 1 ? 0.25f : 0;
@@ -78,14 +78,14 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
     switch (message->type) {
     case MESSAGE_SCENE_ATTACH:
     case MESSAGE_SCENE_CLOSE:
-        tell_done(daemon, request);
+        send_done(daemon, request);
         return;
     case MESSAGE_SCENE_DESCRIBE:
         message_init(&reply, MESSAGE_SCENE_DESCRIPTION);
         tell(daemon, request, &reply);
         return;
     case MESSAGE_SCENE_OBJECTS:
-        tell_list(daemon, request, &message->scene_objects);
+        send_list(daemon, request, &message->scene_objects);
         return;
     case MESSAGE_OBJECT_GET:
         tell_material(daemon, request, message->object_get.object);

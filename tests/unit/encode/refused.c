@@ -74,7 +74,7 @@ static bool encode(struct error *error)
     struct encoder_stream *stream = encoder_stream_create(ENCODING_H264, 30, error);
     assert_non_null(stream);
     struct encoded_picture out;
-    bool done = encoder_stream_encode(stream, &picture, &(struct encoder_wish){.quality = 75}, &out, error);
+    bool done = encoder_stream_encode(stream, &picture, &(struct encoder_request){.quality = 75}, &out, error);
     free(out.bytes);
     encoder_stream_destroy(stream);
     return done;

@@ -55,24 +55,24 @@ static struct encoder_stream *new_stream(void)
 }
 
 static struct encoded_picture encode(struct encoder_stream *stream, const uint8_t *pixels, uint32_t width,
-                                     uint32_t height, const struct encoder_wish *wish)
+                                     uint32_t height, const struct encoder_request *request)
 {
     const struct picture picture = {.width = width, .height = height, .bytes_per_pixel = 4, .pixels = pixels};
     struct encoded_picture out;
     struct error error = {0};
-    if (!encoder_stream_encode(stream, &picture, wish, &out, &error))
+    if (!encoder_stream_encode(stream, &picture, request, &out, &error))
         fail_msg("%s", error.text);
     assert_true(out.bytes && out.size_bytes);
     return out;
 }
 
 /* The next picture of a moving scene, encoded, decoded and compared; `made` is what it became, without bytes. */
-static double pass(struct encoder_stream *stream, struct player *player, int step, const struct encoder_wish *wish,
-                   struct encoded_picture *made)
+static double pass(struct encoder_stream *stream, struct player *player, int step,
+                   const struct encoder_request *request, struct encoded_picture *made)
 {
     uint8_t *pixels = new_pixels(WIDTH, HEIGHT);
     draw(pixels, WIDTH, HEIGHT, step);
-    struct encoded_picture out = encode(stream, pixels, WIDTH, HEIGHT, wish);
+    struct encoded_picture out = encode(stream, pixels, WIDTH, HEIGHT, request);
     assert_true(play(player, out.bytes, out.size_bytes));
     double quality = psnr(player->frame, pixels, WIDTH, HEIGHT);
     *made = (struct encoded_picture){.size_bytes = out.size_bytes, .key_frame = out.key_frame};
@@ -89,11 +89,11 @@ TEST(each_picture_decodes_alone_and_looks_like_the_original)
 {
     struct encoder_stream *stream = new_stream();
     struct player player = player_begin();
-    const struct encoder_wish wish = {.quality = 75};
+    const struct encoder_request request = {.quality = 75};
     double minimum = 99;
     for (int i = 0; i < 20; i++) {
         struct encoded_picture made;
-        double quality = pass(stream, &player, i, &wish, &made);
+        double quality = pass(stream, &player, i, &request, &made);
         minimum = quality < minimum ? quality : minimum;
         assert_int_equal(made.key_frame, i == 0); /* and no others that nobody asked for */
     }
@@ -120,7 +120,7 @@ TEST(quality_may_change_from_picture_to_picture)
         for (int k = 0; k < 4; k++) { /* what was better before is kept for a while */
             struct encoded_picture made;
             quality = pass(stream, &player, 4 * i + k,
-                           &(struct encoder_wish){.quality = qualities[i], .key_frame = k == 0}, &made);
+                           &(struct encoder_request){.quality = qualities[i], .key_frame = k == 0}, &made);
             bytes += made.size_bytes;
         }
         print_message("quality %u: %.1f dB, %zu bytes\n", qualities[i], quality, bytes);
@@ -139,10 +139,10 @@ TEST(a_key_frame_comes_when_it_is_asked_for_and_stands_alone)
     struct player player = player_begin(), late = player_begin();
     for (int i = 0; i < 12; i++) {
         bool key;
-        const struct encoder_wish wish = {.quality = 75, .key_frame = i == 7};
+        const struct encoder_request request = {.quality = 75, .key_frame = i == 7};
         uint8_t *pixels = new_pixels(WIDTH, HEIGHT);
         draw(pixels, WIDTH, HEIGHT, i);
-        struct encoded_picture out = encode(stream, pixels, WIDTH, HEIGHT, &wish);
+        struct encoded_picture out = encode(stream, pixels, WIDTH, HEIGHT, &request);
         key = out.key_frame;
         assert_int_equal(key, i == 0 || i == 7);
         /* Annex B: a start code first. */
@@ -166,7 +166,7 @@ TEST(a_decoder_that_lost_a_picture_recovers_at_the_next_key_frame)
     struct encoder_stream *stream = new_stream();
     struct player player = player_begin();
     struct encoded_picture made;
-    const struct encoder_wish plain = {.quality = 75}, wanted = {.quality = 75, .key_frame = true};
+    const struct encoder_request plain = {.quality = 75}, wanted = {.quality = 75, .key_frame = true};
     pass(stream, &player, 0, &plain, &made);
     uint8_t *pixels = new_pixels(WIDTH, HEIGHT);
     draw(pixels, WIDTH, HEIGHT, 5);
@@ -185,13 +185,13 @@ TEST(another_size_begins_with_a_key_frame)
     const uint32_t sizes[][2] = {{320, 180}, {240, 136}, {320, 180}, {161, 91}, {1, 1}, {17, 400}};
     struct encoder_stream *stream = new_stream();
     struct player player = player_begin();
-    const struct encoder_wish wish = {.quality = 75};
+    const struct encoder_request request = {.quality = 75};
     for (int i = 0; i < 6; i++) {
         uint32_t width = sizes[i][0], height = sizes[i][1];
         uint8_t *pixels = new_pixels(width, height);
         for (int k = 0; k < 3; k++) {
             draw(pixels, width, height, 3 * i + k);
-            struct encoded_picture out = encode(stream, pixels, width, height, &wish);
+            struct encoded_picture out = encode(stream, pixels, width, height, &request);
             assert_int_equal(out.key_frame, k == 0);
             assert_true(play(&player, out.bytes, out.size_bytes));
             assert_int_equal(player.frame->width, (width + 1) / 2 * 2);
@@ -218,8 +218,8 @@ TEST(pictures_keep_to_the_bytes_that_they_may_have)
         size_t sum = 0, maximum = 0;
         for (int k = 0; k < 10; k++) {
             draw_noise(pixels, (uint32_t)(100 * i + k));
-            const struct encoder_wish wish = {.quality = 95, .bytes = limits[i], .key_frame = k == 5};
-            struct encoded_picture out = encode(stream, pixels, WIDTH, HEIGHT, &wish);
+            const struct encoder_request request = {.quality = 95, .bytes = limits[i], .key_frame = k == 5};
+            struct encoded_picture out = encode(stream, pixels, WIDTH, HEIGHT, &request);
             /* The first picture after a change is judged by the buffer as it was before. */
             sum += k ? out.size_bytes : 0;
             maximum = k && out.size_bytes > maximum ? out.size_bytes : maximum;
@@ -247,7 +247,7 @@ static double quality_of_first(const struct picture *picture, const uint8_t *pix
     struct player player = player_begin();
     struct encoded_picture out;
     struct error error = {0};
-    if (!encoder_stream_encode(stream, picture, &(struct encoder_wish){.quality = 75}, &out, &error))
+    if (!encoder_stream_encode(stream, picture, &(struct encoder_request){.quality = 75}, &out, &error))
         fail_msg("%s", error.text);
     assert_true(play(&player, out.bytes, out.size_bytes));
     double quality = psnr(player.frame, pixels, picture->width, picture->height);
@@ -297,7 +297,7 @@ TEST(what_is_no_8_bit_picture_is_refused)
         struct encoded_picture out;
         error = (struct error){0};
         assert_false(
-            encoder_stream_encode(stream, &pictures[i], &(struct encoder_wish){.quality = 75}, &out, &error));
+            encoder_stream_encode(stream, &pictures[i], &(struct encoder_request){.quality = 75}, &out, &error));
         assert_int_equal(error.kind, ERROR_UNSUPPORTED);
         assert_null(out.bytes);
     }

@@ -105,7 +105,7 @@ TEST(a_watchdog_sees_whether_the_engine_makes_progress)
     wait_until(&fake.steps_held, 1);
     engine_is_alive(engine, &turns);
     assert_false(engine_is_alive(engine, &turns)); /* within a step */
-    progress_tell();
+    progress_report();
     assert_true(engine_is_alive(engine, &turns)); /* the step is one of many parts */
     assert_false(engine_is_alive(engine, &turns));
     atomic_store(&fake.holds_steps, false);

@@ -80,7 +80,7 @@ static struct view_camera camera(uint64_t number, bool moving)
     };
 }
 
-static void look_from(const struct view_camera *from)
+static void set_eye(const struct view_camera *from)
 {
     if (view_wishes_set_camera(wishes, from))
         submit(command(ENGINE_VIEW_CHANGED, 1, 0));
@@ -89,7 +89,7 @@ static void look_from(const struct view_camera *from)
 static void look(uint64_t number, bool moving)
 {
     struct view_camera made = camera(number, moving);
-    look_from(&made);
+    set_eye(&made);
 }
 
 EACH_TEST(begin, end)
@@ -166,7 +166,7 @@ TEST(a_picture_that_rests_is_refined_until_it_has_its_samples)
     expect_silence(); /* it moves: more will follow */
     struct view_camera stays = camera(1, false);
     stays.command = 2; /* the same place: the samples that it has count */
-    look_from(&stays);
+    set_eye(&stays);
     expect_picture(2, 4, 2, 6, ENCODING_RAW);
     expect_picture(2, 5, 2, 7, ENCODING_RAW);
     expect_silence();

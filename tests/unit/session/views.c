@@ -27,7 +27,7 @@
 static struct {
     struct queue *commands;
     struct engine_command *told[64]; /* until the test ends */
-    size_t told_count;
+    size_t described_count;
     atomic_uint gone;
 } engine;
 
@@ -73,8 +73,8 @@ static void drop_command(void *item)
 static void engine_end(void)
 {
     port_end();
-    while (engine.told_count)
-        engine_command_destroy(engine.told[--engine.told_count]);
+    while (engine.described_count)
+        engine_command_destroy(engine.told[--engine.described_count]);
     queue_destroy(engine.commands, drop_command);
 }
 
@@ -86,8 +86,8 @@ static struct engine_command *told(enum engine_command_kind kind)
         fail_msg("the engine was told nothing; command %d was to come", kind);
     if (command->kind != kind)
         fail_msg("the engine was told command %d instead of %d", command->kind, kind);
-    assert_true(engine.told_count < sizeof(engine.told) / sizeof(engine.told[0]));
-    return engine.told[engine.told_count++] = command;
+    assert_true(engine.described_count < sizeof(engine.told) / sizeof(engine.told[0]));
+    return engine.told[engine.described_count++] = command;
 }
 
 /* So much and no more; on a busy machine, where the first frame was slow to come, in several steps. */

@@ -34,7 +34,7 @@ static void expect_built(const struct fixture *fixture, bool expected)
 
 static void expect_distance(const struct fixture *fixture, float distance, double expected)
 {
-    if (!(fabs((double)distance - expected) < (double)told_metres(fixture->tracer, "cell")))
+    if (!(fabs((double)distance - expected) < (double)described_metres(fixture->tracer, "cell")))
         fail_msg("%g metres, where it is %g", (double)distance, expected);
 }
 
@@ -182,17 +182,17 @@ TEST(it_says_how_large_it_is)
     fixture_init(&fixture, scene_of_boxes(3), &small); /* 8 x 2 x 2 */
     expect_built(&fixture, true);
     assert_int_equal(told(fixture.tracer, "resolution"), RESOLUTION);
-    assert_float_equal(told_metres(fixture.tracer, "cell"), 8.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_float_equal(described_metres(fixture.tracer, "cell"), 8.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
     assert_int_equal(told(fixture.tracer, "longest_list"),
                      6); /* along x: a side to the left and one to the right of each */
     /* Sides of 2 x 2 of 8: along x six of them, along the others three times two. */
-    double side = 2 / (double)told_metres(fixture.tracer, "cell");
+    double side = 2 / (double)described_metres(fixture.tracer, "cell");
     assert_in_range(told(fixture.tracer, "samples"), 18 * (side - 1) * (side - 1), 18 * (side + 1) * (side + 1));
     assert_int_equal(fixture.tracer->stats.nodes, told(fixture.tracer, "samples"));
     assert_in_range(fixture.tracer->stats.device_bytes, 3 * RESOLUTION * RESOLUTION * 8, UINT64_MAX);
     add_box(&fixture.edits, 4, 30);
     update(&fixture);
-    assert_float_equal(told_metres(fixture.tracer, "cell"), 32.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_float_equal(described_metres(fixture.tracer, "cell"), 32.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
     expect_distance(&fixture, distance_below(&fixture, 30, 0), 9);
     fixture_finish(&fixture);
 }

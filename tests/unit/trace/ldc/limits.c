@@ -235,7 +235,7 @@ TEST_LONG(a_texel_that_is_drawn_more_often_than_it_was_counted_stays_within_its_
     assert_true(lost > 0);
     assert_int_equal(some.cube.samples_lost, lost);
     struct structure_rows rows = {0};
-    ldc_cube_tell(&fixture.store, LDC_CUBE_STATIC, true, &rows);
+    ldc_cube_report(&fixture.store, LDC_CUBE_STATIC, true, &rows);
     assert_non_null(strstr(rows.rows[rows.count - 2].warning, "more than it counted"));
     contents_free(&all);
     contents_free(&some);

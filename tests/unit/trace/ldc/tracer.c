@@ -96,7 +96,7 @@ TEST(the_size_of_a_cell_is_that_of_the_longest_side)
     expect_built(&fixture, true, false);
     assert_int_equal(told(fixture.tracer, "static/resolution"), RESOLUTION);
     assert_int_equal(told(fixture.tracer, "dynamic/resolution"), 0);
-    assert_float_equal(told_metres(fixture.tracer, "static/cell"), 5.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_float_equal(described_metres(fixture.tracer, "static/cell"), 5.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
     assert_int_equal(told(fixture.tracer, "static/layers_needed"),
                      6); /* along x: each box has a side to the left and one to the right */
     assert_int_equal(told(fixture.tracer, "static/layers_kept"), 6);
@@ -104,7 +104,8 @@ TEST(the_size_of_a_cell_is_that_of_the_longest_side)
     assert_in_range(fixture.tracer->stats.device_bytes, 3 * RESOLUTION * RESOLUTION * 16, UINT64_MAX);
     add_box(&fixture.edits, 4, 1, 19.5f, 0, 0); /* the scene is four times as long */
     update(&fixture);
-    assert_float_equal(told_metres(fixture.tracer, "static/cell"), 20.5f / (RESOLUTION - MARGIN_CELLS), 1e-5f);
+    assert_float_equal(described_metres(fixture.tracer, "static/cell"), 20.5f / (RESOLUTION - MARGIN_CELLS),
+                       1e-5f);
     expect_distance(distance_below(&fixture, 19.5f, 0), 9.5);
     fixture_finish(&fixture);
 }
@@ -116,14 +117,15 @@ TEST(what_begins_to_move_leaves_the_static_cube_once)
     add_box(&fixture.edits, 3, 1, 4, 0, 1);
     update(&fixture);
     expect_built(&fixture, true, true);
-    float static_cell = told_metres(fixture.tracer, "static/cell");
+    float static_cell = described_metres(fixture.tracer, "static/cell");
     assert_float_equal(static_cell, 3.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
     for (int step = 0; step < 3; step++) {
         add_box(&fixture.edits, 3, 1, 4, (float)step, 2);
         update(&fixture);
         expect_built(&fixture, false, true);
-        assert_float_equal(told_metres(fixture.tracer, "static/cell"), static_cell, 0);
-        assert_float_equal(told_metres(fixture.tracer, "dynamic/cell"), 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+        assert_float_equal(described_metres(fixture.tracer, "static/cell"), static_cell, 0);
+        assert_float_equal(described_metres(fixture.tracer, "dynamic/cell"), 1.0f / (RESOLUTION - MARGIN_CELLS),
+                           1e-6f);
         expect_distance(distance_below(&fixture, 4, (float)step), 7.5);
         expect_distance(distance_below(&fixture, 0, 0), 9.5);
         if (step > 0)
@@ -184,7 +186,8 @@ TEST(new_objects_are_static_and_settle_what_stood_still)
     test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){0.5f, 0, 0, 8, 0, 0.5f, 0, 0, 0, 0, 0.5f, 0});
     update(&fixture); /* the first box has settled, the second was on the move until now */
     expect_built(&fixture, true, true);
-    assert_float_equal(told_metres(fixture.tracer, "dynamic/cell"), 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_float_equal(described_metres(fixture.tracer, "dynamic/cell"), 1.0f / (RESOLUTION - MARGIN_CELLS),
+                       1e-6f);
     static const float distances[] = {8.5f, 8.5f, 9.5f};
     for (int i = 0; i < 3; i++)
         expect_distance(distance_below(&fixture, 2 * (float)i, 0), (double)distances[i]);
@@ -222,7 +225,7 @@ TEST(a_skinned_mesh_is_dynamic_from_the_first)
     struct fixture fixture;
     fixture_init(&fixture, test_scene_deformed(), &small);
     expect_built(&fixture, true, true); /* rigid nodes 6 and 7; skins and targets 2, 4, 5 */
-    float static_cell = told_metres(fixture.tracer, "static/cell");
+    float static_cell = described_metres(fixture.tracer, "static/cell");
     for (uint32_t turn = 0; turn < 2; turn++) {
         scene_motion_finish(&fixture.motion);
         test_motion_init(&fixture.motion, 1);
@@ -231,7 +234,7 @@ TEST(a_skinned_mesh_is_dynamic_from_the_first)
         test_pose_node(&fixture.motion.poses[0], 11, m);
         update(&fixture);
         expect_built(&fixture, false, true);
-        assert_float_equal(told_metres(fixture.tracer, "static/cell"), static_cell, 0);
+        assert_float_equal(described_metres(fixture.tracer, "static/cell"), static_cell, 0);
     }
     fixture_finish(&fixture);
 }
@@ -276,7 +279,7 @@ TEST(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay)
     assert_int_equal(told(fixture.tracer, "static/layers_needed"), 6);
     assert_int_equal(told(fixture.tracer, "static/layers_kept"), 2);
     assert_int_equal(told(fixture.tracer, "static/samples_lost"), 2 * told(fixture.tracer, "static/samples"));
-    assert_non_null(strstr(told_row(fixture.tracer, "static/layers_kept").warning, "2 of 6 layers"));
+    assert_non_null(strstr(described_row(fixture.tracer, "static/layers_kept").warning, "2 of 6 layers"));
     expect_distance(distance_below(&fixture, 0, 0), 9.75); /* z = 0.25, the second from below: minimum depths */
     const struct ray up = {{0.013f, 0.017f, -10, 0}, {0, 0, 1, 1e9f}};
     expect_distance(trace_one(&fixture, up).distance, 10);

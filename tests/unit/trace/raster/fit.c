@@ -126,7 +126,7 @@ static struct axes_layers count_layers(const struct fixture *fixture, float over
 static double predicted_samples(const struct fixture *fixture, unsigned tracer)
 {
     const double along = (double)told(fixture->tracer, row_of(tracer, "static/resolution"));
-    const double cell_world = (double)told_metres(fixture->tracer, row_of(tracer, "static/cell"));
+    const double cell_world = (double)described_metres(fixture->tracer, row_of(tracer, "static/cell"));
     const struct axes_layers layers =
         tracer == TRACER_LDC ? count_layers(fixture, AXES_OVERLAP, 0, (float)(along * cell_world))
                              : count_layers(fixture, 0, FACE_STEEP_BELOW, (float)(along * cell_world));
@@ -152,7 +152,8 @@ TEST(usual_scenes_have_the_resolution_that_was_asked_for)
         for (int which = 0; which < 2; which++) {
             struct fixture fixture;
             fixture_init_by(&fixture, sampled[i], which ? test_scene_soup() : test_scene_spheres(), &options);
-            const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+            const struct structure_row row =
+                described_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
             assert_int_equal(row.number, RESOLUTION);
             assert_string_equal(row.warning, "");
             expect_predicted(&fixture, sampled[i], TOLERANCE);
@@ -170,7 +171,8 @@ TEST(deep_scenes_have_a_lower_one_and_a_warning)
             const double tolerance = which ? TOLERANCE : LATTICE_TOLERANCE;
             struct fixture fixture;
             fixture_init_by(&fixture, sampled[i], which ? nested_shells(30) : lattice(20), &options);
-            const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+            const struct structure_row row =
+                described_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
             assert_in_range(row.number, AXES_FITTED_MIN, RESOLUTION - 1);
             assert_non_null(strstr(row.warning, "instead of 256 texels"));
             expect_predicted(&fixture, sampled[i], tolerance);
@@ -231,7 +233,7 @@ TEST(a_chosen_resolution_is_that_of_the_picture_and_warns_only_where_it_is_coars
         struct tracer_options options = {0};
         tracer_options_note_picture(&options, sampled[i], 320 * 180);
         fixture_init_by(&fixture, sampled[i], test_scene_spheres(), &options);
-        const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+        const struct structure_row row = described_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
         if (device->facts.software)
             assert_in_range(row.number, AXES_FITTED_MIN, 1023);
         assert_string_equal(row.warning, "");
@@ -247,7 +249,7 @@ TEST(a_chosen_resolution_coarser_than_the_pictures_pixels_comes_with_a_warning)
         struct tracer_options options = {0};
         tracer_options_note_picture(&options, sampled[i], 640 * 360);
         fixture_init_by(&fixture, sampled[i], nested_shells(60), &options);
-        const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+        const struct structure_row row = described_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
         assert_in_range(row.number, AXES_FITTED_MIN, 255);
         assert_non_null(strstr(row.warning, "instead of 256 texels"));
         fixture_finish(&fixture);

@@ -308,7 +308,7 @@ static struct structure_rows rows_of(struct fixture *fixture)
     struct structure_rows rows = {0};
     struct error error = {0};
     expect_ok(trace_state_copy_counts(fixture->tracer->state, &error), &error);
-    expect_ok(trace_state_tell(fixture->tracer->state, &rows, &error), &error);
+    expect_ok(trace_state_report(fixture->tracer->state, &rows, &error), &error);
     return rows;
 }
 

@@ -521,9 +521,9 @@ TEST(a_large_tree_gives_signs_of_its_progress)
     struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
     struct bvh_form settings = packed;
     for (settings.threads = 1; settings.threads < 3; settings.threads++) {
-        uint64_t before = progress_told();
+        uint64_t before = progress_reports();
         struct bvh_tree tree = build(&input, &settings);
-        assert_in_range(progress_told() - before, 10, UINT32_MAX);
+        assert_in_range(progress_reports() - before, 10, UINT32_MAX);
         bvh_tree_finish(&tree);
     }
     input_finish(&input);
