@@ -4,12 +4,13 @@
 
 equal_time.py BUILD [--samples N] [--only A,B] [--size WxH] [--option OPTION].. [--denoise] [--out FOLDER]
 
-Each renders five scenes with N and 4 N samples and with 64 N, its own truth, for neither is the other's. Noise is the mean
-squared error of luminance relative to the truth's square; what the truth's own noise adds is taken off. Time is that of
-processors, so that others on the machine count little, without loading, trees and compiling: what both renders have in
-common falls out of their difference. Through both points goes a power of time, and at the noise that Cycles has at 4 N
-the times are compared. --option is one more of `farlight render`, such as --option=--tracer=reference. With --denoise the
-error of a denoised picture of N samples is measured as well, and its time compared with Cycles' to that error, undenoised.
+Each renderer renders five scenes without clamps or denoiser, with N and 4 N samples and with 64 N, which is its own truth:
+neither renderer's truth is the other's, as Cycles sees materials as Blender's importers make them. Noise is the mean squared
+error of luminance relative to the square of the truth's; the truth's own noise is subtracted. Time is processor time, so
+other work on the machine counts little; loading, building trees and compiling cancel out in the difference of both renders.
+A power of time through both points gives the time at which each renderer reaches the noise that Cycles has at 4 N samples.
+--option adds an option of `farlight render`, such as --option=--tracer=reference. --denoise also measures the error of a
+denoised picture of N samples, and compares its time with that of Cycles to the same error without a denoiser.
 
 Blender comes from the Debian package of that name. Writes equal-time.txt and equal-time.json, and the pictures.
 Exit status: 0 measured, 1 a renderer failed, 2 wrong usage."""

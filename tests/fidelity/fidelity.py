@@ -1,18 +1,20 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Renders scenes whose pictures by other renderers are known, and says how far ours are from theirs.
+"""Renders scenes whose pictures by other renderers are known, and measures how far ours are from theirs.
 
 fidelity.py BUILD [--samples N] [--small] [--only A,B] [--jobs N] [--out FOLDER]
 
 Models, cameras, environments and the others' pictures are in the folder fidelity of FARLIGHT_SCENES (default:
-../shared/scenes beside the checkout). Of each scene the mean absolute difference to each path tracer is measured, in
-steps of 255 and of means of 4 x 4 pixels where all of them see a surface. The spread is that between the two path
-tracers that differ most, or, where there is one, its difference to the nearest rasteriser. Where our difference to the
-nearest path tracer is within the spread, our picture is as true as theirs. known.json says what we do not show, and which
-renderers do not show what a scene is about: they are no judges of it.
+../shared/scenes beside the checkout). All pictures are brought to one display curve. For each scene the mean absolute
+difference to each path tracer is measured, in steps of 255 and over means of 4 x 4 pixels where all of them see a surface.
+The spread is the difference between the two path tracers that differ most, or, if there is only one, its difference to the
+nearest rasteriser. Our picture is as true as theirs if its difference to the nearest path tracer is within the spread.
+A wide spread is a weak judge, so the sum names scenes that are within it although an effect is missing. Noise counts as a
+difference: with fewer samples than 256 more scenes are outside, and only scenes that could not be rendered fail.
+known.json lists effects that farlight does not have, and renderers that lack a scene's main effect: they do not judge it.
 
-Writes fidelity.txt, fidelity.json and index.html, pictures side by side. What was rendered by the same programs with the
-same command is taken from before, so a run that was stopped goes on.
+Writes fidelity.txt, fidelity.json and index.html, pictures side by side. A picture that the same programs
+rendered with the same command is used again, so a run that was stopped continues.
 Exit status: 0 all goals are reached, 1 some are not (the last lines say which), 2 wrong usage."""
 import argparse
 import concurrent.futures
