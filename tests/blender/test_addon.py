@@ -1,9 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""The add-on in Blender: pictures beside Cycles' of the same scene, what is sent, and what goes wrong.
+"""The add-on in Blender: pictures beside Cycles' of the same scene, sent messages, and failures.
 
-Run by `make blender-test`. Pictures are compared by the means of 8 x 6 parts. With Lambert's surfaces both engines compute the same light:
-what differs is noise, 0.5 % of a part's mean at these samples, and the filter at the edges of what is small. Where the models of
-materials differ, a test says by what."""
+Run by `make blender-test`. Pictures are compared by the means of 8 x 6 parts. With Lambert's surfaces both engines compute the same
+light: they differ by noise, 0.5 % of a part's mean at these samples, and by the filter at the edges of small things. The models of
+materials and lights differ as follows:
+- Cycles scatters all light below a mirroring surface, farlight the part that the surface lets through: plastic is 3 % darker here, up
+  to 8 % at grazing angles; fur is 1.4 % darker. Fully rough plastic is Lambert's here and Burley's there: 1 %.
+- Cycles' GGX (without Multiscatter) loses 12 % of the light of rough metal, half at a roughness of 1; its Filter Glossy loses a third
+  below glass.
+- Between texels, Cycles interpolates sRGB's numbers, farlight light: hard edges are lighter here. Cycles darkens bumps that face a
+  light by 10 % more than their surface.
+- Light passes straight through glass here: from hardly a shadow to half more light behind it than by Cycles' caustics. Spots are sums
+  of four cones: 1 % on average, 3 % at a soft edge.
+"""
 import contextlib
 import math
 import os

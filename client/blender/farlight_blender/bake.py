@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Baked textures: pictures of the values of nodes that no field of a material can express, laid out by the active UV map."""
+"""Baked textures: pictures of the values of nodes (Noise, Voronoi, Checker, Color Ramp ..) that no field of a material can express, laid
+out by the active UV map. Without a UV map a value is replaced by its mean.
+"""
 from __future__ import annotations
 
 import functools

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Blender's shaders, and mixtures of them, as a single material of metal, dielectric and alpha."""
+"""Blender's shaders, and mixtures of them by Mix and Add Shader, also by a mask, as a single material of metal, dielectric and alpha.
+A volume without a surface shows none: only its absorption is drawn.
+"""
 from __future__ import annotations
 
 from collections.abc import Callable

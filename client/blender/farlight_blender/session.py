@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Connections to daemons. Blender forbids Python threads of an add-on, so a connection runs only while it is waited for, in
-slices, between which Blender is asked whether the user has cancelled."""
+slices, between which Blender is asked whether the user has cancelled: Esc ends a job within some 0.1 s.
+
+A daemon that is away, full, or refuses a value ends the render with an error that names the address or field; the picture keeps
+what has arrived, and the next F12 connects again and sends the whole scene. The error of a failed ssh has its last line, and a
+command that shows what is missing.
+"""
 from __future__ import annotations
 
 import asyncio

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Objects with places and radii but no faces: hairs of particle systems, curves and points.
 
-Hairs and curves become tubes of triangles, points exact spheres. The selection of hairs and their thickness are as in Cycles.
+Hairs and curves become tubes of triangles with six sides (a hair of 8 steps has 96), points exact spheres. The selection of hairs
+and their thickness are as in Cycles.
 """
 from __future__ import annotations
 

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The viewport: a view of the daemon's, whose newest frame is drawn."""
+"""The viewport: a view of the daemon's, whose newest frame is drawn.
+
+It has a scene and a job of its own; a flat view is a perspective one with a field of 1 degree. Nothing waits for the daemon: a lost
+one is tried again after 1 s, then 2, up to 8.
+"""
 from __future__ import annotations
 
 import asyncio
