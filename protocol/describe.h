@@ -29,7 +29,7 @@ enum field_kind {
     FIELD_ENUM,   /* enumeration */
     FIELD_REAL,   /* `count` floats (1: REAL, else REALS); real_min, real_max */
     FIELD_BYTES,  /* `count` bytes */
-    FIELD_RECORD, /* one `record`, which has fixed fields alone */
+    FIELD_RECORD, /* a nested `record` with fixed fields only */
     FIELD_STRING, /* `max` bytes; counted from here on */
     FIELD_ARRAY,  /* `max` records of `record` */
     FIELD_BULK,   /* `max` bytes */

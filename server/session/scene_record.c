@@ -21,7 +21,7 @@ struct sink {
     const atomic_bool *abandoned;
     size_t objects;
     bool failed;
-    struct record_blob_ref arrays[MESH_ARRAY_COUNT]; /* of the message that is being made */
+    struct record_blob_ref arrays[MESH_ARRAY_COUNT]; /* arrays of the message that is being made */
 };
 
 static bool fail(struct sink *sink)

@@ -13,7 +13,7 @@
 #include "protocol/describe.h"
 #include "protocol/plain_text.h"
 
-#define FIELDS_MAX 64 /* of a message of an object */
+#define FIELDS_MAX 64 /* fields of an object's message */
 
 /* ---- text ---- */
 

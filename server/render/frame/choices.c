@@ -7,16 +7,16 @@
 #include "shared/path.h"
 #include "shared/ray.h"
 
-/* Rays of a slice: as many as suit the device, if the buffers of its waves take no more than this part of its
- * memory; the second, where that is not known. What takes long is traced in parts (waves/trace.h), but where
+/* Rays of a slice, unless the buffers of its waves would take more than 1 / SLICE_MEMORY_PART of the device's
+ * memory; SLICE_RAYS_UNTOLD if the memory is not known. Long waves are traced in parts (waves/trace.h), except where
  * tracers are compared. */
 #define SLICE_RAYS_UNTOLD (1u << 18)
 #define SLICE_RAYS_MIN (1u << 12)
-/* The same where there are many lights: a work group of the passes over hits. */
+/* Minimum where there are many lights: a work group of the passes over hits. */
 #define SLICE_RAYS_LIT_MIN (1u << 6)
 #define SLICE_MEMORY_PART 64
 
-/* Not by the limit in force, which changes with the frames of others. */
+/* Ignores the limit in force, which changes with the frames of others. */
 uint32_t choices_slice_rays(const struct gpu_device *device, bool compared, uint32_t lights)
 {
     const struct gpu_facts *facts = &device->facts;
