@@ -6,7 +6,7 @@ Run from the root of the project. One line for each fault, and exit status 1. Fa
 elsewhere, a source without an opening line, and a README of more than README_LINES lines.
 
 A comment is one /* .. */, or neighbouring lines of //, that hold at least one letter; the licence line is none. It opens
-with its first word. `(docs)` are the texts of rows in .def files, which become help, man pages and documents.
+with its first word. The text of a row in a .def file counts as well: it becomes help, a man page and documents.
 A source says what it is in a comment before its first code, set off from it: an include, a guard or an empty line follows.
 For NAME.c the opening of a NAME.h in the same folder counts: what both are stands once.
 """
