@@ -21,7 +21,7 @@ static const struct subcommand {
 } subcommands[] = {
     {"render", "farlight render", cli_render, "render one picture of a model"},
     {"animate", "farlight animate", cli_animate, "render a series of pictures or a video"},
-    {"turntable", "farlight turntable", cli_turntable, "render a camera's way once around a model"},
+    {"turntable", "farlight turntable", cli_turntable, "render a full turn of the camera around a model"},
     {"thumbnail", "farlight thumbnail", cli_thumbnail, "render a contact sheet of many models"},
     {"view", "farlight view", cli_view, "open a window on a model or a shared scene"},
     {"info", "farlight info", cli_info, "show what a model file contains"},

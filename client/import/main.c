@@ -74,9 +74,9 @@ static const struct argp_option option_rows[] = {
     {"at", OPTION_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
      "place the MODEL named before: metres, degrees about x, then y, then z, and a factor", 0},
     {"format", OPTION_FORMAT, "NAME", 0,
-     "take the MODEL named before for such a file, as glb (default: by its name, else its first bytes)", 0},
-    {"no-sky", OPTION_NO_SKY, NULL, 0,
-     "leave a model's lights alone (default: a sky beside them, but not in rooms)", 0},
+     "read the MODEL named before as such a file, for example glb (default: by its name, else its first bytes)",
+     0},
+    {"no-sky", OPTION_NO_SKY, NULL, 0, "add no sky to models with lights (default: a sky, but not in rooms)", 0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 

@@ -51,12 +51,12 @@ static const struct argp_option options[] = {
      "any free one; may be repeated",
      -2},
     {"host", KEY_HOST, "NAME", 0,
-     "Answer browsers that ask for this name, such as a proxy's; may be repeated (addresses and localhost are "
+     "Answer requests to this host name, such as a proxy's; may be repeated (addresses and localhost are "
      "always "
      "answered)",
      -2},
     {"insecure", KEY_INSECURE, NULL, 0,
-     "Let --listen be beyond this machine: who can read the network's traffic gets the link and the pictures", -2},
+     "Allow --listen beyond this machine: readers of the network's traffic get the link and the pictures", -2},
     {"viewers", KEY_VIEWERS, "N", 0, "Serve at most N browsers at a time, 1 to 64 (default 8)", -2},
     {"allow-edit", KEY_ALLOW_EDIT, NULL, 0,
      "Print a second link, whose users may edit the scene for all who view it", -2},

@@ -56,7 +56,7 @@ static const struct argp_option options[] = {
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
      "Turn the environment about +y by -360 to 360 (default 0: its middle column is +x)", 0},
     {"at", KEY_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
-     "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; again: one more of it",
+     "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; repeat it for a copy",
      0},
     {"variant", KEY_VARIANT, "NAME", 0, "Show the materials of this variant of a glTF model", 0},
     {"watch", KEY_WATCH, NULL, 0, "Load the model again when it, or a file that it names, has changed", 0},

@@ -143,9 +143,8 @@ static bool read_all(struct animation *animation, int argc, char **argv)
                     "--scene NAME --server ADDRESS --frames A-B -o 'DIR/%04d.exr'\n--script SHOT.json",
         .doc =
             "Render a series of pictures or a video of a model, with clips or a moving camera. 'farlight "
-            "turntable' does the "
-            "same with --orbit: once around the model, which takes 4 seconds unless something else says how "
-            "long.\v"
+            "turntable' does the same with --orbit: once around the model, in 4 seconds unless --frames or "
+            "--script says otherwise.\v"
             "In the name of the images write %d or %04d for the frame's number and %% for a percent sign. Videos "
             "end in .mp4, .mkv or .y4m, moving pictures, whose name has no %d, in .gif or .webp; '-' is standard "
             "output, as y4m or as --format says.",

@@ -353,10 +353,10 @@ int cli_thumbnail(int argc, char **argv)
                               .parser = parse,
                               .args_doc = "FOLDER|MODEL... -o SHEET.png\nFOLDER|MODEL... -o FOLDER/",
                               .doc =
-                                  "Render a contact sheet of models: those that are named, and all in folders and "
-                                  "the folders below.\v"
-                                  "A model that cannot be read does not stop the others: its place says why, and "
-                                  "the exit status is 1.",
+                                  "Render a contact sheet of the named models, and of all models in and below the "
+                                  "named folders.\v"
+                                  "In place of a model that cannot be read stands the reason; the others are "
+                                  "rendered, and the exit status is 1.",
                               .children = children};
     struct message_render defaults = fl_render_defaults();
     struct thumbnails wanted = {.columns = 0};
