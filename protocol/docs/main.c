@@ -52,7 +52,7 @@ static void print_capabilities(void)
 
 static void print_handshake(void)
 {
-    printf("## Handshake\n\n"
+    printf("\n## Handshake\n\n"
            "The layout of the handshake never changes. The client begins, with at most %u bytes:\n\n"
            "| offset | type | field |\n| ---: | --- | --- |\n"
            "| 0 | 4 bytes | `FARL` |\n"
