@@ -122,7 +122,7 @@ WARP_OBJ := $(call obj,$(WARP_SRC))
 LIB_OBJ := $(call obj,$(LIB_SRC) $(EDIT_SRC)) $(WARP_OBJ) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # What programs share is linked to each of them, as an archive: each takes what it needs. Tests link the windows' and pages' parts so, too.
-HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
+HELPER_OBJ := $(call obj,$(call sources,client/helper,c) protocol/common/landlock.c)
 OPTIONS_OBJ := $(call obj,$(call sources,client/options,c))
 VIEWER_OBJ := $(call obj,$(VIEWER_C))
 WEB_OBJ := $(call obj,$(WEB_C))

@@ -2,12 +2,11 @@
 /* The sandbox of helper programs: limits, Landlock, seccomp. */
 #include "sandbox.h"
 
+#include "protocol/common/landlock.h"
 #include "protocol/sanitized.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <linux/landlock.h>
 #include <sched.h>
 #include <seccomp.h>
 #include <signal.h>
@@ -18,16 +17,7 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/syscall.h>
 #include <unistd.h>
-
-/* Constants that the headers of some supported distributions lack. */
-#ifndef LANDLOCK_ACCESS_FS_TRUNCATE
-#define LANDLOCK_ACCESS_FS_TRUNCATE (1ULL << 14)
-#endif
-#ifndef LANDLOCK_ACCESS_FS_IOCTL_DEV
-#define LANDLOCK_ACCESS_FS_IOCTL_DEV (1ULL << 15)
-#endif
 
 #define DEFAULT_ADDRESS_SPACE_BYTES (8ULL << 30)
 #define UNCONFINED "FARLIGHT_UNCONFINED" /* environment variable */
@@ -59,24 +49,9 @@ static bool set_limits(const struct sandbox_options *options)
     return set_limit(RLIMIT_CORE, 0) && (SANITIZED || set_limit(RLIMIT_FSIZE, options->file_bytes));
 }
 
-/* Counts threads, since Landlock binds only the thread that enters it and its later children: code in a bound
- * thread can act through an unbound one by a signal or shared memory. 0: unknown. */
-static unsigned count_threads(void)
-{
-    DIR *tasks = opendir("/proc/self/task");
-    unsigned count = 0;
-
-    if (!tasks)
-        return 0;
-    for (const struct dirent *task; (task = readdir(tasks));)
-        count += task->d_name[0] != '.';
-    closedir(tasks);
-    return count;
-}
-
 static bool is_alone(char *reason, size_t reason_bytes)
 {
-    const unsigned threads = count_threads();
+    const unsigned threads = landlock_thread_count();
 
     if (threads == 0)
         snprintf(reason, reason_bytes, "cannot count the threads of this process: /proc/self/task: %s",
@@ -90,30 +65,14 @@ static bool is_alone(char *reason, size_t reason_bytes)
 
 /* ---- Landlock ---- */
 
-static uint64_t rights_of_abi(long abi)
-{
-    uint64_t rights = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1; /* ABI 1: execute .. make_sym */
-
-    if (abi >= 2)
-        rights |= LANDLOCK_ACCESS_FS_REFER;
-    if (abi >= 3)
-        rights |= LANDLOCK_ACCESS_FS_TRUNCATE;
-    if (abi >= 5)
-        rights |= LANDLOCK_ACCESS_FS_IOCTL_DEV;
-    return rights;
-}
-
 /* Grants rights to a folder. A missing folder is no error here: opening a file in it reports that. */
 static bool allow_folder(int ruleset, const char *folder, uint64_t rights)
 {
-    struct landlock_path_beneath_attr rule = {.allowed_access = rights};
-    bool allowed;
+    const int fd = open(folder, O_PATH | O_CLOEXEC | O_DIRECTORY);
+    const bool allowed = fd < 0 || landlock_allow(ruleset, fd, rights);
 
-    rule.parent_fd = open(folder, O_PATH | O_CLOEXEC | O_DIRECTORY);
-    if (rule.parent_fd < 0)
-        return true;
-    allowed = syscall(SYS_landlock_add_rule, ruleset, LANDLOCK_RULE_PATH_BENEATH, &rule, 0) == 0;
-    close(rule.parent_fd);
+    if (fd >= 0)
+        close(fd);
     return allowed;
 }
 
@@ -146,19 +105,15 @@ static bool allow_folders(int ruleset, const struct sandbox_options *options, ui
 /* -1: the kernel has no Landlock; 0: failed; 1: in force */
 static int enter_landlock(const struct sandbox_options *options)
 {
-    struct landlock_ruleset_attr attributes = {0};
-    long abi = syscall(SYS_landlock_create_ruleset, NULL, 0, LANDLOCK_CREATE_RULESET_VERSION);
-    int ruleset;
+    uint64_t handled;
+    const int ruleset = landlock_create(&handled);
     bool entered;
 
-    if (abi < 1)
+    if (handled == 0)
         return -1;
-    attributes.handled_access_fs = rights_of_abi(abi);
-    ruleset = (int)syscall(SYS_landlock_create_ruleset, &attributes, sizeof(attributes), 0);
     if (ruleset < 0)
         return 0;
-    entered = allow_folders(ruleset, options, attributes.handled_access_fs) &&
-              syscall(SYS_landlock_restrict_self, ruleset, 0) == 0;
+    entered = allow_folders(ruleset, options, handled) && landlock_enforce(ruleset);
     close(ruleset);
     return entered ? 1 : 0;
 }

@@ -2,39 +2,22 @@
 /* Sandbox of a process that serves clients: Landlock and seccomp. */
 #include "base/confinement.h"
 
+#include "protocol/common/landlock.h"
 #include "protocol/sanitized.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <linux/landlock.h>
 #include <sched.h>
 #include <seccomp.h>
-#include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
-/* Headers of some supported distributions lack this. */
-#ifndef LANDLOCK_ACCESS_FS_TRUNCATE
-#define LANDLOCK_ACCESS_FS_TRUNCATE (1ULL << 14)
-#endif
-#ifndef LANDLOCK_ACCESS_FS_IOCTL_DEV
-#define LANDLOCK_ACCESS_FS_IOCTL_DEV (1ULL << 15)
-#endif
-#define ACCESS_NET (3ULL) /* LANDLOCK_ACCESS_NET_BIND_TCP and _CONNECT_TCP, ABI 4 */
-#define SCOPES (3ULL)     /* LANDLOCK_SCOPE_ABSTRACT_UNIX_SOCKET and _SIGNAL, ABI 6 */
 #define PATHS_MAX 128
-
-/* struct landlock_ruleset_attr in ABI 6; an older kernel reads its first members. */
-struct ruleset_attributes {
-    uint64_t handled_access_fs, handled_access_net, scoped;
-};
 
 struct confinement {
     struct {
@@ -78,30 +61,13 @@ void confinement_destroy(struct confinement *confinement)
 
 /* ---- Landlock ---------------------------------------------------------------------------------------- */
 
-/* Whether the calling thread is the only one. Landlock binds the thread that enters it and those that it
- * starts; an unbound thread shares the memory, and could be made to act for a bound one. */
 static bool is_alone(struct error *error)
 {
-    DIR *tasks = opendir("/proc/self/task");
-    unsigned count = 0;
-    if (!tasks)
+    const unsigned threads = landlock_thread_count();
+    if (threads == 0)
         return error_set(error, ERROR_INTERNAL, "sandbox", "/proc/self/task: %s", strerror(errno));
-    for (const struct dirent *task; (task = readdir(tasks));)
-        count += task->d_name[0] != '.';
-    closedir(tasks);
-    return count == 1 || error_set(error, ERROR_INTERNAL, "sandbox", "the process has %u threads already", count);
-}
-
-static uint64_t rights_of_abi(long abi)
-{
-    uint64_t rights = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1; /* ABI 1: execute .. make_sym */
-    if (abi >= 2)
-        rights |= LANDLOCK_ACCESS_FS_REFER;
-    if (abi >= 3)
-        rights |= LANDLOCK_ACCESS_FS_TRUNCATE;
-    if (abi >= 5)
-        rights |= LANDLOCK_ACCESS_FS_IOCTL_DEV;
-    return rights;
+    return threads == 1 ||
+           error_set(error, ERROR_INTERNAL, "sandbox", "the process has %u threads already", threads);
 }
 
 static uint64_t rights_of(enum confined_access access, bool is_folder)
@@ -125,35 +91,21 @@ static uint64_t rights_of(enum confined_access access, bool is_folder)
 
 static bool add_rules(const struct confinement *confinement, int ruleset, uint64_t handled)
 {
-    for (size_t i = 0; i < confinement->count; i++) {
-        const struct landlock_path_beneath_attr rule = {
-            .allowed_access = rights_of(confinement->paths[i].access, confinement->paths[i].is_folder) & handled,
-            .parent_fd = confinement->paths[i].fd};
-        if (syscall(SYS_landlock_add_rule, ruleset, LANDLOCK_RULE_PATH_BENEATH, &rule, 0) != 0)
-            return false;
-    }
-    return true;
+    bool ok = true;
+    for (size_t i = 0; ok && i < confinement->count; i++)
+        ok = landlock_allow(ruleset, confinement->paths[i].fd,
+                            rights_of(confinement->paths[i].access, confinement->paths[i].is_folder) & handled);
+    return ok;
 }
 
 static bool enter_landlock(const struct confinement *confinement, bool *has_files, struct error *error)
 {
-    const long abi = syscall(SYS_landlock_create_ruleset, NULL, 0, LANDLOCK_CREATE_RULESET_VERSION);
-    *has_files = abi >= 1;
-    if (!*has_files)
-        return true;
-    const struct ruleset_attributes attributes = {
-        .handled_access_fs = rights_of_abi(abi),
-        .handled_access_net = abi >= 4 ? ACCESS_NET : 0,
-        .scoped = abi >= 6 ? SCOPES : 0,
-    };
-    const size_t bytes = abi >= 6   ? sizeof(attributes)
-                         : abi >= 4 ? offsetof(struct ruleset_attributes, scoped)
-                                    : sizeof(attributes.handled_access_fs);
-    const int ruleset = (int)syscall(SYS_landlock_create_ruleset, &attributes, bytes, 0);
-    const bool ok = ruleset >= 0 && add_rules(confinement, ruleset, attributes.handled_access_fs) &&
-                    syscall(SYS_landlock_restrict_self, ruleset, 0) == 0;
-    if (!ok)
-        error_set(error, ERROR_INTERNAL, "sandbox", "Landlock refused the rules: %s", strerror(errno));
+    uint64_t handled;
+    const int ruleset = landlock_create(&handled);
+    *has_files = handled != 0;
+    const bool ok = !*has_files ||
+                    (ruleset >= 0 && add_rules(confinement, ruleset, handled) && landlock_enforce(ruleset)) ||
+                    error_set(error, ERROR_INTERNAL, "sandbox", "Landlock refused the rules: %s", strerror(errno));
     if (ruleset >= 0)
         close(ruleset);
     return ok;

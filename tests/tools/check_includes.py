@@ -69,7 +69,7 @@ MAY_INCLUDE = {
     "client/warp": ("shaders/quadtree",),  # no protocol, GL, window or socket
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
     "client/edit": ("protocol", "protocol/common", "client/lib"),  # a part of the library
-    "client/helper": ("protocol",),
+    "client/helper": ("protocol", "protocol/common"),
     "client/import/model": ("protocol", "protocol/common"),
     "client/import/image": ("protocol/common", "client/helper"),
     "client/import/obj": ("protocol/common", "client/import/model", "client/import/image"),
