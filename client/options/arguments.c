@@ -658,93 +658,45 @@ error_t cli_job_set(struct cli_job *job, const char *name, const char *value)
     return ARGP_ERR_UNKNOWN;
 }
 
-static bool is_among(const struct argp_option *option, const char *const *names)
+/* Options that a set lacks, between blanks; NULL: it has all. */
+static const char *const left_out[CLI_OPTIONS_COUNT] = {
+    [CLI_OPTIONS_PICTURE] =
+        " parents output format tone-map tracer primary timings trace-file layers light-group "
+        "retry-for retries metadata stereo stereo-layout light-field baseline views lens noise ",
+    [CLI_OPTIONS_VIEWS] =
+        " parents output format timings trace-file layers light-group retry-for retries metadata "
+        "stereo-layout noise crop ",
+    [CLI_OPTIONS_THUMBNAIL] = " output timings trace-file layers light-group retry-for retries metadata "
+                              "stereo-layout noise stereo baseline light-field views lens clip-once clip-start "
+                              "clip-speed clip at variant frame ",
+    [CLI_OPTIONS_WINDOW] = " parents output format samples integrator timings trace-file layers light-group "
+                           "clip-once clip-start encoding retries metadata light-field baseline views crop ",
+    [CLI_OPTIONS_PAGE] =
+        " parents output format samples integrator timings trace-file layers light-group clip-once "
+        "retry-for clip-start clip-speed clip encoding retries light-field metadata stereo-layout "
+        "baseline views crop stereo lens size ",
+};
+/* No set that lacks options has those of image files. */
+static const char of_files[] = " half float exr-compression colour-space display-view ocio ";
+
+static bool is_among(const struct argp_option *option, const char *names)
 {
-    for (size_t i = 0; option->name && names[i]; i++)
-        if (strcmp(option->name, names[i]) == 0)
-            return true;
-    return false;
+    char name[40];
+    snprintf(name, sizeof(name), " %s ", option->name ? option->name : "");
+    return strstr(names, name);
 }
 
-/* Copies all options except `left_out`, and except those of image files. */
-static void keep(struct argp_option *kept, const char *const *left_out)
+const struct argp *cli_options_argp(enum cli_options set)
 {
-    static const char *const of_files[] = {"half", "float", "exr-compression", "colour-space", "display-view",
-                                           "ocio", NULL};
+    static struct argp_option kept[CLI_OPTIONS_COUNT][OPTIONS_MAX];
+    static struct argp argps[CLI_OPTIONS_COUNT];
     size_t count = 0;
     for (const struct argp_option *option = all_options(); option->name || option->doc; option++) {
-        if (!is_among(option, left_out) && !is_among(option, of_files))
-            kept[count++] = *option;
+        if (!left_out[set] || !(is_among(option, left_out[set]) || is_among(option, of_files)))
+            kept[set][count++] = *option;
     }
-}
-
-const struct argp *cli_job_argp(void)
-{
-    static struct argp argp = {.parser = parse};
-    argp.options = all_options();
-    return &argp;
-}
-
-const struct argp *cli_picture_argp(void)
-{
-    static const char *const left_out[] = {
-        "parents",       "output",      "format",      "tone-map",  "tracer",  "primary",  "timings",
-        "trace-file",    "layers",      "light-group", "retry-for", "retries", "metadata", "stereo",
-        "stereo-layout", "light-field", "baseline",    "views",     "lens",    "noise",    NULL};
-    static struct argp_option kept[OPTIONS_MAX];
-    static const struct argp argp = {.options = kept, .parser = parse};
-    keep(kept, left_out);
-    return &argp;
-}
-
-const struct argp *cli_views_argp(void)
-{
-    static const char *const left_out[] = {"parents",       "output",      "format",    "timings", "trace-file",
-                                           "layers",        "light-group", "retry-for", "retries", "metadata",
-                                           "stereo-layout", "noise",       "crop",      NULL};
-    static struct argp_option kept[OPTIONS_MAX];
-    static const struct argp argp = {.options = kept, .parser = parse};
-    keep(kept, left_out);
-    return &argp;
-}
-
-const struct argp *cli_thumbnail_argp(void)
-{
-    static const char *const left_out[] = {
-        "output",      "timings",  "trace-file",    "layers",    "light-group", "retry-for",
-        "retries",     "metadata", "stereo-layout", "noise",     "stereo",      "baseline",
-        "light-field", "views",    "lens",          "clip-once", "clip-start",  "clip-speed",
-        "clip",        "at",       "variant",       "frame",     NULL};
-    static struct argp_option kept[OPTIONS_MAX];
-    static const struct argp argp = {.options = kept, .parser = parse};
-    keep(kept, left_out);
-    return &argp;
-}
-
-const struct argp *cli_view_argp(void)
-{
-    static const char *const left_out[] = {"parents",    "output",     "format",  "samples",     "integrator",
-                                           "timings",    "trace-file", "layers",  "light-group", "clip-once",
-                                           "clip-start", "encoding",   "retries", "metadata",    "light-field",
-                                           "baseline",   "views",      "crop",    NULL};
-    static struct argp_option kept[OPTIONS_MAX];
-    static const struct argp argp = {.options = kept, .parser = parse};
-    keep(kept, left_out);
-    return &argp;
-}
-
-const struct argp *cli_web_argp(void)
-{
-    static const char *const left_out[] = {"parents",   "output",      "format",     "samples",       "integrator",
-                                           "timings",   "trace-file",  "layers",     "light-group",   "clip-once",
-                                           "retry-for", "clip-start",  "clip-speed", "clip",          "encoding",
-                                           "retries",   "light-field", "metadata",   "stereo-layout", "baseline",
-                                           "views",     "crop",        "stereo",     "lens",          "size",
-                                           NULL};
-    static struct argp_option kept[OPTIONS_MAX];
-    static const struct argp argp = {.options = kept, .parser = parse};
-    keep(kept, left_out);
-    return &argp;
+    argps[set] = (struct argp){.options = kept[set], .parser = parse};
+    return &argps[set];
 }
 
 /* Reads FARLIGHT_SIZE for --size, and so on. */

@@ -5,19 +5,18 @@
 
 #include "options/job.h"
 
-/* Parsers of the options of a job, for use as child parsers; their input is a struct cli_job. The first one has
- * all options. */
-const struct argp *cli_job_argp(void);
-/* No options of output, tracer and first hits. */
-const struct argp *cli_picture_argp(void);
-/* No options of output. */
-const struct argp *cli_views_argp(void);
-/* Pictures of many models. */
-const struct argp *cli_thumbnail_argp(void);
-/* A window: no options of files; samples, integrator and encoding have other defaults. */
-const struct argp *cli_view_argp(void);
-/* A page in a browser, which chooses size and clips itself. */
-const struct argp *cli_web_argp(void);
+/* Sets of a job's options. */
+enum cli_options {
+    CLI_OPTIONS_ALL,
+    CLI_OPTIONS_PICTURE,   /* no options of output, tracer and first hits */
+    CLI_OPTIONS_VIEWS,     /* no options of output */
+    CLI_OPTIONS_THUMBNAIL, /* pictures of many models */
+    CLI_OPTIONS_WINDOW,    /* no options of files; samples, integrator and encoding have other defaults */
+    CLI_OPTIONS_PAGE,      /* a page in a browser, which chooses size and clips itself */
+    CLI_OPTIONS_COUNT
+};
+/* Parser of a set, for use as a child parser; its input is a struct cli_job. */
+const struct argp *cli_options_argp(enum cli_options set);
 /* Sets the defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job, struct message_render defaults);
 /* Sets an option as the command line "--OPTION VALUE" does; NULL for an option without a value.

@@ -400,7 +400,7 @@ static bool read_all(struct command_line *line, const struct argp *argp, int arg
 int main(int argc, char **argv)
 {
     static struct argp_child children[2];
-    children[0].argp = cli_view_argp();
+    children[0].argp = cli_options_argp(CLI_OPTIONS_WINDOW);
     static const struct argp argp = {.options = options,
                                      .parser = parse,
                                      .args_doc = "MODEL [--at PLACE] [MODEL [--at PLACE]]...",

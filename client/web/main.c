@@ -320,7 +320,7 @@ static void serve(struct command_line *line, struct fl_error *error)
 int main(int argc, char **argv)
 {
     static struct argp_child children[2];
-    children[0].argp = cli_web_argp();
+    children[0].argp = cli_options_argp(CLI_OPTIONS_PAGE);
     static const struct argp argp = {
         .options = options,
         .parser = parse,

@@ -215,7 +215,8 @@ static void print_json(const struct tracer_comparison *comparison)
 
 int cli_compare_tracers(int argc, char **argv)
 {
-    const struct argp_child children[] = {{&cli_pair_argp, 0, NULL, 0}, {cli_picture_argp(), 0, NULL, 0}, {0}};
+    const struct argp_child children[] = {
+        {&cli_pair_argp, 0, NULL, 0}, {cli_options_argp(CLI_OPTIONS_PICTURE), 0, NULL, 0}, {0}};
     const struct argp argp = {
         .options = options,
         .parser = parse,

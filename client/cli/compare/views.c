@@ -293,8 +293,10 @@ static void finish(struct views_comparison *comparison)
 
 int cli_compare_views(int argc, char **argv)
 {
-    const struct argp_child children[] = {
-        {&cli_pair_argp, 0, NULL, 0}, {cli_views_argp(), 0, NULL, 0}, {cli_series_argp(), 0, NULL, 0}, {0}};
+    const struct argp_child children[] = {{&cli_pair_argp, 0, NULL, 0},
+                                          {cli_options_argp(CLI_OPTIONS_VIEWS), 0, NULL, 0},
+                                          {cli_series_argp(), 0, NULL, 0},
+                                          {0}};
     const struct argp argp = {
         .options = options,
         .parser = parse,

@@ -135,7 +135,8 @@ static bool apply_script(struct animation *animation, const struct animation *ty
 
 static bool read_all(struct animation *animation, int argc, char **argv)
 {
-    const struct argp_child children[] = {{cli_series_argp(), 0, NULL, 0}, {cli_job_argp(), 0, NULL, 0}, {0}};
+    const struct argp_child children[] = {
+        {cli_series_argp(), 0, NULL, 0}, {cli_options_argp(CLI_OPTIONS_ALL), 0, NULL, 0}, {0}};
     const struct argp argp = {
         .options = options,
         .parser = parse,

@@ -115,7 +115,7 @@ static bool complete(struct cli_job *job)
 
 int cli_render(int argc, char **argv)
 {
-    const struct argp_child children[] = {{cli_job_argp(), 0, NULL, 0}, {0}};
+    const struct argp_child children[] = {{cli_options_argp(CLI_OPTIONS_ALL), 0, NULL, 0}, {0}};
     const struct argp argp = {
         .options = options,
         .parser = parse,

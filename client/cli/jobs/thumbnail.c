@@ -348,7 +348,7 @@ static int thumbnails(struct thumbnails *wanted)
 
 int cli_thumbnail(int argc, char **argv)
 {
-    const struct argp_child children[] = {{cli_thumbnail_argp(), 0, NULL, 0}, {0}};
+    const struct argp_child children[] = {{cli_options_argp(CLI_OPTIONS_THUMBNAIL), 0, NULL, 0}, {0}};
     const struct argp argp = {.options = option_rows,
                               .parser = parse,
                               .args_doc = "FOLDER|MODEL... -o SHEET.png\nFOLDER|MODEL... -o FOLDER/",
