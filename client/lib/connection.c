@@ -359,7 +359,7 @@ static bool read_key(struct sealed_key *key, const char *key_file, struct fl_err
 }
 
 /* Reports the first line of the peer's bytes, which shows what kind of server answered. */
-static void report_other_server(const struct fl_connection *connection, const struct decode_error *why,
+static bool report_other_server(const struct fl_connection *connection, const struct decode_error *why,
                                 struct fl_error *error)
 {
     const struct fl_stream *stream = &connection->stream;
@@ -374,58 +374,77 @@ static void report_other_server(const struct fl_connection *connection, const st
     if (strncmp(connection->address, "ssh:", 4) == 0)
         fl_error_remedy(error, "'ssh HOST true' must print nothing: keep .bashrc and other login scripts quiet "
                                "where there is no terminal");
+    return false;
+}
+
+static bool send_hello(struct fl_connection *connection, const char *name, struct handshake_hello *hello,
+                       struct fl_error *error)
+{
+    *hello = (struct handshake_hello){
+        .version_min = HANDSHAKE_VERSION_MIN,
+        .version_max = HANDSHAKE_VERSION_MAX,
+        .capabilities = HANDSHAKE_CAN_ABANDON | (connection->can_h264 ? HANDSHAKE_CAN_H264 : 0),
+    };
+    snprintf(hello->name, sizeof(hello->name), "%s", name);
+    if (getrandom(hello->nonce, sizeof(hello->nonce), 0) != (ssize_t)sizeof(hello->nonce))
+        return fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
+    connection->stream.out_end = handshake_hello_encode(connection->stream.out, hello);
+    return connection->stream.out_end > 0 ||
+           fl_error_set(error, FL_ERROR_ARGUMENT, "name", "the client's name is not allowed");
+}
+
+/* Sets the error's field to the address; returns false. */
+static bool name_address(const struct fl_connection *connection, struct fl_error *error)
+{
+    snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1, connection->address);
+    return false;
+}
+
+static bool accept_reply(struct fl_connection *connection, const struct handshake_hello *hello,
+                         const struct handshake_reply *reply, struct fl_error *error)
+{
+    struct decode_error why = {0};
+    if (reply->version == 0 && (reply->capabilities & HANDSHAKE_NEEDS_KEY) != 0)
+        return report_key_needed(connection, error);
+    if (fl_stream_is_turned_away(reply, error))
+        return name_address(connection, error);
+    if (!handshake_reply_accept(hello, reply, &why))
+        return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
+    connection->limits = reply->limits;
+    connection->read_only = (reply->capabilities & HANDSHAKE_CAN_READ_ONLY) != 0;
+    connection->can_h264 = connection->can_h264 && (reply->capabilities & HANDSHAKE_CAN_H264) != 0;
+    return true;
 }
 
 static bool shake_hands(struct fl_connection *connection, const char *name, uint64_t deadline_ns,
                         struct fl_error *error)
 {
     struct fl_stream *stream = &connection->stream;
-    struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
-    hello.capabilities = HANDSHAKE_CAN_ABANDON | (connection->can_h264 ? HANDSHAKE_CAN_H264 : 0);
-    snprintf(hello.name, sizeof(hello.name), "%s", name);
-    if (getrandom(hello.nonce, sizeof(hello.nonce), 0) != (ssize_t)sizeof(hello.nonce))
-        return fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
-    stream->out_end = handshake_hello_encode(stream->out, &hello);
-    if (stream->out_end == 0)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "name", "the client's name is not allowed");
-    for (;;) {
+    struct handshake_hello hello;
+    struct handshake_reply reply;
+    struct decode_error why = {0};
+    size_t consumed = 0;
+    enum handshake_result result = HANDSHAKE_NEED_MORE;
+    if (!send_hello(connection, name, &hello, error))
+        return false;
+    while (result == HANDSHAKE_NEED_MORE) {
+        if (stream->ended)
+            return fail_ended(connection, error);
         if (!serve(connection, deadline_ns, error)) {
             if (error->code == FL_ERROR_TIMEOUT)
                 fl_error_set(error, FL_ERROR_TIMEOUT, connection->address,
                              "the daemon does not answer the handshake");
             else if (error->code == FL_ERROR_REFUSED || error->code == FL_ERROR_PROTOCOL)
-                snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
-                         connection->address);
+                name_address(connection, error);
             return false;
         }
-        struct handshake_reply reply;
-        struct decode_error why = {0};
-        size_t consumed = 0;
-        const enum handshake_result result = handshake_reply_parse(
-            &reply, stream->in + stream->in_start, stream->in_end - stream->in_start, &consumed, &why);
-        if (result == HANDSHAKE_FATAL) {
-            report_other_server(connection, &why, error);
-            return false;
-        }
-        if (result == HANDSHAKE_CONSUMED) {
-            stream->in_start += consumed;
-            if (reply.version == 0 && (reply.capabilities & HANDSHAKE_NEEDS_KEY) != 0)
-                return report_key_needed(connection, error);
-            if (fl_stream_is_turned_away(&reply, error)) {
-                snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
-                         connection->address);
-                return false;
-            }
-            if (!handshake_reply_accept(&hello, &reply, &why))
-                return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
-            connection->limits = reply.limits;
-            connection->read_only = (reply.capabilities & HANDSHAKE_CAN_READ_ONLY) != 0;
-            connection->can_h264 = connection->can_h264 && (reply.capabilities & HANDSHAKE_CAN_H264) != 0;
-            return true;
-        }
-        if (stream->ended)
-            return fail_ended(connection, error);
+        result = handshake_reply_parse(&reply, stream->in + stream->in_start, stream->in_end - stream->in_start,
+                                       &consumed, &why);
     }
+    if (result == HANDSHAKE_FATAL)
+        return report_other_server(connection, &why, error);
+    stream->in_start += consumed;
+    return accept_reply(connection, &hello, &reply, error);
 }
 
 /* `farlight bridge` on the other host. A host that begins with '-' would be an option of ssh. */
@@ -507,8 +526,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     if (!open_link(connection, options, deadline_ns, error) ||
         !shake_hands(connection, options->name ? options->name : "libfarlight", deadline_ns, error)) {
         if (error->field[0] == '\0' && error->code == FL_ERROR_CONNECTION)
-            snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
-                     connection->address);
+            name_address(connection, error);
         error->retryable = error->retryable || error->code == FL_ERROR_TIMEOUT;
         connection->broken = *error;
         fl_connection_destroy(connection);
@@ -584,9 +602,9 @@ const char *fl_connection_address(const struct fl_connection *connection)
 
 bool fl_connection_limit(const struct fl_connection *connection, size_t index, struct fl_limit *limit)
 {
-    struct handshake_limit told;
-    if (!handshake_limit_at(&connection->limits, index, &told))
+    struct handshake_limit sent;
+    if (!handshake_limit_at(&connection->limits, index, &sent))
         return false;
-    *limit = (struct fl_limit){told.name, told.what, told.value};
+    *limit = (struct fl_limit){sent.name, sent.what, sent.value};
     return true;
 }

@@ -45,35 +45,27 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     snprintf(window, sizeof(window), "%u,%u,%u,%u", options->window.x, options->window.y, options->window.width,
              options->window.height);
     snprintf(rate, sizeof(rate), "%.9g", (double)options->frames_per_second);
-    const char *arguments[21] = {/* ends with NULL */ "--folder", options->folder};
-    size_t count = 2;
-    if (options->frames_per_second > 0) {
-        arguments[count++] = "--fps";
-        arguments[count++] = rate;
-    }
-    if (options->window.width > 0) {
-        arguments[count++] = "--window";
-        arguments[count++] = window;
-    }
-    if (options->full_metadata)
-        arguments[count++] = "--full-metadata";
-    const char *const colours[][2] = {{"--ocio", options->ocio},
-                                      {"--colour-space", options->colour_space},
-                                      {"--display-view", options->display_view},
-                                      {"--light-groups", options->light_groups}};
-    for (size_t i = 0; i < sizeof(colours) / sizeof(colours[0]); i++)
-        if (colours[i][1]) {
-            arguments[count++] = colours[i][0];
-            arguments[count++] = colours[i][1];
+    const char *const values[][2] = {{"--folder", options->folder},
+                                     {"--fps", options->frames_per_second > 0 ? rate : NULL},
+                                     {"--window", options->window.width > 0 ? window : NULL},
+                                     {"--ocio", options->ocio},
+                                     {"--colour-space", options->colour_space},
+                                     {"--display-view", options->display_view},
+                                     {"--light-groups", options->light_groups},
+                                     {"--format", options->format}};
+    const char *const flags[] = {options->full_metadata ? "--full-metadata" : NULL,
+                                 options->dwaa ? "--dwaa" : NULL, options->draws_text ? "--text" : NULL};
+    const size_t value_count = sizeof(values) / sizeof(values[0]), flag_count = sizeof(flags) / sizeof(flags[0]);
+    const char *arguments[20] = {NULL}; /* ends with NULL */
+    size_t count = 0;
+    for (size_t i = 0; i < value_count; i++)
+        if (values[i][1]) {
+            arguments[count++] = values[i][0];
+            arguments[count++] = values[i][1];
         }
-    if (options->dwaa)
-        arguments[count++] = "--dwaa";
-    if (options->draws_text)
-        arguments[count++] = "--text";
-    if (options->format) {
-        arguments[count++] = "--format";
-        arguments[count++] = options->format;
-    }
+    for (size_t i = 0; i < flag_count; i++)
+        if (flags[i])
+            arguments[count++] = flags[i];
     if (!fl_helper_start(&exporter->helper, arguments, error) || !has_colours(exporter, options, error)) {
         fl_exporter_destroy(exporter);
         return NULL;

@@ -2,64 +2,44 @@
 /* A hash table of digests of imported objects. */
 #include "lib/imported.h"
 
+#include <stddef.h>
 #include <stdlib.h>
+#include <string.h>
 #include <xxhash.h>
+
+/* Edits that set an object, and the place of its identifier in the message. A scene has a single environment,
+ * without an identifier. */
+static const struct {
+    enum message_type type;
+    enum protocol_object_kind kind;
+    size_t id;
+} edits[] = {
+    {MESSAGE_SET_NODE, PROTOCOL_OBJECT_NODE, offsetof(struct message, set_node.node)},
+    {MESSAGE_SET_MESH, PROTOCOL_OBJECT_MESH, offsetof(struct message, set_mesh.mesh)},
+    {MESSAGE_SET_SPHERES, PROTOCOL_OBJECT_SPHERES, offsetof(struct message, set_spheres.spheres)},
+    {MESSAGE_SET_DISC, PROTOCOL_OBJECT_DISC, offsetof(struct message, set_disc.disc)},
+    {MESSAGE_SET_MATERIAL, PROTOCOL_OBJECT_MATERIAL, offsetof(struct message, set_material.material)},
+    {MESSAGE_SET_TEXTURE, PROTOCOL_OBJECT_TEXTURE, offsetof(struct message, set_texture.texture)},
+    {MESSAGE_SET_LIGHT, PROTOCOL_OBJECT_LIGHT, offsetof(struct message, set_light.light)},
+    {MESSAGE_SET_CAMERA, PROTOCOL_OBJECT_CAMERA, offsetof(struct message, set_camera.camera)},
+    {MESSAGE_SET_SKIN, PROTOCOL_OBJECT_SKIN, offsetof(struct message, set_skin.skin)},
+    {MESSAGE_SET_CLIP, PROTOCOL_OBJECT_CLIP, offsetof(struct message, set_clip.clip)},
+    {MESSAGE_SET_CHANNEL, PROTOCOL_OBJECT_CHANNEL, offsetof(struct message, set_channel.channel)},
+    {MESSAGE_SET_ENVIRONMENT, PROTOCOL_OBJECT_ENVIRONMENT, 0},
+};
 
 /* False: no edit that sets an object. */
 static bool object_of(const struct message *message, struct fl_imported_object *object)
 {
-    *object = (struct fl_imported_object){.is_there = true};
-    switch (message->type) {
-    case MESSAGE_SET_NODE:
-        object->kind = PROTOCOL_OBJECT_NODE;
-        object->id = message->set_node.node;
+    for (size_t i = 0; i < sizeof(edits) / sizeof(edits[0]); i++) {
+        if (edits[i].type != message->type)
+            continue;
+        *object = (struct fl_imported_object){.is_there = true, .kind = edits[i].kind};
+        if (edits[i].id)
+            memcpy(&object->id, (const char *)message + edits[i].id, sizeof(object->id));
         return true;
-    case MESSAGE_SET_MESH:
-        object->kind = PROTOCOL_OBJECT_MESH;
-        object->id = message->set_mesh.mesh;
-        return true;
-    case MESSAGE_SET_SPHERES:
-        object->kind = PROTOCOL_OBJECT_SPHERES;
-        object->id = message->set_spheres.spheres;
-        return true;
-    case MESSAGE_SET_DISC:
-        object->kind = PROTOCOL_OBJECT_DISC;
-        object->id = message->set_disc.disc;
-        return true;
-    case MESSAGE_SET_MATERIAL:
-        object->kind = PROTOCOL_OBJECT_MATERIAL;
-        object->id = message->set_material.material;
-        return true;
-    case MESSAGE_SET_TEXTURE:
-        object->kind = PROTOCOL_OBJECT_TEXTURE;
-        object->id = message->set_texture.texture;
-        return true;
-    case MESSAGE_SET_LIGHT:
-        object->kind = PROTOCOL_OBJECT_LIGHT;
-        object->id = message->set_light.light;
-        return true;
-    case MESSAGE_SET_CAMERA:
-        object->kind = PROTOCOL_OBJECT_CAMERA;
-        object->id = message->set_camera.camera;
-        return true;
-    case MESSAGE_SET_SKIN:
-        object->kind = PROTOCOL_OBJECT_SKIN;
-        object->id = message->set_skin.skin;
-        return true;
-    case MESSAGE_SET_CLIP:
-        object->kind = PROTOCOL_OBJECT_CLIP;
-        object->id = message->set_clip.clip;
-        return true;
-    case MESSAGE_SET_CHANNEL:
-        object->kind = PROTOCOL_OBJECT_CHANNEL;
-        object->id = message->set_channel.channel;
-        return true;
-    case MESSAGE_SET_ENVIRONMENT: /* a scene has a single environment, without an identifier */
-        object->kind = PROTOCOL_OBJECT_ENVIRONMENT;
-        return true;
-    default:
-        return false;
     }
+    return false;
 }
 
 /* The object's place, or the empty one where it belongs; one of four places is always empty. */

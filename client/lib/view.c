@@ -168,23 +168,23 @@ bool fl_view_set_camera(struct fl_view *view, const struct fl_view_camera *camer
                         struct fl_error *error)
 {
     struct message message = {.type = MESSAGE_VIEW_CAMERA};
-    struct message_view_camera *look = &message.view_camera;
-    look->channel = view->channel;
-    look->command = view->last_command + 1;
-    look->moving = camera->moving ? 1 : 0;
-    look->time_s = camera->time_s;
-    memcpy(look->eye_world, camera->eye_world, sizeof(look->eye_world));
-    memcpy(look->look_at_world, camera->look_at_world, sizeof(look->look_at_world));
-    memcpy(look->up_world, camera->up_world, sizeof(look->up_world));
-    look->fov_y = camera->fov_y;
-    look->node = camera->node;
+    struct message_view_camera *sent = &message.view_camera;
+    sent->channel = view->channel;
+    sent->command = view->last_command + 1;
+    sent->moving = camera->moving ? 1 : 0;
+    sent->time_s = camera->time_s;
+    memcpy(sent->eye_world, camera->eye_world, sizeof(sent->eye_world));
+    memcpy(sent->look_at_world, camera->look_at_world, sizeof(sent->look_at_world));
+    memcpy(sent->up_world, camera->up_world, sizeof(sent->up_world));
+    sent->fov_y = camera->fov_y;
+    sent->node = camera->node;
     const uint64_t now_ns = monotonic_now_ns();
     if (!check(view, error) || !fl_connection_send(view->connection, 0, 0, &message, error))
         return false;
-    view->last_command = look->command;
-    view->command_sent_ns[look->command % COMMANDS_REMEMBERED] = now_ns;
+    view->last_command = sent->command;
+    view->command_sent_ns[sent->command % COMMANDS_REMEMBERED] = now_ns;
     if (command)
-        *command = look->command;
+        *command = sent->command;
     return true;
 }
 

@@ -82,7 +82,7 @@ struct front {
     void *reload_context;
 };
 
-/* Zeroes it. */
+/* Makes a front without addresses and without a loop. */
 void front_init(struct front *front);
 /* Reserves addresses, separated by blanks (at least one; their paths may have blanks); clients wait until
  * front_run(). */
@@ -91,7 +91,7 @@ bool front_listen(struct front *front, const char *addresses, bool beyond_loopba
  * started otherwise. */
 bool front_listen_activated(struct front *front, bool beyond_loopback, size_t *count, struct error *error);
 /* Starts the first workers, says READY with the addresses on the stream once they are, and serves until SIGTERM or
- * SIGINT. False and *error: it cannot start, or cannot go on. */
+ * SIGINT. False and *error: it cannot start, or its loop failed. */
 bool front_run(struct front *front, const struct front_options *options, FILE *stream, struct error *error);
 void front_finish(struct front *front);
 /* Applies limits, readers and keys to new clients, and hands the setup to all workers. False: out of memory,
