@@ -94,7 +94,7 @@ TEST_LONG(a_tile_stops_by_its_error_and_is_that_of_a_picture_of_so_many_samples)
     frame_result_finish(&result);
 }
 
-/* As server/render/picture/noise.h defines it. */
+/* The error of a tile by the definition in server/render/picture/noise.h. */
 static double error_of_tile(const struct frame_result *result, const struct frame_result *truth, uint32_t tile)
 {
     double squares = 0.0, light = 0.0;
@@ -144,10 +144,9 @@ static double error_of_picture(const struct frame_result *result, const struct f
     return sqrt(squares);
 }
 
-/* It stops by the noise of the picture as it is, so both have the same samples; those of a tile that has stopped
- * are few. Light is stratified, so the gain is small: of pictures with 16 samples everywhere a fifth, with 32 a
- * fiftieth.
- */
+/* Sampling stops by the noise of the unfiltered picture, so both pictures have the same samples; those of a
+ * tile that has stopped are few. Light is stratified, so the gain is small: a fifth with 16 samples
+ * everywhere, a fiftieth with 32. */
 TEST_LONG(a_picture_that_stops_by_its_noise_is_nearer_to_the_truth_denoised)
 {
     struct fixture *fixture = *state;

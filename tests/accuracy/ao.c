@@ -84,7 +84,7 @@ TEST(a_wall_hides_its_share_of_the_sky)
         struct scene_mesh *mesh = fixture_square(fixture, 1.0f, material, wall);
         float *corners = (float *)(void *)mesh->arrays[MESH_POSITIONS]->data;
         for (int i = 0; i < 4; i++)
-            corners[3 * i + 1] *= 400.0f; /* of a wall 800 m long, the ends hide less than (1 / 400)^2 */
+            corners[3 * i + 1] *= 400.0f; /* the ends of a wall of 800 m hide less than (1 / 400)^2 */
         look_down(fixture, 4.0f);
         fixture->request.sampling.samples = SAMPLES;
         fixture->request.light.ao_rays = RAYS;
@@ -142,8 +142,8 @@ TEST(nearer_surfaces_occlude_more)
         }
 }
 
-/* Of a plane 1 m below a pane that is half open, half the eye's ray sees the pane and half what the pane lets the
- * plane have. A pane of 400 m hides all but its edge's (1 / 400)^2. */
+/* Half the eye's ray sees the pane, which is half open, and half the light that the pane leaves to the plane
+ * 1 m below it. A pane of 400 m hides all but its edge's (1 / 400)^2. */
 TEST(blended_panes_count_by_half)
 {
     struct fixture *fixture = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the path integrator takes a surface to be: the directions that it chooses are as probable as it says,
- * integrate to 1, and bring back no more than arrives, with GGX and with Ward's lobe, along a grain and without
+/* The path integrator's model of a surface: chosen directions have the stated probabilities, which integrate
+ * to 1, and bring back no more light than arrives, with GGX and with Ward's lobe, along a grain and without
  * one. */
 #include "tests/accuracy/bsdf_measures.h"
 #include "tests/harness/test.h"
@@ -53,9 +53,9 @@ TEST_LONG(sampled_directions_follow_the_stated_density)
 
 /* ---- how much comes back ---- */
 
-/* What rough facets send into each other comes out again: as fits of it say, which are within 0.007 (the
- * polynomials of facet_albedo.glsl), 0.025 where the index is above 2.4. Along a grain a fit for facets without
- * one stands in: it is off by up to 0.05, and chosen so that no more comes out than went in. */
+/* Light between rough facets leaves the surface again, by fits that are within 0.007 (the polynomials of
+ * facet_albedo.glsl), or 0.025 above an index of 2.4. Along a grain a fit for facets without grain stands in:
+ * it is off by up to 0.05, and chosen so that no more light leaves than arrives. */
 TEST_LONG(white_materials_send_on_what_arrives_and_no_more)
 {
     static const float roughnesses[] = {0.0f, 0.15f, 0.5f, 1.0f, 0.05f, 0.3f, 0.7f, 0.85f};
@@ -203,7 +203,7 @@ TEST_LONG(layers_follow_their_density_and_keep_the_light)
             }
         print_message("row %zu: %.1f deviations off at most; albedo %.3f to %.5f (%s)\n", k, densities.max_z,
                       albedos.min_even[0], albedos.max, albedos.where);
-        assert_true(densities.max_z < 5.5); /* as above */
+        assert_true(densities.max_z < 5.5); /* the bound from above */
         assert_true(densities.max_weight_off < 1e-4);
         assert_true(albedos.max <= layered[k].albedo_max);
         assert_true(albedos.min_even[0] > layered[k].albedo_min);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What is measured of a material with the functions of bsdf_probe.h: whether chosen directions follow the density
- * that is stated for them, and how much of the light comes back. */
+/* Measures of a material with the functions of bsdf_probe.h: whether chosen directions follow the stated
+ * density, and the share of light that comes back. */
 #ifndef FARLIGHT_TESTS_BSDF_MEASURES_H
 #define FARLIGHT_TESTS_BSDF_MEASURES_H
 
@@ -81,7 +81,7 @@ static inline void set_eye(struct bsdf_case *c, double cosine)
     c->view[2] = (float)cosine;
 }
 
-/* Of the choices that say how probable they were, how many go to each cell of the hemisphere; in all. */
+/* Counts the choices with a stated probability in each cell of the hemisphere, and returns their sum. */
 static inline double counts_of(const struct bsdf_answer *chosen, double cells[CELLS_ACROSS * CELLS_ABOUT])
 {
     double all = 0.0;

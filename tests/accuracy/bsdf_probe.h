@@ -18,26 +18,26 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-/* As the shader has it: five vec4. */
+/* Layout of the shader's struct: five vec4. */
 struct bsdf_case {
     float roughness, metallic, transmission, ior;
     float view[3], base;             /* unit, towards the eye; base colour, grey */
     float inside, anisotropy;        /* inside 1: seen from behind, as glass is */
-    float specular, specular_colour; /* of a probe that has them; grey */
-    float coat, coat_roughness;      /* likewise */
-    float coat_turn;                 /* of its normal, radians from the surface's in the plane y = 0 */
-    float film, film_ior, film_nm;   /* likewise */
+    float specular, specular_colour; /* for a probe with specular reflection; grey */
+    float coat, coat_roughness;      /* for a probe with a coat */
+    float coat_turn;               /* angle of the coat's normal from the surface's in the plane y = 0, radians */
+    float film, film_ior, film_nm; /* for a probe with a thin film */
     float unused[2];
 };
 _Static_assert(sizeof(struct bsdf_case) == 80, "the shader reads five vec4 a case");
 
-/* What is asked: a direction to evaluate, or three numbers to choose by. */
+/* A question to the shader: a direction to evaluate, or three numbers to choose by. */
 struct bsdf_question {
     float v[4]; /* direction; or u, u, choice */
 };
 
 struct bsdf_answer {
-    float direction[3], lobe;            /* as given; or chosen, BSDF_* */
+    float direction[3], lobe;            /* given, or chosen, BSDF_* */
     float weight, probability, sent, of; /* weight of what was chosen; bsdf_evaluate() of the direction and its
                                             probability; `of`: reflected() of common/scattering.glsl */
 };

@@ -20,14 +20,15 @@
 #define SIDE 160u
 #define RAY_COUNT (SIDE * SIDE)
 #define EDGE_STEPS 6.0f
-/* One ray, moved so many ways: at the tip of a triangle of one degree one in 360 falls on it. Most need few. */
+/* Number of ways in which a ray is moved: at the tip of a triangle of one degree, one in 360 falls on it.
+ * Most rays need few. */
 #define EDGE_TRIES_FEW 64u
 #define EDGE_TRIES_MANY 8192u
 #define SHOWN_MAX 10u
 /* A distance is the quotient of two sums of three products of differences: some 16 steps of its coordinates in the
  * plane's space, which an instance stretches by up to 2 in these scenes; and it grows as the ray slants. */
 #define DISTANCE_STEPS 32.0f
-/* What the issue asks for: agreement of 99.99 %, edges aside, and a median relative error below 1e-6. */
+/* Required agreement: 99.99 %, edges aside, and a median relative error below 1e-6. */
 #define DISAGREED_MAX (RAY_COUNT / 10000)
 #define MEDIAN_MAX 1e-6
 /* Edges are a few rounding steps wide, so few rays meet one; many would mean that something else is called one. */
@@ -43,7 +44,7 @@ struct arena {
     struct tracer *bvh, *reference;
     struct gpu_buffer ray_buffer, answer_buffer;
     struct ray *rays;
-    struct hit *primary_hits; /* of the reference */
+    struct hit *primary_hits; /* the reference's */
 };
 
 static void expect_ok(bool ok, const struct error *error)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One format of nodes, built and walked twice: by the daemon's shaders and by client/warp, of the same layers. */
+/* Nodes in one format, built and traversed twice: by the daemon's shaders and by client/warp, from the same
+ * layers. */
 #include "tests/accuracy/client_quadtree.h"
 
 #include "shared/eye_hit.h"
@@ -153,7 +154,7 @@ static bool comes_in_late(const struct sides *sides, const struct fl_warp_camera
            sqrt(1 + x * x + y * y) * unit > 0.999 * (double)QUADTREE_FREE_RADII * (double)sides->radius * enters;
 }
 
-/* Of pixels. */
+/* Counts of pixels. */
 struct tally {
     uint32_t same, beside, nothing, unknown, other;
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The same layers for both sides that build quadtrees over them: the daemon's shaders and client/warp. */
+/* Layers for both sides that build quadtrees over them: the daemon's shaders and client/warp. */
 #ifndef FARLIGHT_TESTS_CLIENT_QUADTREE_H
 #define FARLIGHT_TESTS_CLIENT_QUADTREE_H
 
@@ -14,8 +14,8 @@
 
 #include <unistd.h>
 
-/* Of the key view and of the eyes' pictures: tiles of 8x8 and more than one part, with a rest; a place fits into
- * the 8 bits of a colour. */
+/* Size of the key view and of the eyes' pictures: tiles of 8x8 and more than one part, with a remainder; a
+ * place fits into the 8 bits of a colour. */
 #define WIDTH 240u
 #define HEIGHT 184u
 #define COUNT (WIDTH * HEIGHT)
@@ -35,19 +35,19 @@
 struct sides {
     struct layers daemon;
     struct quadtree_layers drawing;
-    float radius; /* of the bound, metres */
+    float radius; /* radius of the bound, metres */
     struct fl_warp_key key;
     struct fl_warp *client;
     float w[LAYERS][COUNT];
     uint32_t colours[LAYERS][COUNT];
-    uint32_t seen[COUNT]; /* what the client makes of an eye */
+    uint32_t seen[COUNT]; /* the client's picture for an eye */
     uint8_t mask[COUNT];
     vec4 found[COUNT]; /* and the daemon, likewise in rows */
 };
 
 /* ---- the daemon's side ---- */
 
-/* Of nodes that were read back the leaves without their flags are what nodes.comp begins with. */
+/* Gives nodes.comp its input: the leaves of the nodes that were read back, without flags. */
 static inline void give_planes(struct sides *sides, uint32_t slice)
 {
     const uint32_t texels = sides->daemon.store.uniforms.padded_width * sides->daemon.store.uniforms.padded_height;
@@ -94,7 +94,7 @@ static inline uint32_t place_colour(uint32_t layer, uint32_t i, float w)
     return i % WIDTH | i / WIDTH << 8 | blue << 16 | 0xff000000u;
 }
 
-/* The same view, unit and bound as the store has, to the bit. */
+/* Builds with the view, unit and bound of the store, to the bit. */
 static inline void build_by_client(struct sides *sides)
 {
     struct quadtree_uniforms *u = &sides->daemon.store.uniforms;
@@ -219,7 +219,7 @@ static inline void load_bundled(struct loaded_model *model, const char *name)
     assert_int_equal(system(command), 0);
 }
 
-/* What the daemon sees of the carousel, layer by layer, with nodes of its own; the client gets the w of its
+/* Renders the carousel for the daemon, layer by layer, with nodes of its own; the client gets the w of its
  * leaves. */
 static inline struct sides *rendered(const struct scene *scene)
 {

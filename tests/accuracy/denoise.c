@@ -118,7 +118,7 @@ TEST(an_exposure_for_what_is_dark_filters_no_less)
     frame_result_finish(&exposed);
 }
 
-/* The same as the wall itself: of a mirror's own normal and albedo one sample would be left as it is. */
+/* The mirror takes the wall's normal and albedo: with its own, a single sample would be left unfiltered. */
 TEST_LONG(so_it_does_in_a_mirror)
 {
     struct fixture *fixture = *state;

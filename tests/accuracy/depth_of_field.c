@@ -29,8 +29,8 @@ static double disc_share(double t)
     return 0.5 + (t * sqrt(1.0 - t * t) + asin(t)) / PI;
 }
 
-/* What a pixel sees of the half plane through a lens of radius `confusion` where the edge is; `x`: of the pixel's
- * left side there, `size`: its width there. */
+/* Share of the half plane that a pixel sees through a lens of radius `confusion` at the edge; `x`: left side
+ * of the pixel there, `size`: its width there. */
 static double pixel_share(double x, double size, double confusion)
 {
     double sum = 0.0;
@@ -100,7 +100,7 @@ TEST(what_is_in_focus_is_as_sharp_as_without_a_lens)
     fixture->request.aperture = 0.5f;
     fixture->request.focus = 4.0f;
     struct frame_result in_focus = fixture_render(fixture);
-    /* the same places in the pixel: all but those within rounding of the edge see the same */
+    /* equal places in the pixels: all but those within rounding of the edge see the same */
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
         assert_near(fixture_pixel(&in_focus, i % WIDTH, i / WIDTH)[0],
                     fixture_pixel(&sharp, i % WIDTH, i / WIDTH)[0], 1.01 / 64.0);

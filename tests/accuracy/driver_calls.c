@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What is asked of the driver while a frame is made: calls that stall, or wait for more than they need, show in no
- * picture. The device is taken for hardware, whatever it is. Programs that no run has left on the disk are
- * compiled ahead by other threads, which ask on contexts of their own: only calls of the thread that makes the
- * frame are looked at. */
+/* Calls of the driver while a frame is made: calls that stall, or wait for more than they need, show in no
+ * picture. Every device is treated as hardware. Programs that no run has left on the disk are compiled ahead
+ * by other threads, on contexts of their own: only calls of the thread that makes the frame count. */
 #include "protocol/tracers.h"
 #include "shared/layers.h"
 #include "render/passes/layers/layers.h"
@@ -26,7 +25,7 @@ static PFNGLDISPATCHCOMPUTEINDIRECTPROC dispatch_indirect_of_driver;
 static PFNGLGETUNIFORMLOCATIONPROC location_of_driver;
 static struct {
     unsigned locations, resets, dispatches, barriers;
-    GLbitfield kinds;     /* that were waited for since the dispatch before */
+    GLbitfield kinds;     /* kinds that a barrier since the previous dispatch waited for */
     GLbitfield all_kinds; /* in all */
 } calls;
 

@@ -19,11 +19,11 @@
 /* Outlines in the pictures are no longer than 16 sides. */
 #define OUTLINES 16.0
 
-/* What both ways may differ by. They begin in other nodes and round on other ways, by some 1e-5 of the picture:
- * 1e-3 of a texel; and each may be off by the bound. Along outlines, where they differ by that, another surface is
- * met. */
+/* Allowed differences of both ways. They begin in other nodes and round differently, by some 1e-5 of the
+ * picture: 1e-3 of a texel; and each may be off by the bound. Along outlines, where they differ by that,
+ * another surface is hit. */
 struct slack {
-    float bound_pixels; /* of the structure */
+    float bound_pixels; /* bound of the structure */
     double texels, share;
 };
 #define ROUNDING 2e-3
@@ -97,7 +97,8 @@ static void room_destroy(struct room *room)
 
 /* ---- eyes ---- */
 
-/* As far from the eye of the view, and turned about the vertical; of a picture of some views across and down. */
+/* An eye at this distance from the view's, turned about the vertical; in a picture of several views across
+ * and down. */
 struct eye {
     float aside[3], turn;
     uint32_t views;
@@ -123,7 +124,7 @@ static void look_through(struct room *room, const struct eye *eye)
     frame->eyes_middle[0] = frame->eyes_middle[1] = (float)(eye->views - 1) / 2;
 }
 
-/* Of a pixel of the picture, as shaders/common/slots.glsl numbers them. */
+/* Ray of a pixel of the picture, numbered as in shaders/common/slots.glsl. */
 static struct ray ray_of(const struct frame_uniforms *frame, uint32_t slot)
 {
     const uint32_t tile = slot / 64, m = slot % 64;

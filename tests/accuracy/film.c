@@ -90,8 +90,8 @@ static void film_colour(const struct film_case *c, double rgb[3])
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-/* One Gaussian for each of CIE's curves and one more for red are off by a fifth of a wave's amplitude at most:
- * that of a film of an index of 2 on glass is 0.095. By 0.05 where it lies on metal. */
+/* Gaussians, one for each of CIE's curves and one more for red, are off by at most a fifth of a wave's
+ * amplitude: 0.095 for a film of index 2 on glass, 0.05 on metal. */
 TEST(colours_are_those_of_all_wavelengths)
 {
     static const float f0s[] = {0.04f, 0.2f, 0.7f}, iors[] = {1.1f, 1.3f, 2.0f};

@@ -6,7 +6,7 @@
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-/* As of a device that was measured: primitives a pixel from which tracing is faster. */
+/* Sets the result of a device's measurement: primitives per pixel from which tracing is faster. */
 static void take_as_measured(float one, float several)
 {
     device->measured = (struct gpu_measured){.known = true, .traced_from = {one, several}};

@@ -31,7 +31,7 @@ static int take_for_what_it_is(void **state)
 ALL_TESTS(take_for_hardware, take_for_what_it_is)
 EACH_TEST(fixture_clear, NULL)
 
-/* One picture, so that most tests share their programs. */
+/* Builds one picture, so that most tests share their programs. */
 static void build(struct fixture *fixture)
 {
     fixture_mixture(fixture);
@@ -319,7 +319,7 @@ TEST(slices_are_no_larger_than_the_device_has_memory_and_texels_for)
         const char *what;
         uint64_t memory_bytes, texels;
         uint32_t rays;
-    } rows[] = {{"nothing is short", (uint64_t)8 << 30, 1u << 27, 1u << 14}, /* all of the picture */
+    } rows[] = {{"nothing is short", (uint64_t)8 << 30, 1u << 27, 1u << 14}, /* the whole picture fits */
                 {"memory is not told", 0, 1u << 27, 1u << 14},
                 {"little memory", (uint64_t)256 << 20, 1u << 27, 1u << 13},
                 {"no more texels than OpenGL promises", (uint64_t)8 << 30, 1u << 16, 1u << 13},

@@ -193,7 +193,8 @@ TEST(what_moves_is_alone)
     assert_false(frame_may_begin(first, fixture->scene, NULL, request));
     assert_false(frame_may_begin(first, fixture->scene, &motion, request));
     struct frame_result moved = finish(second);
-    /* It is moved still: the next one puts it back, before which nobody can begin beside others. */
+    /* The first frame still has it moved: the next one puts it back, and until then nothing can begin beside
+     * others. */
     begin(fixture, first, request);
     begin(fixture, second, request);
     struct frame_result back[2] = {finish(second), finish(first)};

@@ -382,7 +382,7 @@ TEST_LONG(a_structure_without_waiting_frames_is_forgotten)
             const bool was_building = fixture->renderer->phase == PHASE_BUILD && !fixture->renderer->built;
             assert_true(was_building || done > 0);
             frame_abandon(fixture->renderer);
-            /* What a builder works with may stay for the next one, but no structure. */
+            /* Working memory of a builder may stay for the next one, but no structure. */
             const struct tracer *tracer_left = fixture->shared->tracers.slots[0].tracer;
             assert_false(tracer_left->updating || (was_building && tracer_left->updated));
             begin(fixture, fixture->renderer);

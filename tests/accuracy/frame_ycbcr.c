@@ -106,7 +106,7 @@ TEST(attachments_lie_behind_planes_as_behind_pixels)
     frame_result_finish(&planes);
 }
 
-/* As a view does that is encoded otherwise when it rests. */
+/* A view that changes its encoding at rest does this. */
 TEST(frames_add_up_whatever_form_each_comes_in)
 {
     struct fixture *fixture = *state;

@@ -64,7 +64,7 @@ static bool ground_at(const struct fixture *fixture, double x, double y, double 
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-/* Of light from one direction a shadow is black and has an edge; alpha says so. */
+/* Light from one direction gives a black shadow with an edge, and an alpha that says so. */
 TEST(a_sun_throws_the_shadow_of_a_sphere_and_elsewhere_nothing_is_seen)
 {
     struct fixture *fixture = *state;
@@ -100,7 +100,7 @@ TEST(a_sun_throws_the_shadow_of_a_sphere_and_elsewhere_nothing_is_seen)
         }
 }
 
-/* What whitted does not shadow is the environment's part of what a white surface would show. */
+/* The share of the environment in the light of a white surface stays unshadowed by whitted. */
 TEST(light_without_shadows_is_left_in_a_shadow)
 {
     struct fixture *fixture = *state;

@@ -6,7 +6,7 @@
 #define EDGE 512u
 #define FOCAL 512.0 /* pixels: half the picture is half as wide as far */
 #define RADIUS 0.15
-#define HALF 0.25 /* of the square that hides, at the distance 1 */
+#define HALF 0.25 /* half the side of the square that hides, at the distance 1 */
 #define WALL 2.0  /* distance of a wall behind it */
 
 ALL_TESTS(fixture_setup, fixture_teardown)

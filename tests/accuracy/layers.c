@@ -250,7 +250,7 @@ TEST(identifiers_are_the_clients)
             expect_id(&result, 31, 0, 0, 0);
         frame_result_finish(&result);
     }
-    /* What shows something goes before it. */
+    /* Nodes are removed before the objects that they show. */
     const struct scene_edit removed[] = {{.object = OBJECT_NODE, .id = square_node},
                                          {.object = OBJECT_MESH, .id = square},
                                          {.object = OBJECT_MATERIAL, .id = materials[0]}};
@@ -293,7 +293,7 @@ TEST_LONG(openness_is_that_of_the_integrator_ao)
             if (open_share[3] < 1)
                 continue;
             for (int k = 0; k < 3; k++)
-                assert_near(open_share[k], shown[k], 1e-6); /* the same rays, summed in another order */
+                assert_near(open_share[k], shown[k], 1e-6); /* same rays, summed in another order */
             minimum = fmin(minimum, (double)open_share[0]);
             sum += (double)open_share[0];
             compared++;
@@ -322,7 +322,7 @@ static void expect_attached(const struct frame_result *result, const struct fram
         if (has_depth)
             assert_memory_equal(depths + (size_t)4 * i, pixel_of(layers, LAYER_DEPTH, x, y), 4);
         double length = sqrt(dot(n, n));
-        for (int k = 0; k < 3 && has_normals; k++) /* to the nearest step */
+        for (int k = 0; k < 3 && has_normals; k++) /* compared to the nearest step */
             assert_near(normals[4 * i + (uint32_t)k], n[3] > 0 ? ((double)n[k] / length / 2 + 0.5) * 255 : 0,
                         0.51);
         if (has_normals)
@@ -420,7 +420,8 @@ TEST_LONG(frames_that_go_on_hold_what_one_of_all_samples_does)
     }
     assert_int_equal(last.samples, 6);
     assert_memory_equal(last.pixels, at_once.pixels, at_once.size_bytes);
-    struct frame_result fewer = render(fixture, BIT(LAYER_BEAUTY)); /* what it would go on from is not all there */
+    struct frame_result fewer =
+        render(fixture, BIT(LAYER_BEAUTY)); /* the layers that it would continue from are incomplete */
     assert_int_equal(fewer.samples, 2);
     frame_result_finish(&at_once);
     frame_result_finish(&other);

@@ -43,7 +43,7 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-/* What moved lies in a cube of its own: rays see both as one, and each other's reflections and shadows. */
+/* Moved geometry is in a cube of its own: rays see both as one, and their reflections and shadows. */
 TEST_LONG(what_moves_is_seen_with_what_stands_still)
 {
     struct fixture *fixture = *state;

@@ -6,7 +6,7 @@
 #include "tests/harness/test.h"
 
 #define ALL (1u << LAYER_BEAUTY | LAYER_BITS_LIGHT_PARTS)
-/* Of a sum of some tens of floats, in another order and cut into parts: a few roundings of 2^-24. */
+/* Rounding of a sum of some tens of floats, in another order and cut into parts: a few times 2^-24. */
 #define ROUNDING 1e-6
 
 ALL_TESTS(fixture_setup, fixture_teardown)

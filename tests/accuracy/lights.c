@@ -9,8 +9,8 @@
 #include "shared/path.h"
 #include "tests/harness/test.h"
 
-#define HEIGHT 2.0f /* of the lights above the floor */
-#define HALF 0.5f   /* of the rectangle's edges, and the ball's radius */
+#define HEIGHT 2.0f /* height of the lights above the floor */
+#define HALF 0.5f   /* half the rectangle's edges, and the ball's radius */
 #define VIEW 4.0f   /* metres of the floor that are seen */
 /* A box filter's mean over a pixel of 1/8 m is not the value at its middle: a sixth of a quarter of the curvature,
  * of two dimensions; that of these forms is below 1 / HEIGHT^2 relative. */
@@ -264,7 +264,7 @@ TEST(lights_are_shadowed_end_at_their_range_and_come_in_batches)
     a_floor(fixture, 5.0f);
     for (int i = 0; i < 23; i++)
         fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 0.25f);
-    frame_renderer_set_capacity(fixture->renderer, 1024, 1024); /* one light a batch */
+    frame_renderer_set_capacity(fixture->renderer, 1024, 1024); /* a batch for each light */
     result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 9, 9)[2], 23 * 0.25 / PI, 1e-3);
     frame_result_finish(&result);
@@ -303,8 +303,8 @@ TEST_LONG(light_through_glass_is_not_counted_twice)
 
 enum { ROWS = 32, COLUMNS = 64 };
 
-/* All of one grey, a half float, but for a sun of one texel. The floor's normal, +z, is the middle of the edges of
- * the image's columns. */
+/* Makes a grey image of half floats with a sun of one texel. The floor's normal, +z, is the middle of the
+ * edges of the image's columns. */
 static void an_image(struct fixture *fixture, uint16_t grey, uint32_t u, uint32_t v, uint16_t sun)
 {
     static uint16_t texels[ROWS][COLUMNS][4];
@@ -337,7 +337,7 @@ static double under_the_image(double grey, uint32_t u, uint32_t v, double sun)
     return sum / PI;
 }
 
-static double relative_deviation; /* of a picture's pixels, from the value that all should have */
+static double relative_deviation; /* deviation of a picture's pixels from the value that they should have */
 static double expected_value;
 static double deviation_and_mean(const struct frame_result *result)
 {

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* All lobes of a surface in one scene: balls of every material, one behind another so that none sees its
- * neighbour. White ones are not seen in a white furnace, and all integrators show them alike under the same
- * lights. */
+/* Materials with all lobes in one scene: balls, one behind another so that none sees its neighbour. White
+ * ones are invisible in a white furnace, and all integrators show them alike under the same lights. */
 #include "tests/accuracy/path_fixture.h"
 
 #include "shared/path.h"

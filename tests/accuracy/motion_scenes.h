@@ -52,7 +52,7 @@ static inline void test_motion_of_soup(struct scene_motion *motion, uint32_t pos
     }
 }
 
-/* Of any scene with nodes 2 and 3: they turn and are stretched; the others stand still. */
+/* Turns and stretches nodes 2 and 3 of any scene; other nodes stand still. */
 static inline void test_motion_of_two(struct scene_motion *motion, uint32_t pose_count)
 {
     test_motion_init(motion, pose_count);
@@ -150,7 +150,7 @@ static inline void test_add_skin(struct test_edits *edits)
     skin->joint_from_mesh = test_blob(bind, sizeof(bind));
 }
 
-/* One mesh with tangents, joints and targets (10), shown twice, of which once below a node that its skin ignores;
+/* Meshes: one with tangents, joints and targets (10), shown twice, once below a node that its skin ignores;
  * one with targets alone (9), squeezed and mirrored; one with joints (8) that a node shows with its skin and
  * another without; a rigid one (7). */
 static inline struct scene *test_scene_deformed(void)

@@ -42,7 +42,7 @@ TEST(a_room_that_glows_has_the_sum_of_its_reflections)
     static const float albedos[] = {0.8f, 0.9f, 1.0f}; /* after 3 bounces more than the half is left */
     for (size_t t = 0; t < (getenv("FARLIGHT_TEST_LONG") ? COUNT(tracers) : 1); t++)
         for (size_t a = 0; a < COUNT(albedos); a++)
-            for (uint32_t depth = 0; depth <= 3; depth++) { /* as far as no path is ended by chance */
+            for (uint32_t depth = 0; depth <= 3; depth++) { /* depths at which no path ends by chance */
                 path_begin(fixture, tracers[t], depth);
                 a_glowing_room(fixture, albedos[a]);
                 fixture->request.sampling.samples = 4;
@@ -102,8 +102,8 @@ static void assert_same(const struct frame_result *a, const struct frame_result 
     assert_int_equal(a->samples, b->samples);
 }
 
-/* What a diffuse surface scatters goes in all directions, what a mirror reflects hardly does; waves of less than
- * 1024 hits stay as they are. */
+/* Light that a diffuse surface scatters goes in all directions, light that a mirror reflects hardly does;
+ * waves of less than 1024 hits are not sorted. */
 TEST(waves_are_sorted_where_their_directions_differ_and_the_picture_stays_the_same)
 {
     struct fixture *fixture = *state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the tests of the integrator `path` share: its default request, and means with their standard errors. */
+/* Shared parts of tests of the integrator `path`: its default request, and means with their standard errors. */
 #ifndef FARLIGHT_TESTS_PATH_FIXTURE_H
 #define FARLIGHT_TESTS_PATH_FIXTURE_H
 
@@ -25,7 +25,7 @@ struct mean {
     double value, error; /* standard error */
 };
 
-/* Of numbers that are independent of each other. */
+/* Mean of independent numbers. */
 static inline struct mean mean_of(const double *values, size_t count)
 {
     double sum = 0.0, squares = 0.0;
@@ -60,7 +60,7 @@ static inline struct mean mean_of_picture(const struct frame_result *result)
     return mean_of(values, PIXELS);
 }
 
-/* Of something that a picture says, over seeds. */
+/* Number of seeds over which a value of a picture is measured. */
 enum { SEEDS = 16 };
 typedef double measure(const struct frame_result *result);
 static inline struct mean mean_of_seeds(struct fixture *fixture, measure *of)

@@ -71,8 +71,8 @@ TEST(a_second_frame_compiles_nothing_and_no_program_that_no_frame_needs_is_compi
     }
 }
 
-/* What is announced there, and compiled by its driver's threads, is what its waves run: those whose counts it
- * alone knows, and which stop a slice. */
+/* Programs that are announced, and compiled by the driver's threads, are those that the waves run: with
+ * counts that only the device knows, and with a stopped slice. */
 TEST(a_frame_on_a_gpu_compiles_no_program_that_it_does_not_need)
 {
     struct fixture *fixture = *state;

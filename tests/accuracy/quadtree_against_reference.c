@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What the tracer quadtree says that it has seen is the first hit of the reference: for eyes round the view that
- * its structure belongs to, and all pixels that each of them sees. Each test prints what share of the pixels is
- * known, by layers. */
+/* Surfaces that the tracer quadtree claims to have seen are first hits of the reference: for eyes round the
+ * view of its structure, and all pixels that each of them sees. Each test prints the known share of the
+ * pixels, by layers. */
 #include "tests/accuracy/test_scenes.h"
 #include "tests/fixtures/device.h"
 
@@ -15,11 +15,11 @@
 #define EYES 8u
 #define FOV 1.05f
 #define LAYERS 3u
-#define BOUND_PIXELS 0.25f /* of planes */
-/* Of what is known, the share that is the first hit or what is a pixel beside it: an outline lies where a texel's
- * middle has it, so on either side of it is what belongs to the other one. */
+#define BOUND_PIXELS 0.25f /* bound of the planes */
+/* Minimum share of known pixels with the reference's first hit, or that of a pixel beside it: an outline lies
+ * at the middle of its texel, so pixels on either side may show the other surface. */
 #define SEEN_MIN 0.998
-#define BESIDE 0.01 /* of 1 / depth, by which a surface may change from one pixel to the next */
+#define BESIDE 0.01 /* change of 1 / depth of a surface from one pixel to the next */
 /* The outline of a surface passes anywhere through a texel, all of which shows what its middle sees. Along an axis
  * that is 1/4 texel of the wrong side on average, and less of a slanted outline by its steps: so of as many pixels
  * as there are steps along the outlines, 1/4 at most are not the first hit of a plane. Half of them are beyond the
@@ -155,7 +155,7 @@ static void room_init(struct room *room, struct scene *scene)
     expect_ok(gpu_buffer_reserve(device, &room->answers, PIXELS * sizeof(struct hit), &error), &error);
 }
 
-/* Of the view. */
+/* Brings the tracer of exact hits to the view. */
 static struct tracer *bring_exact(struct room *room)
 {
     return bring(room, tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : TRACER_BVH,
@@ -187,7 +187,7 @@ static bool is_same(const struct hit *got, const struct hit *expected, double of
 static bool is_beside(const struct hit *got, const struct hit *expected, uint32_t pixel)
 {
     for (uint32_t i = 0; i < 9; i++) {
-        const uint32_t x = pixel % SIDE + i % 3, y = pixel / SIDE + i / 3; /* one more than they are */
+        const uint32_t x = pixel % SIDE + i % 3, y = pixel / SIDE + i / 3; /* coordinates plus 1 */
         if (x < 1 || x > SIDE || y < 1 || y > SIDE)
             continue;
         const struct hit *one = &expected[(y - 1) * SIDE + x - 1];

@@ -14,7 +14,7 @@
 
 enum cone_operation { MIRRORED, REFRACTED, SCATTERED };
 
-/* As the shader has it: two vec4. */
+/* Layout of the shader's struct: two vec4. */
 struct cone_case {
     float width, spread, operation, curvature; /* curvature; of SCATTERED the solid angle */
     float eta, cosine_before, cosine_behind, unused;
@@ -270,7 +270,7 @@ static struct record_texture_use checks(struct fixture *fixture, uint32_t size, 
         .texture = texture->base.id, .uv_transform = {repeats, 0, 0, 0, repeats, 0}, .strength = 1.0f};
 }
 
-/* Of unlit checks, so far below. */
+/* Adds a floor of unlit checks at this depth. */
 static void floor_of_checks(struct fixture *fixture, float depth, float repeats)
 {
     const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -depth, 0, -1, 0, 0};
@@ -304,7 +304,7 @@ static struct frame_result render_samples(struct fixture *fixture, uint32_t samp
     return fixture_render(fixture);
 }
 
-/* Of what is displayed, 0 to 1. */
+/* Mean square of the difference of displayed values, 0 to 1. */
 static double mean_square(const struct frame_result *a, const struct frame_result *b)
 {
     double sum = 0.0;
@@ -404,7 +404,7 @@ static void grazing_floor(struct fixture *fixture, bool glass)
     fixture->request.picture.width = fixture->request.picture.height = 64;
 }
 
-/* What is seen at a grazing angle has a footprint that is much longer than wide. */
+/* The footprint at a grazing angle is much longer than wide. */
 TEST_LONG(a_grazing_floor_in_a_mirror_and_behind_glass_shows_with_one_sample_what_many_show)
 {
     struct fixture *fixture = *state;
@@ -416,7 +416,7 @@ TEST_LONG(a_grazing_floor_in_a_mirror_and_behind_glass_shows_with_one_sample_wha
     }
 }
 
-/* All pixels of a square in the middle of the picture are grey. */
+/* Expects grey pixels in a square in the middle of the picture. */
 static void expect_grey(struct fixture *fixture)
 {
     struct frame_result result = fixture_render(fixture);

@@ -82,7 +82,7 @@ TEST(layers_are_blended_front_to_back)
             for (size_t o = 0; o < COUNT(opacities); o++) {
                 double opacity = opacities[o] > 0.0f ? (double)opacities[o] : 0.5, left = 1.0, radiance = 0.0;
                 for (uint32_t i = 0; i < LAYERS; i++) {
-                    /* what has less than this left before it is not there */
+                    /* surfaces behind less than this share are not there */
                     radiance += left >= (double)PATH_WEIGHT_MIN ? left * opacity * (double)grey_of(i) : 0.0;
                     left = left >= (double)PATH_WEIGHT_MIN ? left * (1.0 - opacity) : 0.0;
                 }

@@ -75,7 +75,7 @@ static inline int fixture_clear(void **state)
     struct fixture *fixture = *state;
     struct error error = {0};
     scene_destroy(fixture->scene);
-    frame_renderer_destroy(fixture->renderer); /* what it keeps belongs to one scene */
+    frame_renderer_destroy(fixture->renderer); /* the renderer keeps data of one scene */
     frame_scene_destroy(fixture->shared);
     fixture->shared = frame_scene_create(fixture->device, &error);
     assert_non_null(fixture->shared);

@@ -37,8 +37,8 @@ static struct frame_result rendered(struct fixture *fixture, enum frame_history 
     return fixture_render(fixture);
 }
 
-/* Of green, how far pictures are from true ones, and how far errors are from those of the frame before at the same
- * pixel. */
+/* Errors of green: distance of pictures from true ones, and of errors from those of the previous frame at the
+ * same pixel. */
 struct quality {
     double squares, changes;
 };
@@ -130,7 +130,7 @@ static double distance_of(const struct frame_result *picture, const struct frame
     return sqrt(squares / (double)(picture->width * picture->height));
 }
 
-/* As a view does that keeps a rate. */
+/* A view that keeps a rate does this. */
 TEST_LONG(a_frame_follows_frames_of_another_size)
 {
     struct fixture *fixture = *state;
@@ -220,8 +220,8 @@ static double error_beside_alone(struct fixture *fixture, float half, uint32_t m
     return sqrt(following.squares / alone.squares);
 }
 
-/* What stays has less noise, where the square was nothing is left of the frames before; its shadow lags behind by
- * less than its noise was. */
+/* Still parts have less noise; nothing of the previous frames is left where the square was; its shadow lags
+ * behind by less than its noise was. */
 TEST_LONG(what_moves_by_itself_leaves_nothing_behind)
 {
     struct fixture *fixture = *state;

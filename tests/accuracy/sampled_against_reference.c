@@ -49,7 +49,7 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
         struct frame_result got = render(fixture, row->tracer, row, name);
         double reached = psnr(&got, &expected);
         printf("%s, %s: PSNR %.1f dB\n", name, row->name, reached);
-        assert_int_equal(structure_row(&got.structure, "static/samples_lost").number, 0); /* of ldc */
+        assert_int_equal(structure_row(&got.structure, "static/samples_lost").number, 0); /* lost samples of ldc */
         frame_result_finish(&got);
         if (!(reached >= asked))
             fail_msg("%s, %s: PSNR %.2f dB, at least %.1f is asked for", name, row->name, reached, asked);

@@ -55,7 +55,7 @@ static inline uint32_t add_shape_mesh(struct fixture *fixture, enum shape shape,
     uint32_t *indices = malloc(3 * (size_t)triangles * sizeof(*indices)), *out = indices;
     for (uint32_t i = 0; i < vertices; i++) {
         float u = (float)(i % each) / (float)steps, v = (float)(i / each) / (float)steps;
-        /* what meets itself does so to the bit */
+        /* seams meet to the bit */
         place_on(shape, i % each == steps ? 0 : u, shape == SHAPE_TORUS && i / each == steps ? 0 : v,
                  positions[i]);
         if (shape != SHAPE_TORUS && (i / each == 0 || i / each == steps))
@@ -222,7 +222,7 @@ static inline uint32_t add_hills(struct fixture *fixture, bool normals)
     return texture->base.id;
 }
 
-/* One surface with every sort of texture that can be on one together, and one with a bump map. */
+/* Adds a surface with every kind of texture that can be combined, and one with a bump map. */
 static inline void add_every_texture(struct fixture *fixture)
 {
     uint32_t hills = add_hills(fixture, false), normals = add_hills(fixture, true);

@@ -79,7 +79,7 @@ static double an_edge(struct fixture *fixture)
     return 0.1;
 }
 
-/* What a pixel with its centre `distance` pixels right of the edge is. */
+/* Value of a pixel with its centre `distance` pixels right of the edge. */
 static double edge_value(enum pixel_filter filter, double distance)
 {
     double share = pixel_filter_share(filter, fabs(distance)) / 2.0;
@@ -105,8 +105,8 @@ TEST(samples_are_as_dense_as_the_filter_is_high)
             }
             print_message("filter %d, %s: off by %.1e at most\n", (int)filter, traced ? "traced" : "rasterised",
                           maximum);
-            /* One in each 256th by x: a mean is off by a sample at most; the table's places by 1/1000 of a pixel,
-             * which is as dense as the filter is high, twice a sample at most. */
+            /* There is a sample in each 256th by x: a mean is off by at most one sample; the table's places
+             * by 1/1000 of a pixel, which is at most twice a sample, where the filter is highest. */
             assert_true(maximum <= 1.0 / 256.0 + 0.002);
             frame_result_finish(&result);
         }
@@ -148,7 +148,7 @@ TEST(the_filters_are_those_of_the_protocol)
         for (int i = 0; i < STEPS; i++) {
             /* the midpoint rule is true to 1e-9 */
             assert_near(pixel_filter_share(filter, radius * i / STEPS), sum / whole, 1e-6);
-            /* as the header says */
+            /* by the header's formula */
             double number = 0.5 + 0.5 * sum / whole, place = radius * i / STEPS;
             double tolerance = sum / whole < 0.99 ? 1e-3 : sum / whole < 1.0 - 1.0 / 4096.0 ? 5e-3 : radius;
             assert_near(pixel_filter_offset(places, (float)number), place, tolerance);
@@ -356,7 +356,7 @@ TEST(a_picture_that_has_all_its_samples_is_handed_out_again)
     frame_result_finish(&fewer);
 }
 
-/* What the next frame holds after `change`d has been undone again: it begins from new each time. */
+/* Expects that the next frame, after `change` has been undone again, begins without samples. */
 static void expect_from_new(struct fixture *fixture, uint32_t samples, const char *what)
 {
     struct frame_result result = fixture_render(fixture);

@@ -213,8 +213,9 @@ TEST(refraction_obeys_snells_law)
         }
 }
 
-/* What a pane of clear glass lets through (bounces = 2, 4, ..) or sends back (1, 3, ..) of a light's radiance of
- * 1, its walls mirroring the share f each time; so far as the bounces are followed and a path carries enough. */
+/* Share of a light's radiance of 1 that a pane of clear glass transmits (bounces = 2, 4, ..) or reflects (1,
+ * 3, ..), if its walls mirror the share f each time, over the bounces that are followed and paths that carry
+ * enough. */
 static double pane_series(double f, uint32_t depth, bool through)
 {
     const double weight_min = (double)PATH_WEIGHT_MIN;

@@ -93,7 +93,8 @@ TEST_LONG(fibres_send_out_what_their_fit_says)
 
 enum { VIEWS = 24, PAIRS = VIEWS * VIEWS };
 
-/* Of each pair what goes from one direction to the other, and back. Those below the horizon see the other side. */
+/* Pairs of directions, for the light from one to the other and back. Those below the horizon see the other
+ * side. */
 static const char pairs_text[] =
     "#define GROUP_SIZE 64\n"
     "#include \"shared/bindings.h\"\n"

@@ -8,7 +8,7 @@
 #define FOV_Y 0.6f
 #define EYE_Z 5.0
 #define RADIUS 0.8
-#define BASE 0.5 /* of what scatters */
+#define BASE 0.5 /* base colour of the scattering surfaces */
 
 enum body { MIRROR, GLASS, ROUGH, PLASTIC, VEIL, BODIES };
 static const double places[BODIES] = {-4, -2, 0, 2, 4}; /* along x */
@@ -82,7 +82,7 @@ static void each_pixel(const struct frame_result *result,
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
         enum body body;
         double place[3];
-        /* Of four pixels the first stands for all. */
+        /* The first of four pixels stands for all of them. */
         if (!meet(i % WIDTH & ~1u, i / WIDTH & ~1u, &body, place))
             continue;
         for (int k = 0; k < 3; k++)
@@ -126,7 +126,7 @@ TEST(mirror_and_glass_stick_and_a_rough_body_does_not)
     }
 }
 
-/* Of a place of the plastic: the cosine between its normal and the way to the eye. */
+/* Cosine between the normal of a place of the plastic and the direction to the eye. */
 static double cosine_of(const double normal[3])
 {
     const double to_eye[3] = {-places[PLASTIC] - RADIUS * normal[0], -RADIUS * normal[1],

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* What a tracer depends on decides when it is brought to the scene and who owns it: the scene, a view, or the work
- * of a frame. Stand-ins that count what they are asked for answer as `naive` does. */
+/* Dependence of a tracer decides when it is brought to the scene and who owns it: the scene, a view, or the
+ * work of a frame. Stand-ins that count their calls answer as `naive` does. */
 #include "tests/accuracy/render_fixture.h"
 #include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
 
 #include "render/frame/work.h"
 
-#define STEPS 3u /* of a wave, by the tracer that advances in a way of its own */
+#define STEPS 3u /* steps of a wave, for the tracer that advances in a way of its own */
 
 /* ---- tracers that count ---- */
 
 static struct {
-    unsigned creates, destroys;   /* of tracers */
+    unsigned creates, destroys;   /* numbers of tracers */
     unsigned updates, changed;    /* calls since count_anew(), and the bits of all of them */
-    struct trace_view view;       /* of the last one */
-    unsigned states, states_made; /* of waves: alive, and made so far */
+    struct trace_view view;       /* the last view */
+    unsigned states, states_made; /* states of waves: alive, and made so far */
     unsigned steps;
 } counts;
 
@@ -87,7 +87,7 @@ static bool batches_begin(struct tracer *tracer, struct gpu_scene *scene, struct
     return true;
 }
 
-/* All rays are final after the last step, and not before. */
+/* Rays become final after the last step, and not before. */
 static enum tracer_progress batches_step(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                                          uint64_t step_end_ns, struct error *error)
 {

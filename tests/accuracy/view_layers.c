@@ -95,8 +95,8 @@ static double unknown_of(const struct frame_result *result)
     return -1;
 }
 
-/* Of the mixture, with lights of which each pixel sees the same: a texel of the key view is no pixel of the
- * picture, so that samples of an area light differ. `plain`: without mirror, glass and veil, which look different
+/* The mixed scene, with lights of which each pixel sees the same: a texel of the key view is no pixel of the
+ * picture, so samples of an area light differ. `plain`: without mirror, glass and veil, which look different
  * from aside. */
 static void mix(struct fixture *fixture, bool plain)
 {
@@ -358,11 +358,11 @@ TEST_LONG(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
     frame_result_finish(&rendered);
     frame_result_finish(&made);
     step_aside(fixture, 0.065f);
-    /* One layer lacks what the panels hide: 0.6 m high, 3.4 to 5.5 m away and 1.5 to 3.6 m before the wall, they
-     * hide strips of 0.8 to 3.2 pixels, 380 of 76,800 together: 0.49 %. Two lack nothing. 35 dB is what is asked
-     * of whole pictures. The picture ends at a tangent of 0.487, the view with its margin at 0.535. Rays from
-     * aside that come into it farther than 1.2 m away are unknown, which are those above 0.535 - 0.065 / 1.2 (1 +
-     * 0.535^2)^0.5 = 0.474: of 320 columns the last 5, 1.56 %. */
+    /* With one layer the surfaces behind the panels are missing: 0.6 m high, 3.4 to 5.5 m away and 1.5 to 3.6
+     * m before the wall, panels hide strips of 0.8 to 3.2 pixels, 380 of 76,800 together: 0.49 %. With two
+     * layers nothing is missing. Whole pictures must reach 35 dB. The picture ends at a tangent of 0.487, the
+     * view with its margin at 0.535. Rays from aside that enter it farther than 1.2 m away are unknown: those
+     * above 0.535 - 0.065 / 1.2 (1 + 0.535^2)^0.5 = 0.474, the last 5 of 320 columns, 1.56 %. */
     const double outside = 0.0156;
     for (uint32_t layers = 1; layers <= 3; layers++) {
         fixture->request.tracer_options.quadtree.layers = layers;

@@ -43,7 +43,8 @@ static inline double exact_luma(const struct exact_picture *picture, uint32_t x,
 /* 0: Cb, 1: Cr; of the columns 2x and the rows 2y on. */
 static inline double exact_chroma(const struct exact_picture *picture, int which, uint32_t x, uint32_t y)
 {
-    static const double video[] = {0.25, 0.5, 0.25}, jpeg[] = {0, 0.5, 0.5}; /* of the columns from 2x - 1 on */
+    static const double video[] = {0.25, 0.5, 0.25},
+                        jpeg[] = {0, 0.5, 0.5}; /* weights of the columns from 2x - 1 on */
     const double *weights = picture->kind == YCBCR_VIDEO ? video : jpeg;
     double mean[3] = {0}, out[3];
     for (int column = 0; column < 3; column++) {
@@ -64,7 +65,7 @@ static inline uint8_t exact_code(double value)
     return (uint8_t)(nearest < 255 ? nearest : 255);
 }
 
-/* As a renderer gives it; free(). NULL: no memory. */
+/* Rows in a renderer's form; for free(). NULL: no memory. */
 static inline uint8_t *exact_rows(const struct exact_picture *picture)
 {
     size_t row_bytes = ycbcr_row_bytes(picture->width), luma_bytes = ycbcr_luma_bytes(picture->width);

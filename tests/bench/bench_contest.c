@@ -13,7 +13,8 @@
  * surface is off by more than a thousandth of what is seen in any scene here. */
 #define DISTANCE_TOLERANCE 1e-4f
 #define DISTANCE_OF_DIAGONAL 1e-6f
-#define VISIBILITY_TOLERANCE 0.02f /* of light let through: two unorm 8-bit steps a channel, twice tinted */
+#define VISIBILITY_TOLERANCE                                                                                      \
+    0.02f /* tolerance of the transmittance: two unorm 8-bit steps a channel, twice tinted */
 #define DISAGREEMENT_MAX 1e-4
 /* A hair's breadth: of the diagonal, and as a turn in radians; some ten roundings of a position. */
 #define NUDGE 2e-6f
@@ -95,7 +96,7 @@ static float let_through(uint32_t visibility)
     return (float)((visibility & 255) + (visibility >> 8 & 255) + (visibility >> 16 & 255)) / 765;
 }
 
-/* One number a ray: the distance (< 0: nothing), or the share of light that is let through; by way of `raw`. */
+/* Reads a number for each ray: the distance (< 0: nothing), or the transmittance; by way of `raw`. */
 static void read_answers(struct bench_contest *contest, const struct bench_wave *wave, void *raw, float *answers)
 {
     const bool is_any = bench_wave_facts[wave->kind].is_any;
@@ -216,7 +217,7 @@ static const struct bench_contender *find_truth(const struct bench_contest *cont
     return NULL;
 }
 
-/* All contenders once; the round's number turns their order. The last round's answers are compared. */
+/* Runs each contender once; the round's number turns their order. The results of the last round are compared. */
 static bool run_round(struct bench_contest *contest, unsigned round, const struct bench_wave *wave,
                       const struct bench_contender *truth, void *raw, float *truths, float *answers,
                       struct error *error)

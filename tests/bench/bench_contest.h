@@ -22,11 +22,11 @@ struct bench_contender {
     struct tracer *tracer;
     enum bench_way way;
     bool is_exact; /* its disagreement is a fault, not a property */
-    /* of the last wave */
+    /* runs of the last wave */
     struct bench_runs runs, device_runs; /* by the host's clock, and by the device's where it has one */
     bool is_compared;
     uint32_t differing; /* rays whose answer is not the truth's */
-    uint32_t edges;     /* of them: the truth gives that answer to a ray a hair's breadth away */
+    uint32_t edges;     /* rays of these for which the truth gives that result when moved by a hair's breadth */
 };
 
 struct bench_contest {
@@ -50,7 +50,7 @@ struct bench_contender *bench_contest_add(struct bench_contest *contest, struct 
 /* A warm-up, which keeps hardware at work until its clock has risen, then the runs; fills what the contenders know
  * of the last wave. */
 bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *wave, struct error *error);
-/* One untimed run through the interface: the hits, for what is made of them. */
+/* Runs once untimed through the interface and returns the hits, for waves that are made from them. */
 bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
                         struct hit *hits, struct error *error);
 /* More than 0.01 % of the rays wrong, edges aside. */

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* What a sample of distributed ray tracing costs beside a plain one, whole frames on the paper's kind of scene.
- * Usage: bench distributed [--size WxH] [--runs N]
- *
- * The contenders take turns, run by run, after a warm-up. Prints JSON: {"scene": {primitives, width, height},
- * "forms": [{name, samples, primary_rays, shadow_rays, secondary_rays, "frame_ns": [..], "stages_ns": {stage:
- * [..]}}]}; times of the frame from begin to the pixels on the host, one a run. */
+/* Cost of a sample of distributed ray tracing beside a plain one, for whole frames on the paper's kind of
+ * scene. Usage: bench distributed [--size WxH] [--runs N]  The contenders take turns, run by run, after a
+ * warm-up. Prints JSON: {"scene": {primitives, width, height}, "forms": [{name, samples, primary_rays,
+ * shadow_rays, secondary_rays, "frame_ns": [..], "stages_ns": {stage: [..]}}]}; times of the frame from begin
+ * to the pixels on the host, one for each run. */
 #include "tests/bench/bench.h"
 #include "tests/bench/paper_scene.h"
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What sealing costs: frames from the daemon's network side to the library over TCP on loopback, open and sealed
+/* Cost of sealing: frames from the daemon's network side to the library over TCP on loopback, open and sealed
  * by turns. bench link [MIB [RUNS]] prints JSON: "mib", and for "open" and "sealed" a figure for each run:
- * "wall_ns" from the connect to the last byte, "daemon_ns" and "client_ns", what either end took of a processor.
- */
+ * "wall_ns" from the connect to the last byte, "daemon_ns" and "client_ns", the processor time of either end. */
 #include "tests/bench/bench.h"
 
 #include "base/clock.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What is looked at: a model or one of a family of like scenes, on the device, with a camera and a light. */
+/* Scenes of benchmarks: a model or a member of a family of similar scenes, on the device, with a camera and a
+ * light. */
 #ifndef FARLIGHT_TESTS_BENCH_SCENE_H
 #define FARLIGHT_TESTS_BENCH_SCENE_H
 
@@ -23,7 +24,7 @@ struct bench_scene {
     struct gpu_scene gpu;
     struct frame_camera camera;            /* perspective */
     float light_world[3];                  /* a point that shadow rays go to */
-    uint64_t triangle_count, sphere_count; /* as the rays meet them: every instance counts */
+    uint64_t triangle_count, sphere_count; /* counted for every instance, as rays see them */
 };
 
 /* The device must be current. Zeroes *scene first, which is to be finished either way. */

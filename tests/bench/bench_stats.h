@@ -19,7 +19,7 @@ struct bench_figure {
 };
 
 void bench_add(struct bench_runs *runs, uint64_t time_ns);       /* beyond BENCH_RUNS_MAX: forgotten */
-struct bench_figure bench_figure(const struct bench_runs *runs); /* all zero where there are no runs */
+struct bench_figure bench_figure(const struct bench_runs *runs); /* zeros without runs */
 json_t *bench_times_json(const struct bench_runs *runs);         /* an array of them */
 
 #endif

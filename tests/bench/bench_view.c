@@ -64,7 +64,7 @@ struct viewer {
     struct fl_view *view;
     struct viewer_camera camera; /* where it rests */
     uint64_t next_look_ns, last_command, shown_command;
-    uint64_t sent_ns[LOOKS_REMEMBERED]; /* of each command, modulo: more than the library remembers */
+    uint64_t sent_ns[LOOKS_REMEMBERED]; /* send times of commands, modulo: more than the library remembers */
     struct decoder *decoder;
     struct pixmap picture;
 };

@@ -6,9 +6,10 @@
 #include <math.h>
 
 #define PI_F 3.14159265f
-/* Of the diagonal: how far off its surface a ray begins; above what distance and position are rounded to. */
+/* Distance from its surface at which a ray begins, as a share of the diagonal; above the rounding of distance
+ * and position. */
 #define OFFSET 1e-5f
-#define OCCLUSION_REACH 0.1f /* of the diagonal */
+#define OCCLUSION_REACH 0.1f /* share of the diagonal */
 #define FAR 1e30f
 
 const struct bench_wave_fact bench_wave_facts[BENCH_WAVE_KINDS] = {

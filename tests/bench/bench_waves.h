@@ -11,9 +11,9 @@
 #include <stdint.h>
 
 enum bench_wave_kind {
-    BENCH_PRIMARY,    /* of the camera, 8x8 tiles in Morton order: coherent, closest */
+    BENCH_PRIMARY,    /* camera rays, 8x8 tiles in Morton order: coherent, closest */
     BENCH_REFLECTION, /* mirrored where those hit: partly coherent, closest */
-    BENCH_SHADOW,     /* to one point: coherent, any */
+    BENCH_SHADOW,     /* rays to one point: coherent, any */
     BENCH_OCCLUSION,  /* cosine-weighted, a tenth of the diagonal long: incoherent, any */
     BENCH_BOUNCE,     /* cosine-weighted, without end: incoherent, closest */
     BENCH_WAVE_KINDS
@@ -22,7 +22,7 @@ enum bench_wave_kind {
 struct bench_wave_fact {
     const char *name, *order; /* "coherent", "partly", "incoherent" */
     bool is_any;
-    bool shared_origin; /* as struct wave has it */
+    bool shared_origin; /* member of struct wave */
 };
 extern const struct bench_wave_fact bench_wave_facts[BENCH_WAVE_KINDS];
 

@@ -12,7 +12,8 @@
 #define SCENES_MAX 64
 #define REFERENCES_MAX 64
 #define JOBS_MAX 64
-/* Of one job; then it stands, as if the GPU were busy with others: a million may be asked for. */
+/* Maximum of frames of one job; then it stands still, as if the GPU were busy with others: a request may name
+ * a million. */
 #define FRAMES_MAX 100
 
 struct recorded_scene {
@@ -55,7 +56,7 @@ static struct engine_event *say(enum engine_event_kind kind, uint64_t client, ui
 {
     struct engine_event *event = port_event(kind, client, request);
     port_say(event);
-    return event; /* what it says is filled in by this thread, which takes it out later */
+    return event; /* this thread fills it in when it takes it out later */
 }
 
 static void say_failed(uint64_t client, uint32_t request, enum error_code kind, const char *field)
@@ -454,7 +455,7 @@ static void carry_out(struct engine_command *command)
     case ENGINE_SCENE_LIST:
         list(command);
         return;
-    case ENGINE_SCENES_TRIM: /* what nobody holds has ended already */
+    case ENGINE_SCENES_TRIM: /* scenes without a holder have ended already */
     case ENGINE_LIMITS:
         return;
     case ENGINE_JOB_CANCEL:

@@ -6,10 +6,10 @@
 
 #include "session/engine_port.h"
 
-/* What the next commands meet; bits. */
+/* Conditions that the next commands find; bits. */
 #define RECORDER_FULL 1u  /* the queue has no room */
 #define RECORDER_FAILS 2u /* they are refused */
-#define RECORDER_HOLDS 4u /* what there is to say waits until the mood has changed */
+#define RECORDER_HOLDS 4u /* answers wait until the condition has changed */
 #define RECORDER_LARGE 8u /* frames of several pieces, more than a socket holds */
 
 #define RECORDER_FRAME_BYTES 44u
@@ -17,7 +17,7 @@
 
 struct engine_port recorder_begin(void);
 void recorder_set_mood(unsigned mood);
-/* What clients hold, which is to be nothing once all are gone. */
+/* Counts of what clients hold; 0 once all are gone. */
 size_t recorder_jobs(void);
 size_t recorder_references(void);
 void recorder_end(void);

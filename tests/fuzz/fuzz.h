@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Assertions of fuzzers, and access to their input. */
 #ifndef FARLIGHT_TESTS_FUZZ_H
 #define FARLIGHT_TESTS_FUZZ_H
 

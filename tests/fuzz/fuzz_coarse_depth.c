@@ -16,7 +16,7 @@ static uint16_t depths[SIDE_MAX * SIDE_MAX];
 static void decode(uint32_t width, uint32_t height, const uint8_t *encoded, size_t bytes)
 {
     const size_t count = (size_t)width * height;
-    uint16_t off, *made = malloc(count * sizeof(*made)); /* of their size, so that a sanitizer sees more */
+    uint16_t off, *made = malloc(count * sizeof(*made)); /* allocated by size, so that a sanitizer sees more */
     FUZZ_REQUIRE(made);
     const struct predicted_result result = coarse_depth_decode(width, height, encoded, bytes, made, &off);
     FUZZ_REQUIRE(result.status == PREDICTED_DONE ? result.bytes == bytes : result.reason != NULL);

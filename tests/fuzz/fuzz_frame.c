@@ -37,7 +37,7 @@ static bool take_message(struct input *input, uint16_t type, bool *in_parts, str
     return message_decode(message, type, start, payload, &scratch, &error);
 }
 
-/* As a viewer asks; of what is free as the frame says, so that more than its first field is looked at. */
+/* A viewer's expectation; open values follow the frame, so that more than its first field is read. */
 static struct fl_frame_expected expect(const struct message_frame_begin *begin)
 {
     return (struct fl_frame_expected){.width = PIXELS_MAX,

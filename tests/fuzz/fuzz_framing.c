@@ -19,13 +19,13 @@ static void decode(const struct frame *frame)
     }
 }
 
-/* One message of the bytes that there are so far; `whole` is what the whole stream gives at this place. */
+/* Parses one message from the bytes so far; `whole` is the result of the whole stream at this place. */
 static enum framing_result check_piece(const uint8_t *bytes, size_t count, uint32_t accept,
                                        enum framing_result whole, const struct frame *whole_frame)
 {
     struct frame frame;
     struct decode_error error;
-    uint8_t *copy = malloc(count > 0 ? count : 1); /* of its own, so that a read beyond it is seen */
+    uint8_t *copy = malloc(count > 0 ? count : 1); /* a copy, so that a read beyond its end is seen */
     if (!copy) {
         return FRAMING_FATAL;
     }

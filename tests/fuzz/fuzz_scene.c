@@ -236,7 +236,7 @@ static void set(struct scene_edit *edit, enum object_kind kind, uint32_t id)
     edit->set.node.base.id = id;
 }
 
-/* What the edits begin with: a skinned mesh at node 3, a clip that turns one of its joints. */
+/* Scene at the beginning of the edits: a skinned mesh at node 3, a clip that turns one of its joints. */
 static struct scene *make_scene(void)
 {
     static const float triangle[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, weights[6] = {1, 0, 0, 1, 1, 1};

@@ -42,7 +42,7 @@ static void send_bytes(unsigned client, struct input *input)
     input->next += count;
 }
 
-/* One of those that a client may send. */
+/* Message that a client may send. */
 static const struct message_info *client_message(unsigned number)
 {
     const struct message_info *found[64];

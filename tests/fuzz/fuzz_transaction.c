@@ -13,10 +13,10 @@
 #include <time.h>
 
 #define EDITS_MAX 16384u
-#define ELEMENTS (1u << 16) /* of an array */
+#define ELEMENTS (1u << 16) /* elements of an array */
 #define HOST_BYTES_MAX (UINT64_C(32) << 20)
-/* Of an input. Without sanitizers the largest takes some 10 ms: a table of 16,384 edits, and 32 MiB that are
- * looked through. Checking every edit's arrays would take a minute. */
+/* Maximum time of an input. Without sanitizers the largest takes some 10 ms: a table of 16,384 edits, and 32
+ * MiB that are read. Checking the arrays of every edit would take a minute. */
 #define SECONDS_MAX 10.0
 
 enum array { POSITIONS, POSITIONS_WITH_NAN, INDICES, INDICES_BEYOND, JOINTS, MATRICES, ARRAYS };

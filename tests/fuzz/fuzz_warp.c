@@ -17,7 +17,7 @@
 
 static uint32_t colours[FL_WARP_LAYERS_MAX][SIDE_MAX * SIDE_MAX], part_colours[SIDE_MAX * SIDE_MAX];
 static float w[FL_WARP_LAYERS_MAX][SIDE_MAX * SIDE_MAX], part_w[SIDE_MAX * SIDE_MAX];
-static uint8_t sticking[SIDE_MAX * SIDE_MAX]; /* of any layer, and of parts */
+static uint8_t sticking[SIDE_MAX * SIDE_MAX]; /* shares for any layer, and for parts */
 
 struct input {
     const uint8_t *next, *end;
@@ -105,7 +105,7 @@ static void make_view(struct fl_warp *warp, struct input *input)
                            picture.counts.sticking == (float)((double)sticking_sum / (255 * pixels))));
 }
 
-/* What was taken stands in `key`, too. */
+/* Accepted input is also in `key`. */
 static void update(struct fl_warp *warp, struct input *input, const struct fl_warp_key *key)
 {
     struct fl_warp_error error = {0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the fuzzers of the importer's formats share. */
+/* Shared parts of the fuzzers of the importer's formats. */
 #ifndef FARLIGHT_TESTS_FUZZ_IMPORTING_H
 #define FARLIGHT_TESTS_FUZZ_IMPORTING_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a client says in sessions that have a bit of everything: what the fuzzer starts from, and what is cut,
- * starved and interrupted at every place. */
+/* Messages of clients in sessions with a bit of everything: the start of the fuzzer, and the sessions that
+ * are cut, starved and interrupted at every place. */
 #ifndef FARLIGHT_TESTS_RECORDED_SESSION_H
 #define FARLIGHT_TESTS_RECORDED_SESSION_H
 

@@ -11,7 +11,7 @@
 
 static const struct sealed_key sealed_fuzz_key = {.bytes = "the key of every fuzzed session"};
 
-static uint32_t sealed_random_states[2]; /* of client and server */
+static uint32_t sealed_random_states[2]; /* states of client and server */
 static unsigned sealed_random_end;
 
 static inline void sealed_random_begin(void)

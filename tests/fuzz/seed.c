@@ -158,7 +158,7 @@ struct said {
     size_t count;
 };
 
-/* What one end has to say goes to the other one, and is kept. */
+/* Passes the output of one end to the other, and keeps it. */
 static bool pass(struct sealed_link *from, struct sealed_link *to, unsigned hearing_end, struct said *said)
 {
     struct decode_error error;

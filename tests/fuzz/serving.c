@@ -86,7 +86,7 @@ static size_t take_message(struct serving_client *client)
     return frame.consumed_bytes;
 }
 
-/* All that is there; false: nothing was. Everything that the daemon says has to be what a client understands. */
+/* Receives everything that has arrived; false: nothing has. A client must understand all of it. */
 static bool receive(struct serving_client *client)
 {
     if (client->fd < 0 || client->stalled)
@@ -216,7 +216,7 @@ void serving_begin(void)
                    .height_pixels = 512,
                    .samples = 64,
                    .blob_bytes = 1 << 20,
-                   .blob_cache_bytes = 0, /* what nobody uses is gone */
+                   .blob_cache_bytes = 0, /* unused blobs are dropped */
                    .upload_window_bytes = 512 << 10,
                    .frame_bytes = 32 << 20,
                    .frames_in_flight = 3,

@@ -14,10 +14,10 @@
 struct test_file {
     char name[96]; /* its path below tests/, without the ending */
     struct CMUnitTest *tests;
-    unsigned *kinds; /* of enum test_kind, for each test */
+    unsigned *kinds; /* enum test_kind of each test */
     size_t count;
     CMFixtureFunction set_up, tear_down;           /* once */
-    CMFixtureFunction each_set_up, each_tear_down; /* of tests without fixtures of their own */
+    CMFixtureFunction each_set_up, each_tear_down; /* for tests without fixtures of their own */
 };
 
 static struct test_file *files;

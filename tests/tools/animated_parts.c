@@ -175,7 +175,7 @@ static void normalise(float v[3])
         v[i] /= length;
 }
 
-/* Of the target's surface, from places a little aside. */
+/* Normal of the target's surface, from places a little aside. */
 static void blob_normal(float normal[3], const float n[3], unsigned target)
 {
     const float aside = 0.01f;

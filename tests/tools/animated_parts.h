@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the roundabout of animated_scene.h is made of: meshes, each about its own origin, in metres, y up. */
+/* Parts of the roundabout of animated_scene.h: meshes, each about its own origin, in metres, y up. */
 #ifndef FARLIGHT_TOOLS_ANIMATED_PARTS_H
 #define FARLIGHT_TOOLS_ANIMATED_PARTS_H
 
@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define PARTS_JOINTS 4 /* of the reed, evenly from its root up */
+#define PARTS_JOINTS 4 /* joints of the reed, evenly from its root up */
 #define PARTS_REED_HEIGHT 2.6f
 
 enum parts_material { SLATE, CREAM, BLUE, RED, GOLD, COPPER, BRASS, JADE, GLOW, DARK, PARTS_MATERIALS };

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #define PI 3.14159265f
-#define CLIP_S 3.0f /* what turns has turned fully after it, what swings is where it was */
+#define CLIP_S 3.0f /* period: turning parts have turned fully, swinging ones are back */
 #define KEYS_MAX 33
 
 enum { JOINTS = PARTS_JOINTS, RIDERS = 4, BULB_PLACES = 6 };

@@ -15,7 +15,7 @@ import re
 import subprocess
 import sys
 
-FOLDERS = ("server", "protocol", "client", "shaders")
+FOLDERS = ("server", "protocol", "client", "shaders", "tests")
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".glsl", ".comp", ".vert", ".geom", ".frag", ".def"}
 # "All-zero", "As-is" and the like are nouns.
 OPENING = re.compile(r"(of|that|to|it|as|what|one|all|the same|likewise|so many)\b(?!-)", re.IGNORECASE)

@@ -40,7 +40,7 @@ bool glb_write(const char *path, const struct glb_part *parts, size_t part_count
 
 /* The pieces of it, for files with more in them. */
 
-/* One element of "materials". */
+/* Prints an element of "materials". */
 void glb_print_material(FILE *json, const struct glb_material *material);
 /* Rotation whose -z looks from eye to look_at with +y up, as a quaternion x y z w. */
 void glb_look_rotation(float q[4], const struct glb_camera *camera);

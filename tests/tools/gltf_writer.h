@@ -15,7 +15,7 @@ struct gltf_text {
     FILE *stream; /* into `text`, in memory */
     char *text;
     size_t bytes;
-    unsigned count; /* of the array's elements */
+    unsigned count; /* number of the array's elements */
 };
 
 struct gltf_writer {
@@ -25,12 +25,12 @@ struct gltf_writer {
 
 enum gltf_use { GLTF_NUMBERS = 0, GLTF_VERTICES = 34962, GLTF_INDICES = 34963 };
 
-/* Of a mesh with one primitive; accessors. */
+/* Accessors of a mesh with one primitive. */
 struct gltf_geometry {
     unsigned positions, normals, indices;
     int joints, weights;    /* -1: no skin moves it */
     unsigned target_count;  /* at most 2 */
-    unsigned targets[2][2]; /* what is added to positions and to normals */
+    unsigned targets[2][2]; /* accessors of displacements of positions and of normals */
 };
 
 void gltf_begin(struct gltf_writer *writer);

@@ -17,7 +17,7 @@
 #define HIDDEN_EXTENSION "VK_EXT_graphics_pipeline_library"
 #define EXTENSIONS_MAX 512
 
-/* What GL orders by glMemoryBarrier() alone. Copies, the host and framebuffers are ordered by the driver. */
+/* Accesses that only glMemoryBarrier() orders in GL. The driver orders copies, the host and framebuffers. */
 #define SHADER_ACCESSES                                                                                           \
     (VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT | VK_ACCESS_2_INDEX_READ_BIT | VK_ACCESS_2_VERTEX_ATTRIBUTE_READ_BIT | \
      VK_ACCESS_2_UNIFORM_READ_BIT | VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_SHADER_WRITE_BIT)
@@ -192,7 +192,7 @@ static VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL of_instance(VkInstance instance,
     return own ? own : next_of_instance(instance, name);
 }
 
-/* What the loader looks for; the manifest names it. */
+/* Entry point that the loader seeks; the manifest names it. */
 __attribute__((visibility("default"))) VkResult farlight_sync_layer(VkNegotiateLayerInterface *interface);
 VkResult farlight_sync_layer(VkNegotiateLayerInterface *interface)
 {

@@ -34,7 +34,7 @@ static void replaces_a_mesh_and_adds_an_instance(struct fixture *fixture)
     test_node(&fixture->edits, 100, 0, NODE_MESH, 5, NULL);
 }
 
-/* What was there is a hole now, and what was a hole is there. */
+/* Makes holes of surfaces and surfaces of holes. */
 static void invert_alpha(struct test_edits *edits, const struct scene_texture *texture)
 {
     size_t bytes = (size_t)texture->value.width * texture->value.height * 4;
@@ -87,7 +87,7 @@ static unsigned phases_of(const struct contract_case *of)
 {
     if (getenv("FARLIGHT_TEST_LONG"))
         return (1u << PHASE_COUNT) - 1;
-    if (of->tracer->seen.layers) /* what is seen takes brute force long; the last phase has all edits in it */
+    if (of->tracer->seen.layers) /* brute force takes long for seen surfaces; the last phase has all edits in it */
         return of->scene->phases & (1u | 1u << PHASE_POSED | 1u << (PHASE_COUNT - 1));
     return of->tracer->sampled.resolution ? of->scene->phases_sampled : of->scene->phases;
 }
@@ -137,7 +137,7 @@ static const struct truth *truth_of(const struct fixture *fixture, const struct 
 
 /* ---- comparing ---- */
 
-/* What of an answer is wrong; empty: nothing. */
+/* Fault of a result; empty: none. */
 struct fault {
     char text[200];
 };
@@ -214,7 +214,7 @@ static double off_plane(const struct fixture *fixture, const struct ray *ray, co
     const double away = sqrt(twin_dot(from_eye, from_eye)), length = sqrt(twin_dot(direction, direction)),
                  seen = fabs(twin_dot(from_eye, expected->normal_geometric)) / away,
                  met = fabs(twin_dot(direction, expected->normal_geometric)) / length;
-    /* What half the diagonal of a texel is on the surface, and by how much that falls off there. */
+    /* Half the diagonal of a texel on the surface, and its effect on the falloff there. */
     const double texel = SEEN_TEXELS * fixture->seen_view.texel * away / seen;
     const double below = texel * texel * expected->bend / 2, slope = met - texel * expected->bend;
     if (slope <= 0)
@@ -333,7 +333,7 @@ static void judge_any(struct tally *tally, const struct fixture *fixture, uint32
     count_fault(tally, ray, &fault);
 }
 
-/* Of those judged; a single ray says nothing. */
+/* Counts judged rays only; a single ray proves nothing. */
 static void expect_few_wrong(const struct tally *tally)
 {
     if (tally->wrong > fmax(1, tally->wrong_max * tally->judged))

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What every tracer promises, checked for each row of a table (rows.c). To add a tracer, add its row; to add a
- * scene, a row of scenes.c; to add a promise, a CHECK to a file of this folder.
- *
- * All run on one device, and brute force in double precision (naive_twin.h) answers each scene once for all
- * tracers. */
+/* Promises of every tracer, checked for each row of a table (rows.c). To add a tracer, add its row; to add a
+ * scene, a row of scenes.c; to add a promise, a CHECK to a file of this folder.  All run on one device, and
+ * brute force in double precision (naive_twin.h) answers each scene once for all tracers. */
 #ifndef FARLIGHT_TESTS_TRACERS_CONTRACT_H
 #define FARLIGHT_TESTS_TRACERS_CONTRACT_H
 
@@ -40,8 +38,8 @@ struct tracer_row {
         double cells;        /* distances agree to so many cells ... */
         double wrong_max;    /* ... but for this share of the rays that pass no edge within BLUR_CELLS */
         const char *reason;
-        /* It takes depths for surfaces: why it is not asked of rays that begin on one or come from afar, and of
-         * light that passes. */
+        /* Reason why a tracer that stores depths as surfaces is not asked for rays that begin on a surface or
+         * come from afar, and for light that passes. */
         const char *coarse;
         /* Why it may meet nothing within two cells of a ray's origin. */
         const char *own_way;
@@ -49,16 +47,16 @@ struct tracer_row {
     /* A tracer that knows what a view sees, and marks what it guesses (HIT_UNKNOWN). 0 layers: it knows
      * everything. Its answers are judged where it is to know them (seen.h), and it must say that it does. */
     struct {
-        uint32_t layers, resolution; /* as its options say; of a face */
-        bool is_one_face;            /* what is beside it, and behind the eye, is not known */
-        double margin;               /* of one face: so much more it sees on each side, in halves of the view */
+        uint32_t layers, resolution; /* values of its options; of a face */
+        bool is_one_face;            /* surfaces beside it, and behind the eye, are not known */
+        double margin;               /* extra view of a face on each side, in halves of the view */
         double blind; /* texels from a ray's origin within which it may take a hit for the origin's own surface */
-        double off;   /* of planes it hits: how far 1 / depth may be off, 1 / metres */
+        double off;   /* error of 1 / depth where planes are hit, 1 / metres */
         double wrong_max;    /* but for this share of the rays judged, which pass no outline within a texel */
-        uint32_t judged_min; /* of RAY_COUNT rays through a scene; brute force says which are known */
+        uint32_t judged_min; /* minimum of RAY_COUNT rays through a scene; brute force says which are known */
         const char *reason;
     } seen;
-    /* What it refuses with an error, and why; NULL: it does not. */
+    /* Reasons for which it refuses a request with an error; NULL: it does not. */
     const char *refuses_motion; /* while the shutter is open */
     const char *refuses_sizes;  /* scenes of extreme ones */
 };
@@ -79,12 +77,12 @@ struct scene_row {
     struct scene *(*create)(void);
     /* Where things are while the shutter is open, or in a pose; may be NULL. */
     void (*move)(struct scene_motion *motion, uint32_t pose_count);
-    uint32_t pose_count;      /* of the open shutter; 0: it is closed, and the pose comes as a later edit */
-    bool is_finer_than_cells; /* of textures: for exact tracers alone */
+    uint32_t pose_count;      /* poses of the open shutter; 0: it is closed, and the pose comes as a later edit */
+    bool is_finer_than_cells; /* textures finer than cells: for exact tracers alone */
     bool is_tinted;           /* light passes: not for what takes depths for surfaces */
     /* Phases of edits (conformance.c) after which answers are judged without FARLIGHT_TEST_LONG, a bit each. Each
      * set of features is another program of every tracer. */
-    unsigned phases, phases_sampled; /* of exact tracers, and of those that sample; 0: the scene is left out */
+    unsigned phases, phases_sampled; /* phases for exact tracers, and for sampled ones; 0: the scene is left out */
 };
 extern const struct scene_row scene_rows[];
 extern const size_t scene_row_count;
@@ -97,8 +95,8 @@ struct contract_case {
 };
 
 enum check_scope {
-    CHECK_EACH_SCENE = 1, /* of scene_rows */
-    CHECK_FORMS = 2,      /* of forms, too */
+    CHECK_EACH_SCENE = 1, /* run for each of scene_rows */
+    CHECK_FORMS = 2,      /* run for forms, too */
     CHECK_SURFACES = 4,   /* not of what takes depths for surfaces */
     CHECK_BESIDE = 8,     /* not of what may meet nothing within two cells of a ray's origin */
 };
@@ -123,7 +121,7 @@ void check_add(const struct check *check);
 
 #define RAY_COUNT 2000u
 
-extern struct gpu_device *device; /* of all tests */
+extern struct gpu_device *device; /* shared by all tests */
 
 struct fixture {
     const struct tracer_row *row;
@@ -132,28 +130,28 @@ struct fixture {
     struct scene_motion motion;
     struct gpu_scene gpu;
     struct tracer *tracer;
-    struct trace_view view; /* of tracers that depend on one */
+    struct trace_view view; /* for tracers that depend on a view */
     bool is_eye_set;        /* the view stays; else it is renewed with each update, in front of all there is */
-    struct twin twin;       /* what is seen, as of the last update; made when it is asked for */
+    struct twin twin;       /* visible surfaces, as of the last update; made on demand */
     struct seen_view seen_view;
     struct seen *seen;
-    struct stage_times times; /* of the last update */
+    struct stage_times times; /* times of the last update */
     struct gpu_buffer rays, ray_times, answers;
     struct ray *host_rays;       /* RAY_COUNT */
     float host_times[RAY_COUNT]; /* 0 where nothing moves, and for tracers that refuse what moves */
-    struct material *materials;  /* of the device, read back */
+    struct material *materials;  /* materials of the device, read back */
     uint64_t memory_before_bytes,
-        others_bytes;          /* of the device: before anything was there, and without the tracer */
-    size_t objects_before[16]; /* of the device, by kind */
+        others_bytes;          /* bytes on the device: before anything was there, and without the tracer */
+    size_t objects_before[16]; /* live objects of the device, by kind */
 };
 
 void expect_ok(bool ok, const struct error *error);
 
 /* Owns the scene. Brings the tracer to it; makes RAY_COUNT rays. */
 void fixture_init(struct fixture *fixture, const struct tracer_row *row, struct scene *scene);
-/* As above, with what moves while the shutter is open. */
+/* Begins as fixture_init() with motion while the shutter is open. */
 void fixture_init_moving(struct fixture *fixture, const struct tracer_row *row, const struct scene_row *scene);
-/* As the first, with an eye of the test's own for a tracer that depends on a view. */
+/* Begins as fixture_init() with an eye of the test's own, for a tracer that depends on a view. */
 void fixture_init_seen_from(struct fixture *fixture, const struct tracer_row *row, struct scene *scene, float x,
                             float y, float z);
 /* Nothing of it is left on the device. */
@@ -161,37 +159,37 @@ void fixture_finish(struct fixture *fixture);
 
 /* Commits the edits and brings the copy on the device to them, and to the motion if there is one. */
 void fixture_commit(struct fixture *fixture, struct scene_changes *changes);
-/* That and the tracer. */
+/* Updates the scene and the tracer. */
 bool fixture_try_update(struct fixture *fixture, struct error *error);
 void fixture_update(struct fixture *fixture);
-/* What an update of the tracer is told where that of the scene has changed, and the view with it. */
+/* Parameters of the tracer's update after an update of the scene, and of the view with it. */
 struct tracer_update fixture_tracer_update(struct fixture *fixture, unsigned changed);
 /* The tracer alone, from nothing, in steps as short as can be; stops after `steps_max`. `steps`: those made; may
  * be NULL. */
 enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t steps_max, uint32_t *steps,
                                              struct error *error);
 
-/* What no answer looks like: shows that an answer was written, and that none was where none is due. */
+/* Pattern unlike any result: shows that a result was written, and that none was where none is due. */
 #define UNTOUCHED 0xdeadbeefu
 
 /* Answers to the fixture's rays, of which the wave has `count`; the caller frees RAY_COUNT of them: struct hit, or
  * of WAVE_ANY uint32_t. */
 void *fixture_trace(struct fixture *fixture, enum wave_kind kind, uint32_t count);
-/* The same in steps of so many rays, where the tracer goes by rays; 0: in the smallest steps. */
+/* Traces in steps of so many rays if the tracer counts rays; 0: in the smallest steps. */
 void *fixture_trace_in_steps(struct fixture *fixture, enum wave_kind kind, uint32_t count, uint32_t step_rays);
 /* Answers to rays of a test's own, at most RAY_COUNT. */
 void fixture_trace_rays(struct fixture *fixture, enum wave_kind kind, const struct ray *rays, uint32_t count,
                         void *answers);
 
-/* Of a tracer that samples; 0: an exact one. */
+/* Cell of a tracer that samples; 0: an exact one. */
 double fixture_cell_metres(const struct fixture *fixture);
-/* Of a texel of a view at the farthest corner of the scene; 0: of a tracer that knows all. */
+/* Texel of a view at the farthest corner of the scene; 0: a tracer that knows everything. */
 double fixture_texel_metres(const struct fixture *fixture);
 
-/* What of a ray is to be known, as of the last update. */
+/* Knowledge about a ray that is required, as of the last update. */
 struct seen_answer fixture_seen(struct fixture *fixture, const struct ray *ray);
 void what_a_view_sees_is_what_brute_force_counts(void **state); /* a test of its own */
-/* What the closest hit of a ray is worth whose true way ends after so far: at a surface, or its end. */
+/* Judgement of the closest hit of a ray that truly ends at this distance: at a surface, or at its own end. */
 enum knowledge { IS_JUDGED, IS_NOT_JUDGED, CLAIMS_TO_KNOW, KNOWS_TOO_LITTLE };
 enum knowledge seen_judges(const struct seen_answer *seen, const struct hit *hit, double until);
 /* Whether all that it passes until then is to be known, and no outline is within a texel. */

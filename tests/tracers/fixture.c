@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The fixture of the contract: a scene, a tracer, and brute force beside it. */
 #include "tests/tracers/contract.h"
 
 #include "gpu/registry.h"
@@ -82,7 +83,7 @@ struct seen_answer fixture_seen(struct fixture *fixture, const struct ray *ray)
     return answer;
 }
 
-/* What the distance of a hit may be off. */
+/* Allowed error of a hit's distance. */
 static double slack_of(double distance)
 {
     return 1e-4 * (1 + fabs(distance));
@@ -159,7 +160,7 @@ enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t s
     stage_times_begin(&fixture->times);
     for (; made < steps_max && progress == TRACER_MORE; made++) {
         progress = tracer_update_step(fixture->tracer, &fixture->gpu, &update, 0, error);
-        /* What of the device's memory is not others' is the structure's, in the middle of an update too. */
+        /* Memory of the device that is not others' is the structure's, in the middle of an update too. */
         assert_int_equal(device->memory_used_bytes - fixture->others_bytes, tracer_device_bytes(fixture->tracer));
     }
     if (steps)

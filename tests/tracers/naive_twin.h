@@ -20,17 +20,17 @@ struct twin_hit {
     double distance; /* < 0: a miss */
     double normal_geometric[3], normal_shading[3];
     double uv[2];
-    double colour[4];  /* of the vertices */
+    double colour[4];  /* colour of the vertices */
     uint32_t material; /* id; 0: the default */
     uint32_t node;     /* 0: a disc */
     bool back_face;
-    double bend; /* of a ball, how much its surface curves at most, 1 / metres in the world */
+    double bend; /* maximum curvature of a ball's surface, 1 / metres in the world */
 };
 
-/* One surface that the ray's line intersects. */
+/* A surface that the ray's line intersects. */
 struct twin_intersection {
     struct twin_hit hit;
-    double alpha; /* of base colour, texture and vertices */
+    double alpha; /* alpha of base colour, texture and vertices */
     double transmittance[3];
     bool cut_out;
 };
@@ -41,7 +41,7 @@ struct twin_shape {
     bool changes; /* between the two */
 };
 
-/* What a tracer that samples cannot tell: all 0 for an exact one. */
+/* Uncertainty of a tracer that samples: all 0 for an exact one. */
 struct twin_blur {
     double near_world; /* metres: edges, the ends of rays and surfaces one behind the other are a close call so
                           near */
@@ -52,7 +52,7 @@ struct twin_blur {
 struct twin {
     const struct scene *scene;
     struct twin_blur blur;
-    struct scene_instance *instances[2]; /* of meshes, of spheres */
+    struct scene_instance *instances[2]; /* instances of meshes, of spheres */
     size_t instance_counts[2];
     struct twin_shape *shapes; /* by mesh instance */
     /* Where the instances are in each pose; the same are shown in all. */
@@ -62,22 +62,22 @@ struct twin {
 
 #define TWIN_SURFACES_MAX 128
 
-/* What is gathered from everything on a ray. */
+/* Result of everything on a ray. */
 struct twin_answer {
     const struct twin *twin;
     double origin[3], direction[3], length, t_min, t_max, time;
-    const struct twin_shape *shape; /* of the instance in hand */
+    const struct twin_shape *shape; /* shape of the current instance */
     struct twin_hit closest;
-    double second_distance; /* of what is there behind (or just before) the closest */
+    double second_distance; /* distance of the next surface behind (or just before) the closest */
     double transmittance[3];
     /* Some test was so close (to an edge, to the ray's ends, to the cutoff) that a float, or a cell, may decide it
      * the other way: for the closest hit, and for transmittance, where what is behind the closest hit counts as
      * well. */
     bool close_call, close_any;
-    double close_distance;              /* of the nearest such test that a cell may decide */
+    double close_distance;              /* distance of the nearest such test that a cell may decide */
     bool is_close;                      /* the surface in hand is such a test */
     bool is_opaque;                     /* some surface surely stops all light */
-    double opaque_distance;             /* of the first one; INFINITY: there is none */
+    double opaque_distance;             /* distance of the first opaque surface; INFINITY: there is none */
     double surfaces[TWIN_SURFACES_MAX]; /* distances; with blur only */
     uint32_t surface_count;
 };
@@ -465,7 +465,7 @@ static inline void twin_sphere(struct twin_answer *answer, const struct scene_in
     double c = twin_dot(from, from) - (double)sphere[3] * sphere[3];
     double discriminant = b * b - a * c;
     answer->close_call |= fabs(discriminant) < 1e-3 * a * sphere[3] * sphere[3];
-    double shrink = 0; /* of what is nearest to the silhouette, from world to object */
+    double shrink = 0; /* shrinking of the shape nearest to the silhouette, from world to object */
     for (int k = 0; k < 3; k++) {
         const float *m = instance->object_from_world;
         shrink =
@@ -544,7 +544,7 @@ static inline void twin_judge_blur(struct twin_answer *answer)
     answer->close_any |= answer->close_distance < INFINITY && !answer->is_opaque;
 }
 
-/* All that lies on the ray. A dead ray (t_max <= t_min) finds nothing. */
+/* Tests everything on the ray. A dead ray (t_max <= t_min) finds nothing. */
 static inline void twin_trace_at(struct twin_answer *answer, const struct twin *twin, const struct ray *ray,
                                  double time)
 {

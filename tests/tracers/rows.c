@@ -2,8 +2,8 @@
 /* The tracers of the product, and their forms. */
 #include "tests/tracers/contract.h"
 
-/* What falls on the border of a texel may be seen from either side of it, and where the images of two axes meet a
- * ray may pass between their samples. */
+/* Rays on the border of a texel may see either side of it, and where the images of two axes meet a ray may
+ * pass between their samples. */
 #define BORDERS "planes of samples overlap or leave gaps where images meet"
 
 /* Layers are ordered by what is at a texel's centre; where surfaces cross, the order turns round within the texel.
@@ -75,8 +75,7 @@ static const struct tracer_row rows[] = {
     .seen = {.resolution = 256, .wrong_max = 0.0025, .judged_min = JUDGED_MIN, .reason = CROSSINGS, __VA_ARGS__}
     QUADTREE("", QUADTREE_OPTIONS(.layers = 3), QUADTREE_SEEN(.layers = 3)),
     QUADTREE(", of one layer", QUADTREE_OPTIONS(.layers = 1), QUADTREE_SEEN(.layers = 1)),
-    /* The same planes, for eyes nearby: what lies before the view is taken to be empty where a ray begins there.
-     */
+    /* Planes for eyes nearby: space before the view counts as empty where a ray begins there. */
     QUADTREE(", of the view",
              QUADTREE_BOUND(0.001f, 0.4f, .layers = 3, .margin = 0.1f, .faces = QUADTREE_FACES_VIEW),
              QUADTREE_SEEN(.layers = 3, .is_one_face = true, .margin = 2 * 26 / 256.0)),

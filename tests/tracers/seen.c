@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a view sees (seen.h) is what brute force counts between the eye and a point. */
+/* Visible points (seen.h) are those that brute force counts between the eye and a point. */
 #include "tests/tracers/contract.h"
 
 /* From the eye, just past its own place, to just before the point. */

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What a view sees, in double and from the scene alone: along a ray, how many surfaces lie between each of its
- * points and the eye. A tracer that keeps so many layers knows the points that fewer hide, and no others.
- *
- * From an eye a convex surface hides a convex body, its shadow, which a ray meets in one interval (a ball in
- * three); so the answer is exact, but for what a texel cannot tell. A texel shows what is at its centre, which is
- * at most sqrt(1/2) of a texel from where the ray is: each shadow is taken twice, wider by that and narrower by
- * that. What is hidden by the narrow ones surely is; what not even the wide ones hide surely is not. */
+/* Visibility from an eye, in double precision and from the scene alone: along a ray, the number of surfaces
+ * between each of its points and the eye. A tracer that keeps so many layers knows the points that fewer
+ * hide, and no others.  From an eye a convex surface hides a convex body, its shadow, which a ray meets in
+ * one interval (a ball in three); so the result is exact, up to the size of a texel. A texel shows the
+ * surface at its centre, which is at most sqrt(1/2) of a texel from the ray: each shadow is computed twice,
+ * wider and narrower by that. Points within the narrow ones are surely hidden; points outside the wide ones
+ * surely are not. */
 #ifndef FARLIGHT_TESTS_TRACERS_SEEN_H
 #define FARLIGHT_TESTS_TRACERS_SEEN_H
 
@@ -19,12 +19,12 @@
 
 struct seen_view {
     double eye[3];
-    double axes[6][3][3]; /* of each face: right, down, forward */
+    double axes[6][3][3]; /* axes of each face: right, down, forward */
     uint32_t faces, layers;
-    double half;  /* of a face at distance 1 */
-    double texel; /* likewise */
+    double half;  /* half the side of a face at distance 1 */
+    double texel; /* side of a texel at distance 1 */
     double blind; /* texels: what a ray meets within them may be taken for what it begins on */
-    /* What bounds the scene: beyond the farthest point of it from the eye, that nothing is there is known. */
+    /* Bounds of the scene: beyond its farthest point from the eye, space is known to be empty. */
     bool is_bounded;
     double lower[3], upper[3];
 };
@@ -46,9 +46,9 @@ struct seen_answer {
     /* Distances from where on a point of the ray may be hidden by all layers, or outside the view, and from where
      * on a tracer must know that it is; INFINITY: nowhere. */
     double maybe_unknown, unknown;
-    /* Of the nearest surface that the ray meets within a texel of its outline. */
+    /* Distance of the nearest surface that the ray meets within a texel of its outline. */
     double edge;
-    double end; /* of the ray */
+    double end; /* end of the ray */
 };
 
 struct seen_interval {
@@ -74,10 +74,10 @@ struct seen {
     double (*triangles)[3][3]; /* in the world */
     bool *is_whole;            /* by triangle: no part may be cut out */
     size_t triangle_count;
-    /* Of the ray in hand. */
+    /* The current ray. */
     double origin[3], direction[3], t_min, t_max; /* the origin from the eye */
-    const double (*axes)[3];                      /* of the face in hand */
-    struct seen_interval inside;                  /* of the ray, in the face in hand */
+    const double (*axes)[3];                      /* axes of the current face */
+    struct seen_interval inside;                  /* part of the ray in the current face */
     struct seen_event events[SEEN_EVENTS_MAX];
     uint32_t event_count;
     struct seen_meeting meetings[SEEN_MEETINGS_MAX];
@@ -116,7 +116,7 @@ static inline void seen_add_mesh(struct seen *seen, size_t i)
     seen->triangle_count = count;
 }
 
-/* As the shutter opens. Both must outlive it. */
+/* Creates it for the time at which the shutter opens. Both must outlive it. */
 static inline struct seen *seen_create(const struct twin *twin, const struct seen_view *view)
 {
     struct seen *seen = calloc(1, sizeof(*seen));
@@ -138,7 +138,7 @@ static inline void seen_destroy(struct seen *seen)
 
 /* ---- intervals ---- */
 
-/* Of them what has at + t * slope >= 0. */
+/* Keeps the part with at + t * slope >= 0. */
 static inline void seen_clip(struct seen_interval *of, double at, double slope)
 {
     if (slope > 0)
@@ -416,7 +416,7 @@ static inline void seen_disc(struct seen *seen, const struct scene_disc *disc)
             seen_hide(seen, seen_both(beyond, seen_roots(a, b, q)), i == 0, i == 1 && is_whole);
             continue;
         }
-        /* It stays inside for good: outside between the roots. */
+        /* The ray stays inside for good: outside between the roots. */
         const struct seen_interval outside = seen_roots(-a, -b, -q);
         struct seen_interval before = beyond, after = beyond;
         before.to = fmin(before.to, outside.from);

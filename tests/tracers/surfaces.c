@@ -119,7 +119,8 @@ static struct scene *scene_of(struct mesh_builder *built, bool closed, bool is_g
     return edits.scene;
 }
 
-/* Of a tracer that samples, a few rays in a thousand may meet a gap where images or texels meet. */
+/* Maximum of wrong rays: with a tracer that samples, a few in a thousand may meet a gap where images or
+ * texels meet. */
 static uint32_t wrong_max(const struct fixture *fixture)
 {
     return fixture->row->sampled.resolution || fixture->row->seen.layers ? RAY_COUNT / 500 : 0;
@@ -130,7 +131,7 @@ struct answered {
     struct hit hits[RAY_COUNT];
     uint32_t visibilities[RAY_COUNT];
     struct seen_answer seen[RAY_COUNT];
-    uint32_t judged, strange; /* of a tracer that knows what a view sees */
+    uint32_t judged, strange; /* counts for a tracer that knows the visible surfaces only */
 };
 
 static void answer(struct fixture *fixture, struct answered *a)
@@ -159,7 +160,7 @@ static bool is_judged(const struct fixture *fixture, struct answered *a, uint32_
     return knowledge == IS_JUDGED;
 }
 
-/* All round an eye, no more than two surfaces hide what these checks ask for. */
+/* At most two surfaces hide the points that these checks use, all round an eye. */
 static void expect_judged(const struct fixture *fixture, const struct answered *a, uint32_t minimum)
 {
     if (fixture->row->seen.layers == 3 && !fixture->row->seen.is_one_face && fixture->row->seen.blind == 0)
@@ -200,7 +201,8 @@ static void init_in_ball(struct fixture *fixture, const struct tracer_row *row, 
     fixture_init_seen_from(fixture, row, scene, ball_centre[0] + 7, ball_centre[1] - 5, ball_centre[2] + 11);
 }
 
-/* As integrators move origins off surfaces: by 2^-16 of the coordinates, here of the size of the scene. */
+/* Ray whose origin is moved off the surface as by integrators: by 2^-16 of the coordinates, here of the size
+ * of the scene. */
 static struct ray ray_on_ball(bool inwards, double grazing, uint64_t *seed)
 {
     double n[3], side = inwards ? -1 : 1, z = (double)test_uniform(seed, -0.999f, 0.999f),
@@ -212,7 +214,7 @@ static struct ray ray_on_ball(bool inwards, double grazing, uint64_t *seed)
         d[k] = test_uniform(seed, -1, 1);
         cosine += (double)d[k] * n[k];
     }
-    for (int k = 0; k < 3; k++) /* of the part along the normal only its size and side */
+    for (int k = 0; k < 3; k++) /* only size and side count of the part along the normal */
         d[k] += (float)(n[k] * (side * fabs(cosine) * grazing - cosine));
     return ray_from(o, d, 0, FAR);
 }
@@ -273,9 +275,8 @@ CHECK(a_ray_does_not_hit_the_ball_that_it_leaves, CHECK_FORMS | CHECK_SURFACES)
     free(a);
 }
 
-/* What is small is met by rays that begin millions of its cells away, as those of a large scene meet what moves in
- * it: a ball has no cracks, and is met where it is, but for what the floats round that tell where the ray begins.
- */
+/* Rays that begin millions of its cells away hit a small shape, as those of a large scene hit its moving
+ * objects: a ball has no cracks, and is hit where it is, up to the rounding of the ray's origin. */
 CHECK(rays_from_afar_meet_what_is_small, CHECK_FORMS | CHECK_SURFACES)
 {
     const struct contract_case *of = *state;
@@ -378,7 +379,7 @@ CHECK(a_wall_beside_the_origin_is_not_passed, CHECK_FORMS | CHECK_SURFACES | CHE
         struct fixture fixture;
         uint64_t seed = 81;
         uint32_t wrong = 0, open = 0;
-        /* Of bodies: a floor and a wall of some thickness, one in the other. */
+        /* Bodies: a floor and a wall of some thickness, one in the other. */
         const float floor_[4][3] = {{wall, low, 0}, {wall, low, CELLS}, {CELLS, low, CELLS}, {CELLS, low, 0}};
         const float side[4][3] = {{wall, low, 0}, {wall, 200, 0}, {wall, 200, CELLS}, {wall, low, CELLS}};
         if (closed) {

@@ -158,7 +158,7 @@ CHECK(without_a_change_nothing_is_built, 0)
     fixture_init(&fixture, of->tracer, scene_of_boxes(3));
     fixture_update(&fixture);
     expect_nothing_built(&fixture, 0);
-    add_box(&fixture.edits, 2, 2, 0, 0); /* to where it is */
+    add_box(&fixture.edits, 2, 2, 0, 0); /* its present place */
     fixture_update(&fixture);
     expect_nothing_built(&fixture, 0);
     struct scene_light *light = &test_add(&fixture.edits, OBJECT_LIGHT)->set.light;
@@ -178,7 +178,7 @@ CHECK(without_a_change_nothing_is_built, 0)
     fixture_finish(&fixture);
 }
 
-/* What moves is built with every frame. */
+/* Moving geometry is built with every frame. */
 CHECK(a_build_again_allocates_nothing, CHECK_FORMS)
 {
     const struct contract_case *of = *state;
@@ -229,7 +229,7 @@ CHECK(an_empty_scene_is_missed_and_filled_and_emptied_again, CHECK_FORMS)
     fixture_finish(&fixture);
 }
 
-/* As flat as can be, one point wide, far away and of any size. */
+/* Scenes as flat as can be, one point wide, far away and of any size. */
 CHECK(flat_and_tiny_and_huge_scenes_are_met_where_they_are, 0)
 {
     const struct contract_case *of = *state;

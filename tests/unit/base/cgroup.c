@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Memory limits of control groups, from files of both versions. */
 #include "base/cgroup.h"
 #include "base/host.h"
 #include "tests/harness/test.h"

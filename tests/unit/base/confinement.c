@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a process that serves can still do when a client runs code in it. Each attempt is made by a process of its
+/* Abilities of a process that serves when a client runs code in it. Each attempt is made by a process of its
  * own, confined to two folders. */
 #include "base/confinement.h"
 
@@ -128,7 +128,7 @@ static int open_unix_socket(void)
     return socket(AF_UNIX, SOCK_STREAM, 0) < 0 ? errno : 0;
 }
 
-static int connected[2]; /* of before */
+static int connected[2]; /* sockets from before the confinement */
 
 static int connect_anew(void)
 {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Threads of processes by their names. */
 #include "base/host.h"
 #include "tests/harness/test.h"
 

@@ -33,7 +33,7 @@ void clock_let_pass(uint64_t ns)
     atomic_fetch_add(&stopped_ns, ns);
 }
 
-void clock_go_on(void)
+void clock_start(void)
 {
     const uint64_t at_ns = atomic_load(&stopped_ns), real_ns = __real_clock_now_ns();
     if (at_ns > real_ns + atomic_load(&ahead_ns))

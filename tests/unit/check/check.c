@@ -15,7 +15,7 @@
 
 ALL_TESTS(open_device, close_device)
 
-/* What a report writes. */
+/* Output of a report. */
 struct written {
     char *text;
     size_t bytes;

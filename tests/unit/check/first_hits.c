@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is made of the times of two ways to first hits. */
+/* Decisions from the times of two ways to first hits. */
 #include "check/first_hits.h"
 #include "tests/fixtures/device.h"
 #include "tests/harness/test.h"
@@ -69,7 +69,7 @@ TEST(what_is_decided_for_a_gpu_holds_at_its_next_start)
     assert_true(device->measured.known);
     assert_true(gpu_measured_load(&device->info, &back));
     assert_true(back.traced_from[1] == device->measured.traced_from[1]);
-    assert_true(first_hits_keep(device, &second)); /* it is decided already */
+    assert_true(first_hits_keep(device, &second)); /* the decision is stored already */
     assert_true(back.traced_from[1] == device->measured.traced_from[1]);
     device->info.software = before.info.software;
     device->measured = before.measured;

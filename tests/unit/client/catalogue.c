@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Names of an import's objects: their order, numbers and look-up. */
 #include "lib/catalogue.h"
 #include "tests/harness/test.h"
 

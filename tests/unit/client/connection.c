@@ -385,7 +385,7 @@ TEST(every_frame_of_a_job_comes_once_and_in_order)
     struct fl_scene scene = {.connection = connection, .scene = 1};
     struct fl_job *job = start_job(&scene, 10, 30, 4);
     assert_non_null(job);
-    assert_null(start_job(&scene, 0, 1, 1)); /* one at a time */
+    assert_null(start_job(&scene, 0, 1, 1)); /* a second job is refused */
     for (uint32_t number = 10; number <= 30; number += 4) {
         struct fl_frame *frame = fl_render_next(job, &error);
         if (!frame)
@@ -413,7 +413,7 @@ TEST(after_a_cancel_the_connection_can_be_used_again)
     fl_render_destroy(job);
 }
 
-/* Of a job of six frames. */
+/* Expects a broken connection after a frame of a job of six. */
 static void expect_broken_after_a_frame(void (*play)(struct daemon *daemon), const char *part)
 {
     connect_to_played(play);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a hostile or broken daemon can say about a frame. */
+/* Messages of a hostile or broken daemon about a frame. */
 #include "lib/frame.h"
 
 #include "encode/encoder.h"
@@ -94,7 +94,7 @@ static void expect_exact(struct fl_frame *frame)
     assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
 }
 
-/* All that came of one frame, in one message. */
+/* Assembles a frame from one message with all of its bytes. */
 static struct fl_frame *assemble(struct fl_assembly *assembly, const struct message_frame_begin *message,
                                  const uint8_t *bytes, size_t count)
 {
@@ -142,7 +142,7 @@ static size_t make_predicted(const struct picture *picture, uint8_t **packed)
 TEST(a_predicted_frame_arrives_in_every_pixel_format)
 {
     for (enum protocol_pixel_format format = 0; format < PROTOCOL_PIXEL_FORMAT_COUNT; format++) {
-        /* The same bytes, as a picture that has fewer rows the larger its pixels are. */
+        /* The picture has equal bytes: fewer rows the larger its pixels are. */
         const uint32_t pixel_bytes = fl_bytes_per_pixel(format);
         const struct picture picture = {
             .width = WIDTH, .height = HEIGHT * 4 / pixel_bytes, .bytes_per_pixel = pixel_bytes, .pixels = pixels};

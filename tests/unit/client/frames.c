@@ -30,7 +30,7 @@ TEST(a_part_is_written_as_k_of_n)
 
 typedef bool divide(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run);
 
-/* All parts of all kinds of ranges: each frame falls to exactly one. */
+/* Every frame falls to exactly one part, in all parts of all kinds of ranges. */
 static void check_parts(divide *part_of, bool is_chunk)
 {
     static uint8_t seen[400];
@@ -124,7 +124,7 @@ TEST(missing_frames_are_listed_as_ranges)
 
 /* ---- files ---- */
 
-/* What fl_image_size says of a file with these bytes, as "WxH", or "" if it is none. */
+/* Result of fl_image_size for a file with these bytes, as "WxH", or "" if it is no image. */
 static const char *size_of(const void *bytes, size_t count)
 {
     static char told[32];

@@ -142,7 +142,7 @@ static size_t count_files(const char *where)
     return count;
 }
 
-static uint8_t *pixels; /* of as many layers as there are */
+static uint8_t *pixels; /* pixels of all layers */
 static struct fl_exporter *exporter;
 static size_t files_before;
 static bool has_exporter;

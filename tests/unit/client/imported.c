@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What changes from one import of a model to the next. */
+/* Differences from one import of a model to the next. */
 #include "lib/imported.h"
 #include "tests/harness/test.h"
 

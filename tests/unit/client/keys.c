@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Files of camera keys. */
 #include "lib/farlight.h"
 #include "tests/harness/test.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Names of objects for mattes. */
 #include "lib/names.h"
 
 #include "tests/harness/test.h"

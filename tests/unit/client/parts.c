@@ -160,7 +160,7 @@ static double error_of(const struct fl_frame *frame)
 
 ALL_TESTS(fill, NULL)
 
-/* The same picture as one that is whole, as JPEG's scans only order what it has. */
+/* The picture equals a whole one, as JPEG's scans only order its data. */
 TEST(all_parts_are_the_frame)
 {
     const struct made parts = make(true), whole = make(false);
@@ -181,7 +181,7 @@ TEST(all_parts_are_the_frame)
 
 static void check_bound(const struct fl_frame *frame)
 {
-    const double slack = 1e-5; /* of 32-bit floats, in 1 / metres */
+    const double slack = 1e-5; /* rounding of 32-bit floats, in 1 / metres */
     for (size_t i = 0; i < TEXELS; i++) {
         const double inverse = frame->depth[i] > 0 ? 1.0 / (double)frame->depth[i] : 0;
         const double off = fabs(inverse - (double)rounded[i] * (double)STEP);
@@ -230,7 +230,7 @@ TEST(first_parts_are_shown_and_all_take_their_place_in_the_queue)
                                             .data_bytes = (uint32_t)(made.size_bytes - first)};
     const struct message_frame_data last = {
         .offset_bytes = made.size_bytes - 1, .data = made.bytes + made.size_bytes - 1, .data_bytes = 1};
-    assert_true(fl_assembly_data(&assembly, &rest, &error)); /* all but a byte */
+    assert_true(fl_assembly_data(&assembly, &rest, &error)); /* a byte is missing */
     assert_true(fl_assembly_has_first_parts(&assembly));
     struct fl_frame *shown = fl_assembly_show(&assembly, 2, &error);
     assert_non_null(shown);
@@ -277,7 +277,7 @@ TEST(parts_that_cannot_be_are_refused)
     }
 }
 
-/* What is damaged within a part that is whole ends in an error, and what is whole may not be called abandoned. */
+/* Damage within a complete part ends in an error, and a complete frame may not be called abandoned. */
 TEST(damaged_parts_are_refused)
 {
     struct made made = make(true);
@@ -287,7 +287,7 @@ TEST(damaged_parts_are_refused)
     give(&assembly, &made, made.size_bytes);
     assert_null(end(&assembly, true));
     fl_assembly_finish(&assembly);
-    made.bytes[first + 2] ^= 0xff; /* of the coarse depth's Zstandard frame */
+    made.bytes[first + 2] ^= 0xff; /* a byte of the coarse depth's Zstandard frame */
     assert_null(receive(&made, true, first + second));
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
     made.bytes[first + 2] ^= 0xff;

@@ -48,7 +48,7 @@ static inline void put_plainly(struct daemon *daemon, const void *bytes, size_t 
         shutdown(daemon->fd, SHUT_RDWR);
 }
 
-/* What waits in the link. */
+/* Bytes that wait in the link. */
 static inline void put_link(struct daemon *daemon)
 {
     size_t count;

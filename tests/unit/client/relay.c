@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Messages that an importer may send. */
 #include "lib/relay.h"
 #include "tests/harness/test.h"
 

@@ -3,7 +3,7 @@
 #include "tests/unit/client/played_daemon.h"
 #include "tests/harness/test.h"
 
-/* What the played daemon saw of the client. */
+/* Messages of the client that the played daemon received. */
 static struct {
     char attached[129];
     uint32_t scene, closed, clip, removed;
@@ -160,7 +160,7 @@ TEST(an_attached_scene_is_known_as_a_loaded_one)
     assert_int_equal(bounds.spheres, 3);
     assert_true(bounds.lower_world[2] == -2 && bounds.upper_world[1] == 1);
     fl_scene_destroy(scene);
-    assert_true(fl_ping(connection, &(uint64_t){0}, &error)); /* what was said before has arrived */
+    assert_true(fl_ping(connection, &(uint64_t){0}, &error)); /* earlier messages have arrived */
     assert_int_equal(seen.closed, seen.scene);
     assert_int_equal(seen.clip, 0);
 }
@@ -184,9 +184,9 @@ TEST(a_revision_is_heard_of_whatever_is_waited_for)
     assert_int_equal(fl_scene_revision(scene), 8);
     struct fl_scene_bounds bounds;
     assert_true(fl_scene_get_bounds(scene, &bounds, &error));
-    assert_int_equal(fl_scene_revision(scene), 8); /* it never falls */
+    assert_int_equal(fl_scene_revision(scene), 8); /* revisions never fall */
     fl_scene_destroy(scene);
-    assert_true(fl_ping(connection, &(uint64_t){0}, &error)); /* of a scene that is gone here */
+    assert_true(fl_ping(connection, &(uint64_t){0}, &error)); /* the scene is gone here */
 }
 
 TEST(a_clip_added_to_a_shared_scene_is_removed_again)

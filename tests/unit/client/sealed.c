@@ -215,7 +215,8 @@ TEST(the_key_file_is_looked_at_before_anybody_is_asked)
 
 /* ---- on the way ---- */
 
-static size_t cut_at; /* of what the daemon says after the handshake of the link; SIZE_MAX: not at all */
+static size_t
+    cut_at; /* place of the cut in the daemon's bytes after the handshake of the link; SIZE_MAX: no cut */
 static bool is_changed;
 
 static void play_cut(struct daemon *daemon)

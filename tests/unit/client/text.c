@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Numbers, vectors and patterns from text. */
 #include "lib/text.h"
 #include "tests/harness/test.h"
 

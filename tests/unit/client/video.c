@@ -694,7 +694,7 @@ TEST(truncated_frames_and_wrong_counts_are_answered_and_the_next_video_works)
     send(&writer, &frame_end);
     expect_answer(&writer, MESSAGE_ERROR, "ended after 100 of 16384 bytes");
     assert_int_equal(count_files(), 0);
-    /* What was on the way meanwhile is taken and dropped, without another answer. */
+    /* Messages that were on the way are received and dropped, without another answer. */
     send_frame_begin(&writer, 64);
     send_data(&writer, 0, 16384);
     send(&writer, &frame_end);

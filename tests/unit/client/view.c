@@ -12,9 +12,9 @@
 #define IN_FLIGHT 3u
 
 #define FRAME_BYTES ((size_t)EDGE * EDGE * 4)
-static uint8_t pixels[(EDGE + 1) * EDGE * 4]; /* one column more than a frame has: for one that is too wide */
+static uint8_t pixels[(EDGE + 1) * EDGE * 4]; /* for a frame that is a column too wide */
 
-/* What the daemon saw of the client; read once its thread has ended. */
+/* Messages of the client; read once the daemon's thread has ended. */
 static struct {
     unsigned renders, cameras, acks, begun_acks, key_frames, cancels;
     uint64_t credit, last_command;
@@ -194,7 +194,7 @@ EACH_TEST(begin, end_played)
 TEST(cameras_are_sent_and_frames_name_them_with_their_times)
 {
     struct fl_view *view = begin_view(play_view);
-    assert_null(fl_view_start(&scene, &usual_options, &error)); /* one at a time */
+    assert_null(fl_view_start(&scene, &usual_options, &error)); /* a second view is refused */
     fl_frame_destroy(next_frame(view));
     for (uint64_t i = 1; i <= 5; i++) {
         uint64_t command = 0;
@@ -251,7 +251,7 @@ TEST(frames_are_acknowledged_and_credit_follows_the_frames_consumed)
     assert_int_equal(seen.credit, IN_FLIGHT + 3);
 }
 
-/* One more frame of the old size comes before a new render takes its place, if the new one is wide. */
+/* Sends one more frame of the old size before a new render takes its place, if the new one is wide. */
 static void play_changes(struct daemon *daemon)
 {
     uint32_t request = 0, number = 0;
@@ -697,7 +697,7 @@ TEST(what_ends_beside_much_else_is_given_back_later)
     assert_false(fl_ping(connection, &ping_ns, &error)); /* still nothing has room */
     check_error(FL_ERROR_TIMEOUT, "no more messages");
     sem_post(&may_read);
-    /* What asks next goes behind. */
+    /* Later requests queue behind it. */
     while (!fl_ping(connection, &ping_ns, &error))
         check_error(FL_ERROR_TIMEOUT, "no more messages");
     leave_played();

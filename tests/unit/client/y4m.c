@@ -112,7 +112,8 @@ TEST(what_is_transparent_lies_over_black_in_linear_light)
                 fail_msg("%u with alpha %u becomes %d in place of %f", value, alpha, row[3 * value],
                          over_black(value, alpha));
     }
-    /* What every reader may rely on: opaque is as it is, transparent is black, half of white is 188, not 128. */
+    /* Readers may rely on this: opaque pixels are unchanged, transparent ones black, half of white is 188,
+     * not 128. */
     assert_int_equal(ycbcr_opaque_row(&converter, pixels, 255)[3 * 77], 77);
     assert_int_equal(ycbcr_opaque_row(&converter, pixels, 0)[3 * 255], 0);
     assert_int_equal(ycbcr_opaque_row(&converter, pixels, 128)[3 * 255], 188);
@@ -125,7 +126,7 @@ static uint32_t within(int64_t at, uint32_t count)
     return at < 0 ? 0 : at >= count ? count - 1 : (uint32_t)at;
 }
 
-/* One chroma sample by the definition in ycbcr.h, edges repeated. */
+/* A chroma sample by the definition in ycbcr.h, edges repeated. */
 static void half_chroma_at(const uint8_t *pixels, uint32_t size[2], uint32_t x, uint32_t y, double out[3])
 {
     double mean[3] = {0};

@@ -7,7 +7,7 @@
 
 #define STEEL 5u /* the only material */
 
-/* What the played daemon does, and what it has. */
+/* State and behaviour of the played daemon. */
 static struct {
     unsigned conflicts;    /* commits that come too late */
     uint32_t wrong_object; /* added to an identifier that is read */

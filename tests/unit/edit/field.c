@@ -38,7 +38,7 @@ TEST(every_value_of_a_material_is_a_field)
     const size_t wires = struct_leaves(message_describe(MESSAGE_SET_MATERIAL)->body(), leaves, FL_FIELDS_MAX);
     for (size_t i = 0; i < count; i++)
         assert_true(fields[i].unit && fields[i].doc && fields[i].min < fields[i].max);
-    assert_int_equal(count, wires - 1); /* all but its identifier */
+    assert_int_equal(count, wires - 1); /* the identifier is no field */
     assert_int_equal(fl_fields(PROTOCOL_OBJECT_MESH, fields), 0);
 }
 
@@ -80,7 +80,7 @@ TEST(the_intensity_of_a_light_keeps_its_hue)
     set(&light, PROTOCOL_OBJECT_LIGHT, "intensity", (double[]){0});
     set(&light, PROTOCOL_OBJECT_LIGHT, "intensity", (double[]){3});
     assert_true(light.set_light.value.colour[0] == 3 &&
-                light.set_light.value.colour[2] == 3); /* of black: white */
+                light.set_light.value.colour[2] == 3); /* multiples of black are white */
 }
 
 TEST(the_environment_turns_as_the_command_line_turns_it)
@@ -142,7 +142,7 @@ TEST(angles_and_scales_come_back_from_a_matrix)
         }
 }
 
-/* As in the shots of animations: about x, then y, then z. */
+/* Rotations are as in the shots of animations: about x, then y, then z. */
 TEST(a_node_turns_about_x_then_y_then_z)
 {
     struct message node = made(PROTOCOL_OBJECT_NODE);

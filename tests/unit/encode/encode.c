@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is encoded comes back: exactly from raw, zstd and predicted, close enough from JPEG. */
+/* Encoded pictures come back: exactly from raw, zstd and predicted, close enough from JPEG. */
 #include "encode/encoder.h"
 #include "encode/sparse.h"
 #include "protocol/pixels/predicted.h"
@@ -89,7 +89,7 @@ TEST(zstd_makes_an_even_picture_small)
     drop_picture(&picture);
 }
 
-/* As the protocol's document has it, word by word. */
+/* The prediction by the protocol's document, word by word. */
 static uint8_t foretell(const uint8_t *plane, size_t x, size_t y, size_t width)
 {
     int a = x ? plane[y * width + x - 1] : 0, b = y ? plane[(y - 1) * width + x] : 0;
@@ -143,8 +143,7 @@ TEST(predicted_gives_every_bit_back_at_every_level)
     }
 }
 
-/* Of the channels' neighbours only left, above and above left count: each branch of the rule, worked out by hand.
- */
+/* Neighbours are left, above and above left: each branch of the rule, worked out by hand. */
 TEST(predicted_leaves_what_the_rule_says)
 {
     const uint8_t pixels[] = {10, 0, 0, 255, 30, 0, 0, 255, 25,  0, 1, 255,  /* first row: less what is left */
@@ -159,7 +158,7 @@ TEST(predicted_leaves_what_the_rule_says)
     free(out);
 }
 
-/* Of blocks of eight: what is there stays, what is not has the mean beside it, or behind it in the row. */
+/* Blocks of eight: pixels with a surface stay, others get the mean beside them, or behind them in the row. */
 TEST(what_is_not_there_is_filled_block_by_block)
 {
     enum { WIDE = 20, HIGH = 9 };
@@ -191,7 +190,7 @@ TEST(predicted_is_smaller_than_zstd_where_a_picture_is_smooth)
     drop_picture(&picture);
 }
 
-/* The same as Y'CbCr; drop its planes. */
+/* Converts to Y'CbCr; the caller drops its planes. */
 static struct picture convert(const struct picture *picture, enum ycbcr kind)
 {
     uint8_t *rows = exact_rows(&(struct exact_picture){picture->pixels, picture->width, picture->height, kind});

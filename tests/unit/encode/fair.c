@@ -10,8 +10,8 @@
 
 #define LARGE 2048u /* noise of 2048 x 2048 takes zstd's highest level several seconds */
 #define SMALL 16u
-/* Of the processors, whatever else they do. Far more than a step of a few milliseconds, far less than one large
- * frame, under any sanitizer. */
+/* Processor time that counts as little, whatever else the processors do: far more than a step of a few
+ * milliseconds, far less than one large frame, under any sanitizer. */
 #define LITTLE_NS UINT64_C(2000000000)
 
 static uint64_t processor_ns(void)
@@ -48,7 +48,7 @@ struct fixture {
     struct queue *events;
     struct stage_totals totals;
     struct encode_pool *pool;
-    struct job_output *outputs[2]; /* of two clients */
+    struct job_output *outputs[2]; /* outputs of two clients */
 };
 
 static void begin(struct fixture *fixture, unsigned threads)
@@ -110,7 +110,7 @@ TEST(frames_are_given_up_with_their_job_and_with_the_pool)
         begin(&fixture, 1);
         submit(&fixture, 0, LARGE, encodings[i]);
         submit(&fixture, 1, SMALL, encodings[i]);
-        assert_null(queue_pop(fixture.events, 50000000)); /* it is at the large one */
+        assert_null(queue_pop(fixture.events, 50000000)); /* the worker is at the large one */
         uint64_t start_ns = processor_ns();
         job_output_close(fixture.outputs[0], NULL);
         struct engine_event *event = queue_pop(fixture.events, 10000000000);

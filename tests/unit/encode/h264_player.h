@@ -50,7 +50,7 @@ static inline bool play(struct player *player, const uint8_t *bytes, size_t size
     return good;
 }
 
-/* Of what is shown, in dB; the formulas of BT.709-6 the other way round. */
+/* Quality of the shown picture, in dB; the formulas of BT.709-6 in reverse. */
 static inline double psnr(const AVFrame *shown, const uint8_t *pixels, uint32_t width, uint32_t height)
 {
     double sum = 0;

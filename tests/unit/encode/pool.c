@@ -17,7 +17,7 @@ static void on_done(void *context)
     (void)context;
 }
 
-/* Of one grey that tells its number; the pool's. */
+/* A frame of a single grey that encodes its number; the pool owns it. */
 static struct engine_frame *new_frame(enum encoding encoding, uint32_t number)
 {
     struct engine_frame *frame = calloc(1, sizeof(*frame));
@@ -255,7 +255,7 @@ TEST(planes_come_to_the_encoder_as_they_are)
     player_end(&player);
 }
 
-/* What is left over, under the address sanitizer. */
+/* The address sanitizer reports what is left over. */
 TEST(a_pool_that_ends_drops_what_waits_in_a_lane)
 {
     use_threads(1);
@@ -299,7 +299,7 @@ TEST(a_frame_in_parts_has_first_colours_and_coarse_depth_first)
     engine_event_destroy(event);
 }
 
-/* What cannot be cut comes as it ever did. */
+/* A frame that cannot be cut arrives as before. */
 TEST(a_frame_of_one_part_is_in_no_parts)
 {
     struct engine_frame *made = new_frame(ENCODING_RAW, 7);

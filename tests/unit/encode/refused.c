@@ -58,7 +58,7 @@ const struct libav *__wrap_libav_load(void)
 {
     library.real = __real_libav_load();
     if (!library.real || !library.is_replaced)
-        return library.real; /* of the other files of this program */
+        return library.real; /* the real library, for the other files of this program */
     library.faked = *library.real;
     library.faked.avcodec_find_encoder_by_name = find_encoder;
     library.faked.avcodec_open2 = open_encoder;

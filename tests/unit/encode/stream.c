@@ -117,7 +117,7 @@ TEST(quality_may_change_from_picture_to_picture)
     for (int i = 0; i < 4; i++) {
         double quality = 0;
         size_t bytes = 0;
-        for (int k = 0; k < 4; k++) { /* what was better before is kept for a while */
+        for (int k = 0; k < 4; k++) { /* better parts of the previous picture are kept for a while */
             struct encoded_picture made;
             quality = pass(stream, &player, 4 * i + k,
                            &(struct encoder_request){.quality = qualities[i], .key_frame = k == 0}, &made);
@@ -240,7 +240,7 @@ TEST(pictures_keep_to_the_bytes_that_they_may_have)
     encoder_stream_destroy(stream);
 }
 
-/* Of the first picture of a stream. */
+/* Quality of the first picture of a stream. */
 static double quality_of_first(const struct picture *picture, const uint8_t *pixels)
 {
     struct encoder_stream *stream = new_stream();

@@ -237,7 +237,7 @@ TEST(an_orbit_by_90_degrees_is_a_quarter_of_the_circle)
         float eye[3];
         eye_of(&camera, eye);
         expect_near("eye", eye, eyes[quarter], 3, 1e-5);
-        /* It still looks at the centre, and what was up is. */
+        /* The camera still looks at the centre, and up is unchanged. */
         double back[3], length = 0;
         for (int i = 0; i < 3; i++) {
             back[i] = eyes[quarter][i] - (double)key.look_at_world[i];
@@ -296,7 +296,7 @@ TEST(an_orbit_without_a_key_turns_about_the_middle_of_the_scene)
     }
 }
 
-/* Of the picture's half, by how much the rim of a disc that lies about (x, 0, 0) reaches out of its middle. */
+/* Distance of the rim of a disc about (x, 0, 0) from the picture's middle, as a share of half the picture. */
 static double reach_of(const struct frame_camera *camera, double x, double radius, double aspect)
 {
     const float *m = camera->world_from_view;

@@ -22,10 +22,11 @@ static struct engine *engine;
 
 static struct tracer_impl watched_bvh;
 static struct {
-    /* Of the engine's thread: whose structure is not done; and this step did a piece. */
+    /* State of the engine's thread: the tracer whose structure is unfinished; and whether this step built a
+     * part. */
     const struct tracer *building;
     bool stepped;
-    atomic_uint pieces, beside; /* of structures that have several; steps between two of them */
+    atomic_uint pieces, beside; /* parts of structures that have several; steps between two of them */
     atomic_bool held;           /* the second piece waits for `gate` */
     atomic_bool gate;
 } watched;
@@ -307,7 +308,7 @@ TEST(jobs_switch_tracers_on_one_scene_while_both_run)
     collect_jobs(together, 5, 2, &cubes, &built);
     assert_memory_equal(alone, together, sizeof(alone));
     assert_int_equal(cubes, FRAMES);
-    assert_int_equal(built, 0); /* it was kept beside the other tracer's tree */
+    assert_int_equal(built, 0); /* kept beside the other tracer's tree */
     for (int i = 0; i < FRAMES; i++)
         assert_true(alone[0][i] != alone[1][i]); /* 64 cells are seen */
     expect_gone(3);
@@ -484,7 +485,7 @@ TEST(views_beside_each_other_come_to_the_pictures_of_single_frames)
 
 /* ---- a context that is lost --------------------------------------------------------------------- */
 
-static atomic_int resets; /* that the driver will tell of, one a context */
+static atomic_int resets; /* resets that the driver will report, one a context */
 
 static GLenum status_of_a_lost_context(void)
 {
@@ -520,7 +521,7 @@ TEST(frames_go_on_after_a_lost_context_and_are_the_same)
         engine_event_destroy(event);
     }
     expect_done();
-    assert_int_equal(atomic_load(&resets), 0); /* it was told */
+    assert_int_equal(atomic_load(&resets), 0); /* the reset was reported */
     assert_memory_equal(before[0], after[0], sizeof(before[0]));
     /* Pictures that are refined, too: what was held is made again. */
     struct view_frame alone[VIEWS][FRAMES], healed[VIEWS][FRAMES];
@@ -571,7 +572,7 @@ static void make_field(uint64_t client)
     expect_done();
 }
 
-/* Of one frame and the answer behind it. */
+/* Expects a frame and the answer behind it; returns the time. */
 static uint64_t expect_picture(uint64_t *revision)
 {
     struct engine_event *event = next_event();

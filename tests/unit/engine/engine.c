@@ -390,7 +390,7 @@ TEST(the_tables_of_all_scenes_together_have_a_limit)
     expect_failed(2, 3, ERROR_LIMIT, "edits");
     submit(commit_of_nodes(2, 4, 1, 40));
     expect_done(2, 4);
-    submit(commit_of_nodes(1, 5, 1, 60)); /* as many as it has */
+    submit(commit_of_nodes(1, 5, 1, 60)); /* its share of the limit */
     expect_done(1, 5);
     submit(command(ENGINE_CLIENT_GONE, 2, 0));
     expect_forgotten(2);

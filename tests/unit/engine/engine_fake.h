@@ -37,7 +37,7 @@
 
 struct frame_scene {
     struct gpu_device *device;
-    uint64_t revision;      /* that was shown last */
+    uint64_t revision;      /* revision of the last frame */
     bool moved;             /* with something in motion, or else changed */
     uint32_t frames, users; /* in progress; renderers */
 };
@@ -50,7 +50,7 @@ struct frame_renderer {
     uint32_t pose_count, steps_left;
     int last_step;
     bool busy;
-    struct frame_request kept_request; /* of the last frame, with the samples that it came to */
+    struct frame_request kept_request; /* request of the last frame, with its final number of samples */
     uint32_t kept_samples;
     uint64_t kept_revision;
     struct stage_times times;
@@ -63,12 +63,12 @@ static struct {
     atomic_int devices_made, devices, scenes, renderers_made, renderers, frames_begun, frames_done,
         frames_abandoned;
     atomic_int fail_steps;      /* the next steps that fail */
-    atomic_uint fail_seed;      /* of these, those of frames of that seed; 0: all */
+    atomic_uint fail_seed;      /* limits these failures to frames of that seed; 0: all */
     atomic_int fail_kind;       /* enum error_code */
     atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
     atomic_bool no_device;
     atomic_bool takes_memory; /* a frame in progress takes a byte of the device's memory for each pixel */
-    atomic_bool holds_steps;  /* as long as it is set, a step does not end */
+    atomic_bool holds_steps;  /* while set, a step does not end */
     atomic_int steps_held;
     atomic_int in_progress; /* frames, of all scenes */
     atomic_int step_count;
@@ -168,7 +168,7 @@ static inline uint64_t fake_renderer_bytes(const struct frame_renderer *renderer
     return FAKE_RENDERER_BYTES + (renderer->busy ? fake_frame_bytes(&renderer->request) : 0);
 }
 
-/* Of everything that a motion says; 0: none. The result's `splits` has it, and `structure_bytes` the poses. */
+/* Digest of everything in a motion; 0: none. The result's `splits` has it, and `structure_bytes` the poses. */
 static inline uint64_t fake_motion_digest(const struct scene_motion *motion)
 {
     uint64_t digest = motion != NULL;
@@ -387,7 +387,7 @@ static inline int stop_engine(void **state)
 {
     (void)state;
     atomic_store(&fake.holds_steps, false);
-    clock_go_on();
+    clock_start();
     stop();
     return 0;
 }

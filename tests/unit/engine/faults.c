@@ -99,7 +99,7 @@ TEST(a_watchdog_sees_whether_the_engine_makes_progress)
     uint64_t turns = 0;
     open_scene(1, 1);
     while (!engine_is_alive(engine, &turns) || !engine_is_alive(engine, &turns))
-        usleep(1000); /* it has nothing to do, from some time on */
+        usleep(1000); /* the engine has nothing to do, from some time on */
     atomic_store(&fake.holds_steps, true);
     submit(render(1, 2, 0, 0));
     wait_until(&fake.steps_held, 1);
@@ -182,7 +182,7 @@ TEST(a_frame_for_which_there_is_no_memory_waits_until_others_have_ended)
     atomic_store(&fake.fail_steps, 1);
     submit(seeded(2, 12));
     wait_until(&fake.frames_begun, 2);
-    expect_silence(); /* it is neither failed nor begun again */
+    expect_silence(); /* the job has neither failed nor begun again */
     submit(seeded(3, 13));
     expect_silence(); /* nobody overtakes it */
     assert_int_equal(atomic_load(&fake.frames_begun), 2);
@@ -260,7 +260,7 @@ TEST(stats_add_up)
     assert_int_equal(stats->jobs, 0);
     assert_int_equal(stats->device_limit_bytes, 700);
     assert_int_equal(stats->scene_count, 2);
-    /* What the job left is there for the next one. */
+    /* Memory that the job left is there for the next one. */
     assert_int_equal(stats->scenes[0].device_bytes, FAKE_SCENE_BYTES + FAKE_RENDERER_BYTES);
     assert_int_equal(stats->scenes[1].nodes, 1);
     assert_int_equal(stats->scenes[1].revision, 1);
@@ -272,7 +272,7 @@ TEST(stats_add_up)
     assert_int_equal(stats->stages[STAGE_QUEUE][CLOCK_CPU].max_ns, 50);
     assert_int_equal(stats->scenes[1].instances, 0);
     engine_event_destroy(event);
-    /* What a scene holds is counted anew after a transaction. */
+    /* Memory of a scene is counted anew after a transaction. */
     struct engine_command *made = command(ENGINE_COMMIT, 1, 5);
     static const float sphere[4] = {0, 0, 0, 1};
     made->scene = 2;

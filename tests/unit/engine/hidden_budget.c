@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The share of time for layers of hidden surfaces. */
 #include "engine/hidden_budget.h"
 #include "tests/harness/test.h"
 

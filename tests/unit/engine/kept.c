@@ -7,7 +7,7 @@
 #include <pthread.h>
 #include <stdio.h>
 
-/* What the keeper was asked for, in order: "read a 1, write a 1, forget a". */
+/* Requests to the keeper, in order: "read a 1, write a 1, forget a". */
 static struct {
     pthread_mutex_t lock;
     char told[1024];
@@ -98,7 +98,7 @@ static void open_named(uint32_t request, const char *name, enum sharing sharing)
     expect_done(1, request);
 }
 
-/* As the last process had it, with that revision. */
+/* Opens a scene as the last process had it, with that revision. */
 static void open_restored(uint32_t request, const char *name, uint64_t revision)
 {
     struct engine_command *open = open_command(request, name, SHARING_SHARED);
@@ -140,7 +140,7 @@ TEST(changes_wait_while_a_scene_is_read_and_frames_go_on)
     change(10, 1);
     wait_for("read a 1");
     submit_commit(1, 11, 1);
-    change(12, 2); /* of another scene */
+    change(12, 2); /* a change of another scene */
     assert_null(event_within(100));
     hold_reads(false);
     assert_int_equal(expect_done(1, 11), 2);

@@ -144,7 +144,7 @@ TEST(clients_and_the_engine_may_go_during_a_long_transaction)
         submit_long_commit(1, 10, 5);
         submit(command(ENGINE_CLIENT_GONE, 1, 0));
         struct engine_event *event = next_event();
-        if (event->kind == ENGINE_DONE) { /* it was finished before */
+        if (event->kind == ENGINE_DONE) { /* the job was finished before */
             engine_event_destroy(event);
             event = expect_event(ENGINE_CLIENT_FORGOTTEN, 1, 0);
         }
@@ -209,7 +209,7 @@ TEST(a_name_names_one_scene_for_each)
     expect_failed(1, 3, ERROR_INVALID, "scene_open.name");
     submit_open(1, 3, "a", SHARING_SHARED);
     expect_failed(1, 3, ERROR_INVALID, "scene_open.name");
-    /* What is kept for one is nothing to another. */
+    /* A scene that is kept for one client is invisible to another. */
     open_as(2, 1, "a", SHARING_KEPT);
     open_as(3, 1, "a", SHARING_SHARED);
     submit_open(4, 1, "a", SHARING_SHARED);
@@ -220,7 +220,7 @@ TEST(a_name_names_one_scene_for_each)
     submit_commit(5, 2, 1);
     expect_done(5, 2);
     assert_int_equal(attach(5, 3, "a"), 1);
-    /* One's own goes before what is shared. */
+    /* A client's own scene has precedence over a shared one. */
     submit_commit(2, 2, 1);
     expect_done(2, 2);
     assert_int_equal(attach(2, 3, "a"), 1);
@@ -328,7 +328,7 @@ TEST(a_cancel_ends_only_what_its_client_waits_for)
     wait_until(&fake.frames_begun, 1);
     submit_commit(2, 8, 6);
     submit(render_scene(2, 9, 6, 0));
-    submit(render_scene(1, 9, 5, 0)); /* of the same number */
+    submit(render_scene(1, 9, 5, 0)); /* a scene with that number */
     submit_target(ENGINE_JOB_CANCEL, 1, 10, 9, 0);
     expect_failed(1, 9, ERROR_CANCELLED, "");
     expect_done(1, 10);
@@ -442,7 +442,7 @@ TEST(lingering_scenes_are_evicted_where_memory_is_short)
     expect_done(1, 2);
     open_as(2, 1, "b", SHARING_PRIVATE);
     submit(commit_of_nodes(2, 2, 1, 60));
-    expect_failed(2, 2, ERROR_LIMIT, "edits"); /* it is held */
+    expect_failed(2, 2, ERROR_LIMIT, "edits"); /* the scene is held */
     client_goes(1);
     submit(commit_of_nodes(2, 3, 1, 60));
     expect_ended();
@@ -486,7 +486,7 @@ TEST(lingering_scenes_are_evicted_for_the_bytes_of_blobs_that_are_lacking)
     leave_spheres(1, "first");
     leave_spheres(2, "second");
     leave_spheres(2, "third");
-    submit_trim(3 * SPHERES_BYTES + 1); /* all of them would not suffice */
+    submit_trim(3 * SPHERES_BYTES + 1); /* even all of them would not suffice */
     submit_trim(0);
     attach(3, 1, "second");
     client_goes(3);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Shares of the device among jobs, in a simulation. */
 #include "engine/scheduler.h"
 #include "tests/harness/test.h"
 
@@ -17,7 +18,7 @@ static struct simulation {
     uint32_t weights[JOBS_MAX];
     uint64_t slice_ns[JOBS_MAX];
     uint64_t had_ns[JOBS_MAX], waited_ns[JOBS_MAX], longest_wait_ns[JOBS_MAX];
-    bool keeps_turn[JOBS_MAX]; /* as it has begun something */
+    bool keeps_turn[JOBS_MAX]; /* set while a job has begun something */
     size_t count, before;
     uint64_t now_ns;
 } simulation;
@@ -154,7 +155,7 @@ TEST(a_job_that_returns_after_a_pause_has_no_claim_on_missed_time)
     serve_for(5000 * MS);
     simulation.entries[paused].ready = true;
     memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
-    assert_int_equal(serve(), paused); /* it is next at once */
+    assert_int_equal(serve(), paused); /* the job is next at once */
     serve_for(195 * MS);
     expect_had(there, 100 * MS);
     expect_had(paused, 100 * MS);
@@ -173,7 +174,7 @@ TEST(a_client_whose_job_has_ended_has_no_claim_either)
     add(0, 1, 5 * MS);
     size_t job = add(1, 1, 5 * MS);
     serve_for(100 * MS);
-    simulation.count--; /* it is not named any more */
+    simulation.count--; /* the last job is not named any more */
     serve_for(3000 * MS);
     simulation.shares[job] = (struct schedule_share){0}; /* another one of that client */
     simulation.count++;
@@ -227,7 +228,7 @@ TEST(many_clients_are_all_served)
         serve();
     }
     for (size_t i = 0; i < JOBS_MAX; i++)
-        simulation.slice_ns[i] = 20 * MS; /* what the longest was */
+        simulation.slice_ns[i] = 20 * MS; /* length of the longest slice */
     for (size_t i = 0; i < JOBS_MAX; i++) {
         expect_had(i, simulation.now_ns / JOBS_MAX);
         /* Nobody waits for longer than it takes to serve each of the others, and what its own slice went too far.
@@ -284,7 +285,8 @@ TEST(a_very_long_slice_is_not_paid_for_without_end)
     memset(simulation.longest_wait_ns, 0, sizeof(simulation.longest_wait_ns));
     memset(simulation.waited_ns, 0, sizeof(simulation.waited_ns));
     serve_for(10000 * MS);
-    /* Of so many, two turns of each; and one round, as the others were not alike far either. */
+    /* The bound: two turns of each of so many jobs, and one round, as the others did not have equal times
+     * either. */
     uint64_t turn_ns = SCHEDULE_TURN_NS + JOBS_MAX * (uint64_t)SCHEDULE_TURN_EACH_NS;
     assert_true(simulation.longest_wait_ns[first] <= JOBS_MAX * (2 * turn_ns + 5 * MS));
     assert_true(simulation.longest_wait_ns[first] >= SCHEDULE_WAIT_MAX_NS);

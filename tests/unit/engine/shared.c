@@ -5,7 +5,7 @@
 
 EACH_TEST(start_engine, stop_engine)
 
-/* One frame, whose steps bear the number of the request. */
+/* A job of one frame, whose steps have the number of the request. */
 static struct engine_command *still(uint32_t request, uint32_t steps, uint32_t depth)
 {
     struct engine_command *made = render(1, request, 0, 0);
@@ -74,7 +74,7 @@ TEST(an_edit_waits_for_all_frames_and_lets_none_begin)
     many->job.credit = 1;
     submit(many);
     take_frame(1, 5, 0);
-    expect_silence(); /* as many as may be in flight are rendered */
+    expect_silence(); /* the maximum number in flight is rendered */
     int begun = atomic_load(&fake.frames_begun);
     submit_commit(1, 6, 1);
     submit_target(ENGINE_JOB_CREDIT, 1, 0, 5, 3);
@@ -115,7 +115,7 @@ TEST(a_frame_that_changes_what_is_shared_is_alone_and_not_overtaken)
     submit(still(3, 20, GATED_DEPTH));
     wait_until(&fake.frames_begun, 2);
     submit(still(4, 20, CHANGING_DEPTH));
-    expect_silence(); /* it is put off */
+    expect_silence(); /* the frame is postponed */
     submit(still(5, 20, 0));
     submit(still(6, 20, 0));
     expect_silence();
@@ -176,7 +176,7 @@ TEST(the_renderer_of_a_clients_job_serves_its_next_job)
         assert_int_equal(atomic_load(&fake.renderers), 1);
     }
     assert_int_equal(atomic_load(&fake.renderers_made), 1);
-    /* Of jobs at the same time one renderer stays. */
+    /* Jobs at the same time leave one renderer. */
     for (uint32_t request = 5; request <= 6; request++)
         submit(still(request, 10, GATED_DEPTH));
     wait_until(&fake.frames_begun, 5);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the frames of a job that plays clips show: poses over the shutter, cameras, lenses, noise. */
+/* Frames of a job that plays clips: poses over the shutter, cameras, lenses, noise. */
 #include "tests/unit/engine/engine_fake.h"
 #include "tests/unit/scene/drafts.h"
 
@@ -84,7 +84,7 @@ TEST(there_are_as_many_poses_as_the_fastest_turn_needs)
             fail_msg("%g degrees: %u poses, %u where what hangs below turns too; expected %u and %u",
                      cases[i].degrees, alone, together, cases[i].alone, cases[i].together);
         assert_int_equal(pose_count(scene, 2, 0, 0), 1);
-        assert_int_equal(pose_count(scene, 2, 1, 1), 1); /* it has come to its end */
+        assert_int_equal(pose_count(scene, 2, 1, 1), 1); /* the clip has come to its end */
         assert_int_equal(pose_count(scene, 2, 0, 1 / 1024.0), 2);
         scene_destroy(scene);
     }
@@ -366,7 +366,7 @@ TEST(an_automatic_camera_shows_the_pose_at_time_0_in_all_frames)
         shot_finish(&fresh);
         shot_finish(&kept);
     }
-    /* What was kept is not used for another revision. */
+    /* Poses that were kept are not used for another revision. */
     add_shown(&list, 2, NODE_MESH, 1);
     expect_commit(scene, &list);
     struct shot kept;
@@ -402,7 +402,7 @@ TEST(a_ground_lies_beneath_all_that_clips_do)
         shot_finish(&fresh);
         shot_finish(&kept);
     }
-    /* Of the rest pose, without the clip; seen from x, what lies at 0. */
+    /* The rest pose, without the clip; seen from x, its bounds begin at 0. */
     job.clip_count = 0;
     job.frame.picture.ground_up_x = 1.0f;
     job.frame.picture.ground_up_y = 0.0f;
@@ -502,7 +502,7 @@ TEST(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does)
 
 /* ---- ranges -------------------------------------------------------------------------------------- */
 
-/* What a frame shows, whichever job it comes from. */
+/* Properties of a shown frame, whichever job it comes from. */
 struct record {
     struct frame_request request;
     uint64_t motion;

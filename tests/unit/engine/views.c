@@ -145,10 +145,10 @@ TEST(of_many_cameras_the_newest_is_shown)
     for (uint64_t number = 2; number <= 500; number++)
         look(number, true);
     expect_silence();
-    assert_int_equal(atomic_load(&fake.frames_begun), 1); /* what shows something new is finished */
+    assert_int_equal(atomic_load(&fake.frames_begun), 1); /* a frame that shows something new is finished */
     atomic_store(&fake.gate_open, true);
     struct engine_event *event = next_event();
-    assert_true(event->frame->command <= 1); /* it may have been begun before the first camera came */
+    assert_true(event->frame->command <= 1); /* the frame may have been begun before the first camera came */
     engine_event_destroy(event);
     expect_picture(2, 1, 500, 1, ENCODING_JPEG);
     expect_silence();
@@ -163,9 +163,9 @@ TEST(a_picture_that_rests_is_refined_until_it_has_its_samples)
     expect_silence();
     look(1, true);
     expect_picture(2, 3, 1, 3, ENCODING_JPEG);
-    expect_silence(); /* it moves: more will follow */
+    expect_silence(); /* the camera moves: more will follow */
     struct view_camera stays = camera(1, false);
-    stays.command = 2; /* the same place: the samples that it has count */
+    stays.command = 2; /* an equal place: the samples so far count */
     set_eye(&stays);
     expect_picture(2, 4, 2, 6, ENCODING_RAW);
     expect_picture(2, 5, 2, 7, ENCODING_RAW);
@@ -225,7 +225,7 @@ TEST(a_new_camera_interrupts_refining)
     assert_int_equal(atomic_load(&fake.frames_abandoned), 1);
     look(10, true);
     expect_silence();
-    assert_int_equal(atomic_load(&fake.frames_abandoned), 1); /* what shows something new is finished */
+    assert_int_equal(atomic_load(&fake.frames_abandoned), 1); /* a frame that shows something new is finished */
     atomic_store(&fake.gate_open, true);
     expect_picture(2, 1, 9, 1, ENCODING_JPEG);
     expect_silence(); /* there is no credit for a third */
@@ -247,7 +247,7 @@ TEST(a_view_shows_cameras_while_an_edit_waits_for_a_long_batch_frame)
     submit(gated(render(1, 9, 0, 0)));
     wait_until(&fake.frames_begun, 1);
     submit_commit(1, 3, 1); /* for the frame of the batch */
-    /* That comes after the edit, and is not begun before it. */
+    /* This view follows the edit, and is not begun before it. */
     submit(view(2));
     expect_silence();
     atomic_store(&fake.gate_open, true);
@@ -270,7 +270,7 @@ TEST(a_view_shows_cameras_while_an_edit_waits_for_a_long_batch_frame)
         assert_int_equal(frame->command, number);
         assert_int_equal(frame->result.revision, 1);
     }
-    expect_silence(); /* what rests is not refined to be thrown away */
+    expect_silence(); /* a frame at rest is not refined to be thrown away */
     atomic_store(&fake.gate_open, true);
     uint32_t shown = 0;
     for (bool applied = false; !applied || shown < 4;) {
@@ -364,7 +364,7 @@ TEST(a_stream_continues_over_frames_at_rest_and_restarts_on_request)
     expect_encoded(take_next(2, true), ENCODING_H264, false);
     expect_encoded(take_next(3, false), ENCODING_RAW, true);
     expect_encoded(take_next(4, true), ENCODING_H264, false);
-    /* One of rest comes at once, and the stream begins again with the next motion. */
+    /* A camera at rest has a frame at once, and the stream begins again with the next motion. */
     look(5, false);
     expect_encoded(take(next_event()), ENCODING_RAW, true);
     assert_true(view_wishes_request_key_frame(wishes));
@@ -387,7 +387,7 @@ TEST(a_view_takes_the_place_of_another_and_goes_on_from_it)
     open_scene(1, 7);
     submit(with_samples(view(2), 1, 1));
     expect_picture(2, 0, 0, 1, ENCODING_RAW);
-    submit(with_samples(view_of(20, others), 1, 1)); /* of the same client, but another one */
+    submit(with_samples(view_of(20, others), 1, 1)); /* another view of the same client */
     expect_picture(20, 0, 0, 1, ENCODING_RAW);
     look(3, true);
     expect_picture(2, 1, 3, 1, ENCODING_JPEG);
@@ -398,7 +398,7 @@ TEST(a_view_takes_the_place_of_another_and_goes_on_from_it)
     expect_done(1, 2);
     expect_picture(4, 2, 3, 1, ENCODING_ZSTD);
     expect_silence();
-    /* One that cannot be changes nothing. */
+    /* A view that cannot be made changes nothing. */
     made = view(5);
     made->job.frame.tracing.tracer = 99;
     submit(made);
@@ -560,7 +560,7 @@ TEST(what_is_hidden_takes_no_more_than_its_share_while_cameras_come)
         pictures += !frame->request.hidden_layer;
     }
     assert_true(hidden_ns > 0 && pictures > 70);
-    /* One that takes longer than the one before it is not saved for. */
+    /* A layer that takes longer than the previous one is not saved for. */
     assert_true((double)hidden_ns < 0.15 * (double)(end_ns - begin_ns) + 2.0 * (double)longest_ns);
 }
 
@@ -623,7 +623,7 @@ TEST(frames_come_in_the_form_that_their_encoder_takes)
     made->job.view.adapt = true;
     view_wishes_set_effort(wishes, &(struct view_effort){.quality = 95, .sparing = true});
     submit(made);
-    /* Of rest only its samples tell whether it will be one that loses. */
+    /* Only its samples tell whether a frame at rest will be lossy. */
     expect_form(take(expect_frame(1, 2, 0)), ENCODING_JPEG, YCBCR_NONE);
     expect_form(take(expect_frame(1, 2, 1)), ENCODING_RAW, YCBCR_NONE);
     look(1, true);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Weights of users, and control groups of workers, in a made folder. */
 #include "front/shares.h"
 
 #include "net/auth.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What fuzzers have found worth keeping, once through each of them: tests/fuzz/corpus/NAME/ through fuzz_NAME.c,
- * which is built for this with another name for its one function. */
+/* Inputs that fuzzers found worth keeping, once through each of them: tests/fuzz/corpus/NAME/ through
+ * fuzz_NAME.c, which is built for this with another name for its one function. */
 #include "tests/harness/test.h"
 
 #include <dirent.h>

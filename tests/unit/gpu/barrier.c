@@ -66,7 +66,7 @@ TEST(each_waits_once_for_its_own_kinds_of_access)
     gpu_buffer_clear(device, &copies, 0);
     assert_int_equal(take_waited_for(), 0);
     assert_int_equal(copy, 2);
-    gpu_dispatch_indirect(&writer, &copies, 0); /* of no groups */
+    gpu_dispatch_indirect(&writer, &copies, 0); /* a dispatch of no groups */
     assert_int_equal(take_waited_for(), GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
     shader_probe_finish(&writer);
     shader_probe_finish(&fetcher);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is kept of programs on the disk: only what is whole, ours, and asked for comes back, and no more than the
- * limit stays. */
+/* Programs on the disk: only complete, own and requested ones come back, and no more than the limit stays. */
 #include "gpu/binary_cache.h"
 #include "tests/harness/test.h"
 
@@ -99,7 +98,7 @@ static unsigned count_files(void)
     return count;
 }
 
-/* It is passed over, and replaced by the next one that is written. */
+/* The file is ignored, and replaced by the next one that is written. */
 static void assert_is_as_good_as_none(void)
 {
     assert_int_equal(read_binary(1), -1);

@@ -41,7 +41,7 @@ static void capture_end(struct capture *capture, char *text, size_t size)
     fputs(text, stderr);
 }
 
-/* What the log says of a mistake and of an inserted message, made in a pass on a device of its own. */
+/* Provokes a mistake and an inserted message in a pass on a device of its own, and returns the log's text. */
 static bool provoke(bool debug, char *text, size_t size)
 {
     struct error error = {0};

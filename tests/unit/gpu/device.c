@@ -101,7 +101,7 @@ TEST(a_lost_context_is_why_whatever_fails_after_it)
     const struct gpu_program_source none = {.compute = "there/is/none.comp"};
     gpu_note_loss(device, &error);
     expect_no_error(&error);
-    device->lost = true; /* as after a reset that the driver told of once */
+    device->lost = true; /* the driver reported a reset once */
     assert_false(gpu_check(device, "the test", &error));
     assert_int_equal(error.kind, ERROR_DEVICE_LOST);
     error = (struct error){0};
@@ -312,7 +312,7 @@ TEST(more_groups_than_an_axis_takes_are_all_run)
     gpu_uniform_uint(program, "ray_count", count);
     gpu_uniform_uint(program, "disc_count", 0);
     gpu_uniform_uint(program, "instance_count", 0);
-    device->facts.work_groups_max = 7; /* as if */
+    device->facts.work_groups_max = 7; /* a limit of another device */
     gpu_dispatch(device, program, count);
     gpu_dispatch(device, program, 0);
     device->facts.work_groups_max = groups_max;
@@ -383,7 +383,7 @@ static int64_t texture_value(unsigned texture, GLenum name)
     return value;
 }
 
-/* What llvmpipe compiles a program for, see gpu/buffer.c. */
+/* Expects the properties for which llvmpipe compiles a program, see gpu/buffer.c. */
 static void assert_as_all_others(struct gpu_buffer *buffer)
 {
     GLint64 memory = 0;
@@ -441,8 +441,8 @@ static double thread_seconds(void)
     return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
-/* As when a daemon with hundreds of jobs ends. A search for each of them would take a hundred times as long as the
- * limit allows: the time is the processor's, so other programs do not lengthen it. */
+/* A daemon with hundreds of jobs ends like this. A search for each object would take a hundred times as long
+ * as the limit allows: the time is the processor's, so other programs do not lengthen it. */
 TEST(many_objects_are_destroyed_in_any_order_without_a_search_for_each)
 {
     enum { COUNT = 200000 };

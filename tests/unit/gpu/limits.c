@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What drivers tell of their limits and their memory: made answers, and what follows from them. */
+/* Drivers' statements about their limits and their memory: made answers, and what follows from them. */
 #include <stddef.h>
 #include <stdint.h>
 

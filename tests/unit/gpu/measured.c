@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What was measured on a device is there again at the next start, and is not taken for another driver's. */
+/* Measurements of a device are there again at the next start, and are not used for another driver. */
 #include <stddef.h>
 #include <stdint.h>
 

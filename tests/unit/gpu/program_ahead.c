@@ -22,7 +22,7 @@ static int open_cold(void **state)
     setenv("XDG_CACHE_HOME", home, 1);
     open_device(state);
     gpu_facts_choose(&device->facts, false);
-    device->facts.compiles_at_dispatch = false; /* what hardware does */
+    device->facts.compiles_at_dispatch = false; /* hardware does not */
     return 0;
 }
 

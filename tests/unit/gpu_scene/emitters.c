@@ -73,7 +73,7 @@ TEST(every_leaf_is_at_the_end_of_its_trail)
             power += (double)leaves[i].power;
         }
         assert_true(fabs((double)nodes[0].power - power) < 1e-4 * power);
-        for (int k = 0; k < 3; k++) { /* one moves far away */
+        for (int k = 0; k < 3; k++) { /* the first leaf moves far away */
             leaves[0].lower[k] += 100.0f;
             leaves[0].upper[k] += 100.0f;
         }

@@ -20,7 +20,7 @@ struct fixture {
     struct test_edits edits;
 };
 
-/* To the motion; to what was committed where it is NULL. Its poses are no longer needed afterwards. */
+/* Updates the device to the motion; NULL: to the committed scene. The poses are no longer needed afterwards. */
 static void update(struct fixture *fixture, struct scene_motion *motion)
 {
     struct error error = {0};
@@ -65,7 +65,7 @@ static const struct gpu_scene_geometry *geometry_of(const struct fixture *fixtur
     return NULL;
 }
 
-/* What lies on the device for one geometry, as the shutter opens or as it closes. */
+/* Reads a geometry's vertices on the device, as the shutter opens or as it closes. */
 static void read_vertices(const struct gpu_buffer *buffer, const struct geometry *geometry, bool closes,
                           size_t item_bytes, void *out)
 {
@@ -442,7 +442,8 @@ TEST(materials_and_lights_follow_the_first_pose)
     update(&fixture, &motion);
     expect_changes(&fixture, "shading lights ");
     assert_in_range(fixture.changes.uploaded_bytes, 1 + sizeof(struct light),
-                    sizeof(struct material) + sizeof(struct light)); /* what differs of the material */
+                    sizeof(struct material) +
+                        sizeof(struct light)); /* the different parts of the material, and the light */
     assert_true(fixture.gpu.has_transmission);
     gpu_buffer_read(device, &fixture.gpu.lights, 0, &light, sizeof(light));
     assert_float_equal(light.colour[0], 9, 0);

@@ -95,7 +95,8 @@ TEST(an_edited_material_moves_no_geometry_and_no_texels)
     update(&fixture);
     expect_changes(&fixture, false, false, true, false);
     assert_false((fixture.changes.bits & CHANGED_SURFACES));
-    assert_in_range(fixture.changes.uploaded_bytes, 1, sizeof(struct material)); /* what differs of it */
+    assert_in_range(fixture.changes.uploaded_bytes, 1,
+                    sizeof(struct material)); /* the different parts of the material */
     fixture_finish(&fixture);
 }
 
@@ -117,7 +118,7 @@ TEST(what_surfaces_have_is_known_of_the_meshes_and_materials_in_use)
     fixture_finish(&fixture);
 }
 
-/* Of a stored surface: its textures are applied, holes are not there; factors are multiplied later. */
+/* Stored surfaces have their textures applied, and no holes; factors are multiplied later. */
 TEST(only_what_is_more_than_a_factor_changes_surfaces)
 {
     struct fixture fixture;
@@ -302,7 +303,7 @@ TEST(the_last_column_of_an_odd_width_counts_in_the_next_level)
     gpu_buffer_read(device, &fixture.gpu.texels, sizeof(texels), back, sizeof(back));
     for (int k = 0; k < 4; k++) {
         assert_int_equal(back[0][k], 0);
-        assert_int_equal(back[1][k], 85); /* of three texels */
+        assert_int_equal(back[1][k], 85); /* mean of three texels */
     }
     fixture_finish(&fixture);
 }
@@ -477,7 +478,7 @@ static struct scene *large_scene(void)
     return edits.scene;
 }
 
-/* One step, which has no time and reserves next to nothing; true: it was the last one. */
+/* Makes one step, which has no time and reserves next to nothing; true: it was the last one. */
 static bool bring(struct gpu_scene *gpu, const struct scene *scene)
 {
     struct error error = {0};

@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* As the shader below has it: five uvec4. */
+/* Layout of the shader's struct below: five uvec4. */
 struct surface {
     float base_colour[4];
     float normal[3], metallic;
@@ -106,7 +106,7 @@ TEST(the_bits_are_where_the_layout_has_them)
             assert_int_equal(words[i][k], expected[i][k]);
 }
 
-static float decode_step(float value) /* of an sRGB byte, at a linear value: its slope times 1 / 255 */
+static float decode_step(float value) /* Step of an sRGB byte at a linear value: its slope times 1 / 255 */
 {
     return value <= 0.0031308f ? 1.0f / 12.92f / 255 : 2.4f / 1.055f * powf(value, 1 - 1 / 2.4f) / 255;
 }
@@ -138,7 +138,7 @@ TEST(what_is_read_back_is_what_was_stored)
             /* half a step, and a little for the driver's pow() */
             assert_float_equal(out->base_colour[k], in->base_colour[k],
                                0.5f * decode_step(in->base_colour[k]) + 1e-4f);
-            float maximum = k == 1 ? 63 : 31; /* of a square root: the slope is twice the root */
+            float maximum = k == 1 ? 63 : 31; /* square roots are stored: the slope is twice the root */
             assert_float_equal(out->emission[k], in->emission[k],
                                sqrtf(in->emission[k]) / maximum + 0.25f / (maximum * maximum) + 1e-6f);
             cosine += out->normal[k] * in->normal[k];
@@ -156,7 +156,7 @@ TEST(what_is_read_back_is_what_was_stored)
     }
 }
 
-/* All shares 1: a material without textures is what it says, to rounding. */
+/* Shares are 1: a material without textures is stored unchanged, up to rounding. */
 TEST(a_surface_without_textures_is_what_its_material_says)
 {
     struct surface surface = {.base_colour = {1, 1, 1, 1},

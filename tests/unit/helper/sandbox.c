@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a helper program that an attacker runs can still do. Each attempt is made by a process of its own, in the
+/* Abilities of a helper program that an attacker runs. Each attempt is made by a process of its own, in the
  * sandbox. */
 #include "helper/sandbox.h"
 

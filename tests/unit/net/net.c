@@ -198,7 +198,7 @@ TEST_WITH(a_live_daemon_is_left_alone_and_a_stale_socket_replaced, make_folder, 
     assert_false(listener_open(&second, &address, false, &error));
     assert_int_equal(error.kind, ERROR_BUSY);
     assert_non_null(strstr(error.text, "another daemon"));
-    close(first.fd); /* as if it had been killed: the file stays */
+    close(first.fd); /* after a kill: the file stays */
     error = (struct error){0};
     if (!listener_open(&second, &address, false, &error))
         fail_msg("%s", error.text);
@@ -475,7 +475,7 @@ static void on_release(struct out_chunk *chunk)
 static void on_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
 {
     (void)context;
-    /* What the tests say of every call to the kernel. */
+    /* Every call to the kernel is replaced by the tests. */
     assert_int_equal(begun_ns, 1);
     assert_int_equal(now_ns, 2);
     sent_calls++;
@@ -610,7 +610,7 @@ TEST(a_begun_item_is_sent_and_reported_when_the_rest_is_dropped)
     queue_end(&scene);
 }
 
-/* What a sealed connection has copied, but the kernel has not taken yet. */
+/* Bytes that a sealed connection has copied, but the kernel has not accepted yet. */
 TEST(copied_bytes_count_as_begun_and_not_as_sent)
 {
     struct queue_scene scene;
@@ -637,7 +637,7 @@ TEST(copied_bytes_count_as_begun_and_not_as_sent)
     assert_int_equal(scene.queue.taken_bytes, 0);
     drain(&scene.queue, 100, text);
     assert_string_equal(text, "bcd..C1");
-    assert_int_equal(sent_calls, 0); /* of a request that was dropped */
+    assert_int_equal(sent_calls, 0); /* call of a request that was dropped */
     expect_nothing_queued(&scene.queue);
     queue_end(&scene);
 }
@@ -675,7 +675,7 @@ static struct blob *made_blob(uint8_t name, size_t bytes)
     struct blob *blob = blob_create(bytes);
     assert_non_null(blob);
     memset(blob->data, name, bytes);
-    memset(blob->hash, 0x11, sizeof(blob->hash)); /* the same head: they share a key of the map */
+    memset(blob->hash, 0x11, sizeof(blob->hash)); /* an equal head: both share a key of the map */
     blob->hash[31] = name;
     return blob;
 }

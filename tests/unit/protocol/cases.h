@@ -12,10 +12,10 @@
 enum case_mode { CASE_MIN, CASE_MAX, CASE_RANDOM, CASE_MODE_COUNT };
 
 struct case_maker {
-    uint64_t state; /* of the random numbers */
+    uint64_t state; /* state of the random numbers */
     enum case_mode mode;
     size_t used_bytes;
-    uint8_t memory[1 << 20]; /* what the message points at */
+    uint8_t memory[1 << 20]; /* data that the message points at */
 };
 
 /* SplitMix64 (Steele, Lea, Flood 2014): the same numbers everywhere. */

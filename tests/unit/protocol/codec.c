@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One fixed set of checks for every message of the table: there and back, golden bytes, cut, prolonged, older and
- * newer peers, too little memory. Run from the top of the
- * tree; FARLIGHT_UPDATE_GOLDEN=1 writes the golden bytes anew. */
+/* Checks of every message of the table: there and back, golden bytes, cut, prolonged, older and newer peers,
+ * too little memory. Run from the top of the tree; FARLIGHT_UPDATE_GOLDEN=1 writes the golden bytes anew. */
 #include <stdlib.h>
 
 #include "tests/unit/protocol/checks.h"
@@ -243,7 +242,7 @@ TEST(the_stated_scratch_suffices_and_less_is_refused_safely)
     struct decode_error error;
     struct scratch scratch;
     for (size_t i = 0; i < protocol_record_count; i++) {
-        /* what the header promises: an element never takes more than twice its bytes */
+        /* the header promises that an element never takes more than twice its bytes */
         const struct struct_desc *record = protocol_records[i]();
         size_t strings = 0;
         for (const struct field_desc *field = record->fields; field->name; field++) {

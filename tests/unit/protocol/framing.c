@@ -11,7 +11,7 @@ static struct case_maker maker;
 static uint8_t stream[4 << 20];
 static uint8_t scratch_memory[SCRATCH_BYTES];
 
-/* All messages of the table, one after the other; message k has request 1000 + k and channel k. */
+/* Writes all messages of the table, one after the other; message k has request 1000 + k and channel k. */
 static size_t make_stream(void)
 {
     struct writer writer;
@@ -74,7 +74,7 @@ TEST(a_stream_fed_byte_by_byte_gives_every_message_once)
             continue;
         }
         assert_int_equal(result, FRAMING_CONSUMED);
-        assert_int_equal(frame.consumed_bytes, end - start); /* as soon as it is complete */
+        assert_int_equal(frame.consumed_bytes, end - start); /* consumed as soon as it is complete */
         assert_int_equal(frame.consumed_bytes, wanted);      /* and as was foretold */
         check_message(&frame, index++);
         start = end;

@@ -62,11 +62,11 @@ struct traffic {
 
 struct end {
     struct sealed *sealed;
-    enum sealed_result last; /* of the handshake */
+    enum sealed_result last; /* result of the handshake */
     struct decode_error error;
 };
 
-/* All that was said: message 1 and 3, and then records; message 2 and 4, and then records. */
+/* Recorded traffic: message 1 and 3, and then records; message 2 and 4, and then records. */
 static struct traffic up, down;
 static struct end client, server;
 
@@ -252,7 +252,7 @@ TEST(the_same_is_heard_byte_by_byte)
 
 /* ---- golden bytes -------------------------------------------------------------------------------------- */
 
-/* What goes in, .. */
+/* Chosen random numbers, .. */
 static struct {
     uint8_t client_secret[32], client_nonce[32], server_secret[32], server_nonce[32];
     uint8_t client_header[24], server_header[24];
@@ -375,7 +375,7 @@ TEST(a_wrong_key_is_refused_without_a_reason)
 
 TEST(a_server_without_the_key_is_found_out)
 {
-    /* It lets everybody in, but cannot prove anything: the bytes of its proof come from another key. */
+    /* The server lets everybody in, but cannot prove anything: the bytes of its proof come from another key. */
     begin(&full_key, &full_key, 1);
     shake_hands(0, 0);
     struct sealed *impostor = sealed_server(&other_key, 1);
@@ -507,12 +507,12 @@ TEST(a_recorded_session_cannot_be_played_again)
     say(&server, &down, "pixels", 6);
     said = up;
     answered = down;
-    /* To another connection of the server: the same bytes, whatever it answers. */
+    /* Replay to another connection of the server: the bytes are refused, whatever it answers. */
     begin(&full_key, &full_key, 1);
     assert_int_equal(hear(&server, said.bytes, 72, &down), 72);
     hear(&server, said.bytes + 72, 64, &down);
     assert_int_equal(server.last, SEALED_REFUSED);
-    /* To another client. */
+    /* Replay to another client. */
     assert_int_equal(hear(&client, answered.bytes, 72, &up), 72);
     hear(&client, answered.bytes + 72, 64, &up);
     assert_int_equal(client.last, SEALED_FATAL);
@@ -542,7 +542,7 @@ TEST(a_message_cannot_be_reflected_to_its_sender)
     uint8_t first[72];
     begin(&full_key, &full_key, 1);
     memcpy(first, up.bytes, sizeof(first));
-    /* As it is, and as what the client waits for. */
+    /* Message as it is, and as the type that the client waits for. */
     hear(&client, first, sizeof(first), &up);
     assert_int_equal(client.last, SEALED_FATAL);
     begin(&full_key, &full_key, 1);
@@ -575,7 +575,7 @@ TEST(a_message_cannot_be_reflected_to_its_sender)
     assert_int_equal(unseal(&server, down.bytes, down.count, &offset), SEALED_FATAL);
 }
 
-/* Of two connections at once, each message of one given to the other: a server in the middle without the key. */
+/* Two connections at once, with messages of one given to the other: a server in the middle without the key. */
 TEST(connections_cannot_be_mixed)
 {
     struct sealed *one = sealed_client(&full_key), *two = sealed_client(&full_key);
@@ -628,7 +628,7 @@ TEST(a_session_that_is_cut_anywhere_is_seen_to_be)
         char text[16] = "";
         size_t offset = 0, text_bytes = 0;
         enum sealed_result result = SEALED_CONSUMED;
-        /* The same client again: its random numbers are those of the record. */
+        /* Repeated client: its random numbers are those of the record. */
         chosen = (const uint8_t *)&given;
         chosen_left = sizeof(given);
         up.count = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What people read of the protocol: the texts of enums. */
+/* Texts of enums, which people read. */
 #include "tests/unit/protocol/cases.h"
 #include "tests/harness/test.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What tracers.def promises, held against every row of it. */
+/* Rules of tracers.def, checked for every row of it. */
 #include "protocol/describe.h"
 #include "protocol/tracers.h"
 
@@ -78,7 +78,7 @@ TEST(settings_that_contradict_each_other_are_reported_with_both_names)
 {
     struct setting_fault fault;
     struct tracer_settings settings = {.abuffer.voxels = 64};
-    assert_true(tracer_settings_check(&settings, "--", &fault)); /* of as many texels as the tracer chooses */
+    assert_true(tracer_settings_check(&settings, "--", &fault)); /* the tracer chooses the number of texels */
     settings.abuffer.resolution = 32;
     expect_fault(&settings, "render.", "render.abuffer_voxels",
                  "64 is more than the 32 texels of abuffer_resolution", "higher abuffer_resolution");

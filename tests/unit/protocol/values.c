@@ -152,8 +152,8 @@ static void try_wrong_count(const struct message *message, const struct field_de
         memcpy(body + field->count_offset, &wrong_counts[i], 4);
         expect_both_refuse(message, path, true);
     }
-    /* as many as allowed, but they are not there: cannot be sent; and nothing is reserved for them when they come
-     */
+    /* an allowed number of elements that are absent: it cannot be sent; and nothing is reserved for it on
+     * arrival */
     uint32_t absent = (uint32_t)field->max;
     struct writer writer;
     struct message back;
@@ -214,7 +214,7 @@ TEST(a_wrong_value_of_any_field_is_refused_with_the_path_of_the_field)
         case_make(&maker, &message, &protocol_messages[i], CASE_MAX, 6);
         try_wrong_fields(&message, protocol_messages[i].body(), (char *)&message + MESSAGE_BODY_OFFSET,
                          protocol_messages[i].info.name);
-        check_round_trip(&message); /* all was put back */
+        check_round_trip(&message); /* everything was put back */
     }
     assert_true(wrong_values_tried > 1000);
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The number of lights that the hits of a slice ask. */
 #include "render/frame/choices.h"
 
 #include "tests/harness/test.h"

@@ -36,7 +36,7 @@ static struct hit hit_at(float distance)
 
 #define MISS hit_at(-1.0f)
 
-/* One ray with both answers, and what the reference says of the moved rays: always `moved`. */
+/* Compares a ray with both results, where the reference's results for the moved rays are always `moved`. */
 static void compare_moved(struct wave_tally *tally, const struct ray *ray, struct hit first, struct hit second,
                           struct hit moved)
 {

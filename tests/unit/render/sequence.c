@@ -41,7 +41,7 @@ TEST(every_aligned_block_of_pairs_has_one_in_each_elementary_cell)
                     for (uint32_t block = 0; block < 3; block++)
                         expect_net(sequence_seed(s, 3 * s, 7), dimensions[d],
                                    (block * 5 * SAMPLES) & ~((1u << log2) - 1), log2, columns);
-    expect_net(sequence_seed(1, 0, 1), 0, 0xffffff00u, 8, 4); /* to the end of the numbers of samples */
+    expect_net(sequence_seed(1, 0, 1), 0, 0xffffff00u, 8, 4); /* up to the last numbers of samples */
 }
 
 TEST(every_aligned_block_of_numbers_has_one_in_each_interval)
@@ -98,7 +98,7 @@ static double error_of(uint32_t samples)
             sequence_pair(pair, sequence_seed(p, 5 * p, 3), SEQUENCE_LENS, i);
             sum += sin(3.0 * (double)pair[0] + 2.0 * (double)pair[1]);
         }
-        /* of sin(3 x + 2 y) over the unit square */
+        /* integral of sin(3 x + 2 y) over the unit square */
         double exact = (sin(3.0) + sin(2.0) - sin(5.0)) / 6.0;
         squares += (sum / samples - exact) * (sum / samples - exact);
     }
@@ -116,7 +116,7 @@ TEST(the_error_of_a_pixels_mean_falls_faster_than_that_of_independent_numbers)
     assert_true(slope < -1.3);
 }
 
-/* Of pairs (x, y) of numbers that are to be independent and uniform: chi-squared over 16 x 16 cells. */
+/* Expects pairs (x, y) of independent, uniform numbers: chi-squared over 16 x 16 cells. */
 static void expect_independent(const char *what, const float (*pairs)[2], uint32_t count)
 {
     enum { CELLS = 16 };
@@ -188,7 +188,7 @@ TEST(the_samples_of_neighbours_are_stratified_together)
                 expect_shared_net(24 * block + (8 - (1u << edge)), 8 * block, edge, log2, dimensions[block]);
 }
 
-/* What is chosen at a pixel, and changes from pixel to pixel as slowly as a picture does: whether a light is
+/* A choice at a pixel, which changes from pixel to pixel as slowly as a picture does: whether a light is
  * hidden by an edge, and the cosine of a smooth light. */
 static double chosen(int what, const float pair[2], double where)
 {
@@ -205,7 +205,7 @@ static double chosen_exactly(int what, double where)
     return what ? (sin(3.0) + sin(2.0) - sin(5.0)) / 6.0 : top + (end - top) * (high + low) / 2.0;
 }
 
-/* Of the errors of a picture: the mean square of a pixel's, and that of the means of 4 x 4 pixels wherever they
+/* Errors of a picture: the mean square of a pixel's, and that of the means of 4 x 4 pixels wherever they
  * begin, times 16, which is the same number where errors are white noise. */
 static void measure_errors(int what, uint32_t samples, double *pixel, double *low)
 {
@@ -265,8 +265,8 @@ TEST(choices_samples_and_seeds_are_independent)
     expect_independent("x and y", (const float(*)[2])pairs, PIXELS);
 }
 
-/* What a dimension shows beside the others of its own pixel: in 16 samples of a pixel two choices must not go hand
- * in hand, which is what the shuffled order is for. */
+/* Dimensions beside each other in a pixel: in 16 samples of a pixel two choices must not be correlated, which
+ * is the purpose of the shuffled order. */
 TEST(the_order_of_one_choice_says_nothing_of_anothers)
 {
     for (uint32_t i = 0; i < PIXELS; i++) {

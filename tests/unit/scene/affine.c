@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Affine transforms against arithmetic in double precision. */
 #include "scene/affine.h"
 #include "tests/harness/test.h"
 

@@ -154,7 +154,7 @@ TEST(skins_and_channels_refer_to_existing_objects)
         add_channel(&list, 5, 1, paths[i], 0, 3, 2);
         expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (channel 5).object");
     }
-    /* What goes in the same transaction is not there. */
+    /* An object that is removed in the same transaction is not there. */
     add_remove(&list, OBJECT_NODE, 3);
     add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 3, 3, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (channel 5).object");
@@ -201,7 +201,7 @@ TEST(channels_have_their_numbers_in_their_clips)
     assert_int_equal(scene->objects[OBJECT_CHANNEL].count, 1);
 }
 
-/* As many as are not compared one by one any more. */
+/* The number is beyond that of channels that are compared one by one. */
 TEST(many_channels_with_equal_times_stay_distinct)
 {
     enum { COUNT = 4 << 20, CHANNELS = 20, LEAP = COUNT - 3 };
@@ -236,7 +236,7 @@ TEST(joints_of_a_mesh_have_their_places_in_its_skin)
     add_joints(add_mesh(&list, 2), beyond, halves);
     add_shown(&list, 4, NODE_MESH, 2)->value.skin = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[1] (node 4).skin");
-    /* All three at once. */
+    /* A transaction with the skin, the mesh and the node is refused as well. */
     add_joints(add_mesh(&list, 1), beyond, halves);
     add_skin(&list, 1, (uint32_t[]){2, 1, 2}, 3);
     expect_commit(scene, &list);

@@ -113,7 +113,8 @@ TEST(catmull_rom_goes_through_its_keys_with_the_slope_between_their_neighbours)
         double t = (double)times[i], h = 1e-6;
         double before = (number_at(&curve, t) - number_at(&curve, t - h)) / h;
         double behind = (number_at(&curve, t + h) - number_at(&curve, t)) / h;
-        expect("slope", before, behind, 1e-5); /* of the difference quotients: second derivative (< 4) times h */
+        expect("slope", before, behind,
+               1e-5); /* error of the difference quotients: second derivative (< 4) times h */
     }
     /* Evenly spaced keys of a parabola: inside, it is the parabola. */
     const float even[] = {0, 1, 2, 3, 4}, squares[] = {0, 1, 4, 9, 16};
@@ -184,7 +185,7 @@ static void turn(double degrees, double scale, float q[4])
     q[3] = (float)(cos(half) * scale);
 }
 
-/* As a rotation, so that q and -q are the same. */
+/* Compares rotations, so that q and -q are the same. */
 static void expect_turn(const char *what, const double q[4], double degrees, double tolerance)
 {
     double half = degrees * PI / 360, along = 0, length = 0;

@@ -161,7 +161,7 @@ TEST(normals_follow_scaled_sheared_and_mirrored_joints)
             for (int k = 0; k < 3; k++) {
                 along_x += (double)((p[3 + k] - p[k]) * n[3 * v + k]);
                 along_y += (double)((p[9 + k] - p[k]) * n[3 * v + k]);
-                side += (double)(matrices[i][4 * k + 2] * n[3 * v + k]); /* of where +z goes */
+                side += (double)(matrices[i][4 * k + 2] * n[3 * v + k]); /* side to which +z goes */
                 length += (double)(n[3 * v + k] * n[3 * v + k]);
             }
             if (!(fabs(along_x) < 1e-6 && fabs(along_y) < 1e-6 && side > 0 && fabs(length - 1) < 1e-6))

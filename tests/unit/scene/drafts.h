@@ -108,7 +108,7 @@ static inline void expect_commit(struct scene *scene, struct draft_list *list)
     finish(list);
 }
 
-/* What may not change when a transaction is refused. */
+/* State that a refused transaction may not change. */
 struct snapshot {
     struct scene scene;
     size_t counts[OBJECT_COUNT];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the hierarchy shows, against a straightforward recursion. */
+/* Flattening of the hierarchy, against a straightforward recursion. */
 #include "scene/affine.h"
 #include "scene/scene.h"
 #include "tests/harness/test.h"

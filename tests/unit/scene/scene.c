@@ -143,7 +143,7 @@ TEST(arrays_must_fit_their_counts)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
     add_mesh(&list, 1)->arrays[MESH_COLOURS] = make_blob(square, 15);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[6] (colours)");
-    add_mesh(&list, 1)->arrays[MESH_COLOURS] = make_blob(square, 31); /* of 16 bits 32 are wanted */
+    add_mesh(&list, 1)->arrays[MESH_COLOURS] = make_blob(square, 31); /* 16 bits an element, and 32 are needed */
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[6] (colours)");
     add_mesh(&list, 1)->arrays[MESH_TANGENTS] = make_blob(square, 48);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[3] (tangents)");
@@ -471,7 +471,7 @@ TEST(an_environment_keeps_its_image_if_the_edit_says_so)
     assert_true(scene->environment.texels == image && scene->environment.value.colour[0] == 3);
     assert_int_equal(scene->environment.value.width, 1);
     assert_int_equal(scene->host_bytes, bytes);
-    /* Of two edits the second keeps the image of the first, which is looked through all the same. */
+    /* The second of two edits keeps the image of the first, which is checked all the same. */
     environment = set_environment(0);
     environment->value.width = environment->value.height = 1;
     environment->texels = make_blob(infinite, sizeof(infinite));

@@ -42,7 +42,7 @@ static void expect_supports(const struct scene *scene, uint32_t root, const doub
     double supports[SCENE_SUPPORTS_MAX];
     assert_true(scene_supports_below(scene, NULL, root, NULL, directions, supports, SCENE_SUPPORTS_MAX));
     for (size_t i = 0; i < SCENE_SUPPORTS_MAX; i++)
-        if (fabs(supports[i] - expected[i]) > 1e-5) /* of numbers up to 30, which plain points have as floats */
+        if (fabs(supports[i] - expected[i]) > 1e-5) /* plain points have numbers up to 30 as floats */
             fail_msg("direction %zu: %.9g, expected %.9g", i, supports[i], expected[i]);
 }
 
@@ -98,7 +98,7 @@ TEST(what_turns_about_an_axis_reaches_as_far_as_all_its_places)
         double expected = -INFINITY;
         for (size_t k = 0; k < 6; k++)
             expected = fmax(expected, turned_along(i, places + 3 * k, axis));
-        assert_true(fabs(supports[i] - expected) < 3e-5); /* of ways of up to 12 */
+        assert_true(fabs(supports[i] - expected) < 3e-5); /* distances are up to 12 */
     }
     scene_destroy(scene);
 }

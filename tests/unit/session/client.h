@@ -23,11 +23,11 @@ struct client {
     size_t in_used, consumed;
     uint8_t scratch_data[SCRATCH_BYTES];
     struct scratch scratch;
-    struct framing_header header; /* of the last message */
+    struct framing_header header; /* header of the last message */
     struct message message;
     uint64_t capabilities, upload_credit;
     struct handshake_limits limits;
-    unsigned pings;   /* of the daemon's: how many came */
+    unsigned pings;   /* number of the daemon's pings */
     unsigned blocked; /* how often it was told so, and why the last time */
     char blocked_text[129];
 };
@@ -190,7 +190,7 @@ static inline const struct message *receive_now(struct client *client)
     }
 }
 
-/* The same, but waits for it. */
+/* Waits for the next message. */
 static inline const struct message *receive(struct client *client)
 {
     const struct message *message;

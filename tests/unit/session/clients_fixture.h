@@ -37,7 +37,7 @@ static inline void *run(void *context)
 }
 
 static struct hub_options options; /* which a test may change before it starts the daemon */
-static bool users_look_only;       /* as the front says of readers */
+static bool users_look_only;       /* set by the front for readers */
 
 static inline int set_options(void **state)
 {

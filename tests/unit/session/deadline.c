@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a view goes without so that it is rendered at the rate that it asks for, with a renderer that is simulated:
- * a part that every frame takes, one that grows with the area, and bounces that do. */
+/* Bounces, size and samples dropped so that a view reaches its rate, with a simulated renderer: a part that
+ * every frame takes, one that grows with the area, and bounces that do. */
 #include "base/clock.h"
 #include "session/guess.h"
 #include "tests/harness/test.h"
@@ -9,7 +9,8 @@
 #define DEADLINE_NS (100 * MS)
 
 struct renderer {
-    uint64_t fixed_ns, area_ns, bounce_ns; /* of a full picture; each bounce half of the one before it */
+    uint64_t fixed_ns, area_ns,
+        bounce_ns; /* times of a full picture; each bounce takes half as long as the one before it */
     uint32_t chance;
     unsigned percent; /* up to so much more or less */
 };
@@ -162,7 +163,7 @@ static void add_spans(struct stage_times *times, enum stage stage, uint32_t wave
         stage_times_add(times, stage, CLOCK_CPU, wave, clock_now_ns(), slice == 0 ? first_ns : ns);
 }
 
-/* It compiled for seconds, and built, before it rendered for half of one. */
+/* The first picture compiled for seconds, and built, before it rendered for half a second. */
 TEST(the_first_that_moves_is_right_where_one_picture_at_rest_was_seen)
 {
     struct pacing pacing = begin(1);
@@ -186,7 +187,8 @@ TEST(the_first_that_moves_is_right_where_one_picture_at_rest_was_seen)
     assert_true(longest_ns <= DEADLINE_NS);
 }
 
-/* One that is a hundred times too high costs the frames until a better step has fitted eight times, no more. */
+/* A guess that is a hundred times too high costs the frames until a better step has fitted eight times, no
+ * more. */
 TEST(a_guess_counts_until_something_is_known)
 {
     struct pacing pacing = begin(1);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a client makes of a scene, over a socketpair: transactions of edits, blobs, what moves. */
+/* Edits of a client over a socketpair: transactions, blobs, moving objects. */
 #include "tests/unit/session/answering_engine.h"
 #include "tests/harness/test.h"
 
@@ -14,7 +14,7 @@ static void send_piece(uint32_t request, const struct record_blob_ref *reference
     send_message(request, 1, &message);
 }
 
-/* As far as credit goes, waiting for more by pings. */
+/* Sends as far as credit goes, waiting for more by pings. */
 static void send_blob(uint32_t request, const struct record_blob_ref *reference, const uint8_t *data)
 {
     static uint64_t sent;
@@ -144,7 +144,7 @@ SESSION_TEST(a_blob_with_another_hash_is_refused_and_can_be_sent_again)
     expect_error(2, PROTOCOL_ERROR_HASH_MISMATCH);
     send_piece(3, &reference, data, 0, 500);
     send_piece(3, &reference, data, 400, 500); /* not where it belongs */
-    send_piece(3, &reference, data, 500, 500); /* of a request that has its answer */
+    send_piece(3, &reference, data, 500, 500); /* the request has its answer */
     expect_error(3, PROTOCOL_ERROR_INVALID);
     send_piece(4, &reference, data, 0, 500);
     send_piece(4, &reference, data, 500, 500);

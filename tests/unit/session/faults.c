@@ -22,7 +22,7 @@
 static struct {
     uint8_t bytes[16384];
     size_t count;
-    size_t ends[128]; /* of each message, the hello first */
+    size_t ends[128]; /* end of each message, the hello first */
     size_t message_count;
 } recording;
 
@@ -48,7 +48,7 @@ static int make_recording(void **state)
     return 0;
 }
 
-/* As somebody plays it who waits for the answer to each message. False: the daemon has closed the connection. */
+/* Plays a client that waits for the answer to each message. False: the daemon has closed the connection. */
 static bool play(unsigned client)
 {
     size_t begin = 0;
@@ -61,7 +61,7 @@ static bool play(unsigned client)
     return true;
 }
 
-/* What a session that nothing happens to is told. */
+/* Expects the daemon's messages of an undisturbed session. */
 static void expect_whole(unsigned client)
 {
     const uint32_t *answers = serving_clients[client].answers;
@@ -126,7 +126,7 @@ TEST(a_session_cut_after_every_byte_that_is_sent_leaves_nothing)
     serving_end();
 }
 
-/* What is in flight when it is cut is another thing where each message is answered before the next one. */
+/* Other messages are in flight at a cut if each message is answered before the next one. */
 TEST(a_session_cut_within_every_message_leaves_nothing)
 {
     serving_begin();
@@ -244,7 +244,7 @@ TEST(a_slow_reader_gets_everything_later)
     assert_true(serving_connect(0));
     recorder_set_mood(RECORDER_LARGE);
     serving_clients[0].stalled = true;
-    /* All but the cancel and what is behind it: what was sent by then stays sent. */
+    /* The session without the cancel and what follows: a message that was sent by then stays sent. */
     size_t cancel = recording.message_count - 6;
     serving_send(0, recording.bytes, recording.ends[cancel - 1]);
     serving_settle();

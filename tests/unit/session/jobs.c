@@ -69,7 +69,7 @@ SESSION_TEST(a_cancelled_job_has_one_answer_and_nothing_follows_it)
     cancel(3, 2);
     expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 3);
-    cancel(4, 2); /* it is gone already */
+    cancel(4, 2); /* the job has ended already */
     expect(MESSAGE_OK, 4);
     expect_alive(5);
 }
@@ -285,7 +285,7 @@ SESSION_TEST(layers_that_pixels_or_messages_do_not_hold_are_refused)
     }
 }
 
-/* Of a render: the fields of several views, and of pictures that are made of layers. */
+/* A render with fields of several views, and of pictures made from layers. */
 struct views_case {
     uint32_t across, down, eyes_over, upsample, accumulate, compare, width;
     float baseline, shutter;
@@ -395,7 +395,7 @@ SESSION_TEST(settings_that_no_tracer_has_are_refused_by_their_field)
     }
 }
 
-/* What the engine gets of a picture of 300 x 200 pixels. */
+/* Pixels in the engine's job for a picture of 300 x 200. */
 static uint32_t pixels_noted_for(const struct message *message)
 {
     static uint32_t request = 2;

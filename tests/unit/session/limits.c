@@ -176,7 +176,7 @@ TEST(edits_that_wait_take_no_more_memory_than_the_limit)
     open_scene_as(one, 1, "", PROTOCOL_SHARING_PRIVATE);
     open_scene_as(two, 1, "", PROTOCOL_SHARING_PRIVATE);
     begin_with_node(one, 1);
-    expect_alive(one, 900); /* it has been read */
+    expect_alive(one, 900); /* the edit has been read */
     begin_with_node(two, 2);
     expect_alive(two, 900);
     begin_with_node(one, 3);
@@ -302,7 +302,7 @@ TEST(the_depth_of_a_hierarchy_is_limited)
 
 TEST(memory_of_a_scene_is_limited)
 {
-    options.engine_limits.scene.host_bytes = 20000; /* one set of 16,000 bytes, not two */
+    options.engine_limits.scene.host_bytes = 20000; /* enough for one set of 16,000 bytes, not for two */
     start_daemon();
     struct client *client = come(false), *other = come(true);
     static float spheres[4 * SPHERES];
@@ -380,7 +380,7 @@ TEST(blobs_of_a_connection_are_limited)
         data[0] = i;
         struct record_blob_ref reference = reference_to(data, sizeof(data));
         upload(client, 2 * i, &reference, data);
-        assert_int_equal(offer(client, 2 * i, reference), 0); /* the same one again is none more */
+        assert_int_equal(offer(client, 2 * i, reference), 0); /* a repeated offer does not count */
     }
     data[0] = 4;
     struct record_blob_ref reference = reference_to(data, sizeof(data));

@@ -11,7 +11,7 @@
 #define MS UINT64_C(1000000)
 #define S UINT64_C(1000000000)
 #define FRAME_NS (S / 30)
-#define BEGIN_BYTES 300 /* of the first message */
+#define BEGIN_BYTES 300 /* size of the first message */
 
 static struct pacing pacing;
 
@@ -34,7 +34,7 @@ struct acknowledgement {
 
 struct link {
     double bytes_per_ns;
-    uint64_t way_ns; /* one way */
+    uint64_t way_ns; /* time of one direction */
     double free_ns;  /* when the bottleneck has sent all that stands in line */
     struct acknowledgement coming[2 * PACING_IN_FLIGHT_MAX];
     size_t coming_count;
@@ -79,7 +79,7 @@ static void link_deliver(struct link *link, uint64_t now_ns)
 struct tally {
     uint32_t frames;
     uint64_t bytes;
-    double longest_line_ns; /* that a frame stood in, its own bytes included */
+    double longest_line_ns; /* longest queue of a frame, its own bytes included */
 };
 
 /* Frames of about `bytes`, one each FRAME_NS as far as the pacing allows; a tick is a millisecond. */
@@ -114,7 +114,7 @@ TEST(a_link_is_used_and_its_line_kept_short)
     static const struct {
         double megabits;
         uint64_t round_trip_ms, bytes;
-        uint32_t frames_min, frames_max; /* of 30 seconds at 30 a second */
+        uint32_t frames_min, frames_max; /* in 30 seconds at 30 a second */
     } rows[] = {{100, 10, 30000, 897, 900}, {10, 50, 26000, 900 * 95 / 100, 900}, {10, 50, 83000, 230, 460}};
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         pacing_init(&pacing, FRAME_NS);
@@ -149,7 +149,7 @@ TEST(learns_the_link)
     uint64_t true_rate, rate = rate_learned(true, &true_rate);
     assert_in_range(rate, true_rate * 95 / 100, true_rate * 105 / 100); /* the first message is not counted */
     assert_in_range(pacing_round_trip_ns(&pacing), 30 * MS, 31 * MS);   /* its 300 bytes take 0.1 ms */
-    /* Of a client that does not tell of the first bytes a frame of 40 ms has taken 70 with the way. */
+    /* Without acknowledged beginnings, a frame of 40 ms seems to take 70 with the round trip. */
     rate = rate_learned(false, &true_rate);
     assert_in_range(rate, true_rate * 40 / 75, true_rate * 105 / 100);
 }
@@ -287,7 +287,7 @@ TEST(makes_frames_fit_the_link)
     uint64_t before_ns = now_ns;
     struct pacing_advice advice = follow(&link, &now_ns, 5 * MS, 150000, 300);
     double frames_per_second = 300e9 / (double)(now_ns - before_ns);
-    assert_true(frames_per_second > 27.0); /* of 30 */
+    assert_true(frames_per_second > 27.0); /* at a maximum of 30 */
     assert_true(advice.scale_32nds < PACING_SCALE_FULL);
     assert_true(advice.quality >= PACING_QUALITY_MIN);
     assert_true((double)advice.bytes <= 10e6 / 8 / 30);
@@ -298,8 +298,8 @@ TEST(makes_frames_fit_the_link)
     assert_int_equal(advice.quality, 90);
 }
 
-/* As follow(), but rendering takes `fixed_ns` whatever the size, and `area_ns` for all of the picture; either is
- * up to a fifth more or less. */
+/* Follows as follow(), but rendering takes `fixed_ns` whatever the size, and `area_ns` for the whole picture;
+ * either varies by up to a fifth. */
 static struct pacing_advice follow_renderer(uint64_t fixed_ns, uint64_t area_ns, unsigned frames)
 {
     struct pacing_advice advice = {0};
@@ -356,7 +356,7 @@ TEST(the_wait_for_the_next_frame_is_what_has_to_drain)
     pacing_sent(&pacing, 1, 10000, 30 * MS);
     assert_int_equal(pacing_wait_ns(&pacing, 1), 0);
     assert_in_range(pacing_wait_ns(&pacing, 3), 20 * MS - 1, 20 * MS + 1);
-    /* One that is larger than all the room waits until nothing is before it. */
+    /* A frame larger than the whole window waits until nothing is before it. */
     pacing_acknowledged(&pacing, 1, false, 50 * MS);
     pacing_acknowledged(&pacing, 1, true, 60 * MS);
     pacing_sent(&pacing, 2, 100000, 60 * MS);
@@ -415,7 +415,7 @@ TEST(a_wait_beyond_all_measure_is_still_one)
 {
     const uint64_t month_ns = 30 * 86400 * S;
     pacing_sent(&pacing, 0, 1, 0);
-    pacing_acknowledged(&pacing, 0, true, month_ns); /* one byte in a month */
+    pacing_acknowledged(&pacing, 0, true, month_ns); /* a byte in a month */
     pacing_sent(&pacing, 1, UINT32_MAX, month_ns);
     assert_in_range(pacing_wait_ns(&pacing, 1), month_ns, UINT64_MAX / 4);
 }
@@ -544,6 +544,6 @@ TEST(what_views_are_made_from_does_not_flicker)
                        advice.no_hidden != before.no_hidden || advice.samples != before.samples;
             before = advice;
         }
-        assert_true(changes <= 4); /* it settles */
+        assert_true(changes <= 4); /* the size settles */
     }
 }

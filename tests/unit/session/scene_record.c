@@ -150,7 +150,7 @@ static struct scene *make_scene(void)
     add_looks(&list);
     add_nodes(&list);
     expect_commit(scene, &list);
-    for (int kind = 0; kind < OBJECT_ENVIRONMENT; kind++) /* that is in no table */
+    for (int kind = 0; kind < OBJECT_ENVIRONMENT; kind++) /* this kind is in no table */
         assert_true(scene->objects[kind].count > 0);
     return scene;
 }

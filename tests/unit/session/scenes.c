@@ -212,7 +212,7 @@ TEST(an_object_is_read_as_it_was_set)
     assert_true(other->message.set_environment.value.colour[0] == 0 &&
                 other->message.set_environment.value.keeps_image == 1);
     expect_ok(other, 6);
-    /* What is not there, or cannot be read, is an error of that request. */
+    /* Objects that do not exist, or cannot be read, are an error of that request. */
     get_object(other, 7, 4, PROTOCOL_OBJECT_MATERIAL, 9);
     expect_error(other, 7, PROTOCOL_ERROR_UNKNOWN_ID);
     get_object(other, 8, 4, PROTOCOL_OBJECT_SPHERES, 1);
@@ -286,7 +286,7 @@ TEST(an_edit_of_what_has_changed_since_it_was_read_is_refused)
     struct client *one = come(false), *other = come(true);
     open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
     commit_sphere(one, 1);
-    submit_material(one, 20, 1, 0.25f); /* it is not there */
+    submit_material(one, 20, 1, 0.25f); /* the material does not exist */
     expect_error(one, 20, PROTOCOL_ERROR_CONFLICT);
     submit_material(one, 21, 0, 0.25f);
     assert_int_equal(expect_ok(one, 21), 2);
@@ -374,7 +374,7 @@ TEST(a_cut_connection_finds_its_scene_again_without_sending_it)
     assert_int_equal(attach(one, 9, "kept"), 1);
     assert_int_equal(render_frame(one, 20, 9), 1);
     struct record_blob_ref reference = reference_to(sphere, sizeof(sphere));
-    assert_int_equal(offer(one, 21, reference), 0); /* it is held, by the scene */
+    assert_int_equal(offer(one, 21, reference), 0); /* the scene holds it */
 }
 
 TEST(a_client_that_leaves_a_shared_scene_does_not_change_it)
@@ -387,7 +387,7 @@ TEST(a_client_that_leaves_a_shared_scene_does_not_change_it)
     cut(stranger, witness);
     assert_int_equal(attach(witness, 1, "shared"), 1);
     assert_int_equal(render_frame(witness, 20, 1), 1);
-    /* What it uses is counted still, though nobody can name it; nobody can come back to the other scene. */
+    /* Memory of the scene still counts, though nobody can name it; nobody can come back to the other scene. */
     struct message message = made(MESSAGE_STATS);
     send_message(witness, 21, 0, &message);
     expect(witness, MESSAGE_STATS_REPLY, 21);
@@ -553,12 +553,12 @@ TEST_WITH(a_reader_looks_and_changes_nothing, set_up_for_readers, tear_down)
     expect_error(reader, 21, PROTOCOL_ERROR_DENIED);
     send_blob(reader, 22, &reference, sphere);
     expect_error(reader, 22, PROTOCOL_ERROR_DENIED);
-    /* One answer to a whole transaction, whose edits are on their way when it is refused. */
+    /* The whole transaction has one answer, as its edits are on their way when it is refused. */
     begin_edit(reader, 23, 1);
     message = made(MESSAGE_SET_NODE);
     message.set_node.node = 1;
     send_message(reader, 23, 0, &message);
     commit(reader, 23);
     expect_error(reader, 23, PROTOCOL_ERROR_DENIED);
-    assert_int_equal(render_frame(reader, 24, 1), 1); /* as before */
+    assert_int_equal(render_frame(reader, 24, 1), 1); /* unchanged */
 }

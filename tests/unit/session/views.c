@@ -59,7 +59,7 @@ static bool submit(void *context, struct engine_command *command, struct error *
 
 static struct engine_port engine_begin(void)
 {
-    clock_go_on();
+    clock_start();
     engine.commands = queue_create(ENGINE_PORT_EVENTS_MAX, false);
     atomic_store(&engine.gone, 0);
     return port_begin(submit);
@@ -554,8 +554,8 @@ static size_t take_cut(uint32_t number)
     return came_bytes;
 }
 
-/* It is shown, so that it uses credit; and the motion that it gives way to does not wait. Where calls are cut
- * short it is chance whether the first parts have left by then. */
+/* The kept picture is shown, so it uses credit; and the motion that overtakes it does not wait. Where calls
+ * are cut short it is chance whether the first parts have left by then. */
 TEST_WITH(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come, set_up, tear_down)
 {
     struct engine_command *start = start_view_in_parts(1);
@@ -761,7 +761,7 @@ SESSION_TEST(a_view_takes_the_place_of_another_on_its_channel)
     expect(MESSAGE_OK, 2);
     take_frame(3, 2);
     told_credit(3, 4);
-    /* It is one job still: another one has room, and the third has not. */
+    /* Both renders are one job: there is room for another one, but not for the third. */
     struct message message = view_message(1);
     message.render.channel = CHANNEL + 1;
     send_message(4, 0, &message);
@@ -839,7 +839,7 @@ SESSION_TEST(a_refused_view_leaves_the_running_one_unchanged)
     expect_error(3, PROTOCOL_ERROR_LIMIT);
     replace_view(4, 17);
     replace_view(5, 18);
-    say(ENGINE_FAILED, 4, ERROR_UNSUPPORTED); /* as the engine does here */
+    say(ENGINE_FAILED, 4, ERROR_UNSUPPORTED); /* the engine's answer here */
     expect_error(4, PROTOCOL_ERROR_UNSUPPORTED);
     say_frame(2, 1, 0);
     take_frame(2, 1);
@@ -997,7 +997,7 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
 TEST_WITH(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungreeted, tear_down)
 {
     struct message message;
-    uint64_t both = greet_with(HANDSHAKE_CAN_H264 | (UINT64_C(1) << 63)); /* one that nobody knows yet */
+    uint64_t both = greet_with(HANDSHAKE_CAN_H264 | (UINT64_C(1) << 63)); /* an unknown bit */
     if (!encoder_stream_supports(ENCODING_H264, 4)) {
         print_message("skipped: no encoder of H.264 is here\n");
         return;
@@ -1063,7 +1063,7 @@ SESSION_TEST(a_margin_goes_with_several_views)
     assert_true(command->job.view.margin == 0.25f && command->job.frame.picture.views_across == 2);
 }
 
-/* What frames of 512 x 512 may take: 7 of them, the limit is 10 MiB. */
+/* Frames of 512 x 512 may use 7 places; the limit is 10 MiB. */
 SESSION_TEST(views_have_room_for_their_frames_or_are_refused)
 {
     open_scene(1, 1);
@@ -1184,13 +1184,13 @@ static void play_client(void)
             assert_true(request < REQUESTS && play.asked[request]);
             assert_false(play.answered[request]);
             play.answered[request] = true;
-            /* What comes next on its channel may be another view, with all the credit that was ever told there. */
+            /* Another view may follow on its channel, with all the credit that was ever given there. */
             if (message->type == MESSAGE_ERROR)
                 play.frames[play.view_of[request]] = 0;
             break;
         case MESSAGE_FRAME_BEGIN:
             assert_true(view < VIEWS && request < REQUESTS && !play.answered[request]);
-            /* One that is not finished is of a request that was answered: it is void. */
+            /* A frame that is not finished belongs to a request that was answered: it is void. */
             assert_true(!play.under_way[view] || play.answered[play.under_way[view]]);
             play.under_way[view] = request;
             play.frame_bytes[view] = message->frame_begin.size_bytes;

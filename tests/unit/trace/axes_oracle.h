@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What images along the three axes have to hold, worked out in double precision from the scene's own buffers: no
- * rasteriser, no shader. Texels whose middle lies so near to an edge that rounding decides are left out. */
+/* Contents of images along the three axes, worked out in double precision from the scene's own buffers: no
+ * rasteriser, no shader. Texels whose middle is so near to an edge that rounding decides are left out. */
 #ifndef FARLIGHT_TESTS_AXES_ORACLE_H
 #define FARLIGHT_TESTS_AXES_ORACLE_H
 
@@ -16,14 +16,15 @@
 
 /* A rasteriser moves corners by half of a 1/256 of a texel (OpenGL asks for four bits, drivers have eight). */
 #define ORACLE_EDGE_TEXELS (1.0 / 128)
-/* Of a normal's largest entry: whether it leans enough to an axis is for rounding to say below this. */
+/* Difference of a normal's entries below which rounding decides whether it leans enough to an axis. */
 #define ORACLE_LEAN 1e-4
 
 struct oracle_sample {
     double depth_cells;
     double normal[3]; /* unit, world, to the outside */
     double weights[3];
-    double slope; /* of its plane along u and v, both together: what a cell aside changes of the depth */
+    double
+        slope; /* slope of its plane along u and v, both together: change of the depth from one cell to the next */
     uint32_t instance, primitive; /* scene-wide */
 };
 
@@ -55,7 +56,7 @@ enum oracle_images {
 struct oracle {
     uint32_t resolution;
     double lower_world[3], cell_world;
-    enum oracle_images images;   /* that a surface is in */
+    enum oracle_images images;   /* images that have the surface */
     struct oracle_texel *texels; /* 3 * resolution^2 */
 };
 
@@ -132,7 +133,7 @@ static inline enum oracle_lean oracle_lean(const double n[3], int axis, enum ora
     return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;
 }
 
-/* Of vertices, linear. */
+/* Interpolated colour of the vertices, linear. */
 static inline void oracle_colour(double out[4], const struct oracle_scene *scene,
                                  const struct oracle_sample *sample)
 {

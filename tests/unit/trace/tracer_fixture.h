@@ -15,10 +15,10 @@ struct fixture {
     struct gpu_scene gpu;
     struct test_edits edits;
     struct tracer *tracer;
-    struct scene_changes changes; /* of the last update */
-    struct stage_times times;     /* likewise */
+    struct scene_changes changes; /* changes of the last update */
+    struct stage_times times;     /* times of the last update */
     struct scene_motion motion;
-    uint64_t memory_before_bytes; /* of the device */
+    uint64_t memory_before_bytes; /* bytes on the device */
 };
 
 /* Commits the edits and brings the tracer to them, and to the motion if there is one. */

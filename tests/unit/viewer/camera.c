@@ -65,7 +65,7 @@ TEST(panning_moves_what_is_looked_at_across_the_picture)
     struct viewer_camera camera = some_camera();
     double direction[3];
     camera_pan(&camera, 0.25, 0);
-    /* What was in the middle is a quarter of the height to the left of it. */
+    /* The former middle is a quarter of the height to the left of it. */
     camera_ray(&camera, 1, 0.25, 0.5, direction);
     const double share = 5 / -direction[2];
     check_place((const double[3]){camera.eye[0] + direction[0] * share, camera.eye[1], camera.eye[2] - 5}, 0, 0,
@@ -297,7 +297,7 @@ TEST(a_clip_plays_pauses_and_begins_again_at_its_end)
     assert_int_equal(tour_clip(&tour, -1), 1);
 }
 
-/* What the panel says of a setting of the tracer. */
+/* Text of the panel for a setting of the tracer. */
 static const char *panel_says(const struct settings *settings, const char *name)
 {
     static char text[40];

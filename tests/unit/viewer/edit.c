@@ -16,7 +16,7 @@ static struct fl_object_state object;
 static struct edit_row rows[HUD_EDIT_ROWS_MAX];
 static struct hud_edit_row shown;
 
-/* All fields of the kind, each in the middle of its range or 1. */
+/* Sets all fields of the kind, each to the middle of its range or to 1. */
 static size_t some_state(enum protocol_object_kind kind)
 {
     struct fl_field fields[FL_FIELDS_MAX];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the viewer tells of frames: rates, latencies, two clocks on one axis, errors as heat, and that the overlay
- * stays within the window. */
+/* Figures about frames: rates, latencies, two clocks on one axis, errors as heat; and the overlay stays
+ * within the window. */
 #include "viewer/overlay/hud.h"
 #include "tests/harness/test.h"
 
@@ -302,7 +302,7 @@ TEST(the_overlay_shows_its_figures_within_the_window)
     assert_true(tells("mean 0.12") && tells("a notice") && tells("moving") && tells("Shift+T"));
 }
 
-/* What does not fit is left out; nothing lies over something else but help and status. */
+/* Elements that do not fit are left out; only help and status cover others. */
 TEST(a_small_window_shows_less)
 {
     add_frames(20, 20);
@@ -336,10 +336,10 @@ TEST(it_begins_with_one_line_and_the_rest_is_a_key_away)
     assert_false(tells("input to picture") || tells("trace"));
     for (size_t i = 1; i < hud.count; i++) /* behind its panel */
         assert_true(hud.marks[i].y >= hud.marks[0].y && hud.marks[i].y + hud.marks[i].height < 50);
-    shown.local.shown = true; /* what is seen then are views that are made here: none yet */
+    shown.local.shown = true; /* views are made on this machine: none yet */
     lay_out(&shown);
     assert_true(tells("0 fps") && !tells("20 fps"));
-    shown = some_state(200, 100); /* what does not fit is left out */
+    shown = some_state(200, 100); /* elements that do not fit are left out */
     settings = (struct settings){0};
     shown.notice = "a notice that is longer than the window is wide";
     lay_out(&shown);
@@ -399,7 +399,7 @@ TEST(the_line_of_figures_ends_before_the_panel_whose_swatches_are_as_the_picture
         lay_out(&shown);
         assert_true(tells("teapot.glb") || width < 700);
         const double right = width - hud_edit_width(&edit, width, shown.scale);
-        for (size_t i = 0; i < hud.count; i++) /* what begins beside the panel ends there */
+        for (size_t i = 0; i < hud.count; i++) /* elements that begin beside the panel end there */
             assert_true(hud.marks[i].y >= 50 || hud.marks[i].x >= right || hud.marks[i].is_right ||
                         hud.marks[i].x + hud.marks[i].width <= right);
         assert_true(has_box_of(188) && !has_box_of(128)); /* sRGB of 0.5 */

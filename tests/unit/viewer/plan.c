@@ -87,7 +87,7 @@ TEST(a_beginning_motion_is_not_exaggerated)
     assert_true(camera.eye[0] > 0.1 && camera.eye[0] <= 0.2 + CLOSE);
 }
 
-/* Of a radian a second about `up`, for a tenth of a second; then for 0.2 s more. */
+/* Turns by a radian a second about `up`, for a tenth of a second; then for 0.2 s more. */
 static void turn_steadily(void (*turn)(struct viewer_camera *, double, double), struct viewer_camera *foreseen,
                           struct viewer_camera *true_one)
 {
@@ -149,7 +149,7 @@ TEST(a_camera_that_would_turn_over_stops_before)
 TEST(a_picture_is_asked_for_the_middle_of_the_time_in_which_it_is_used)
 {
     struct plan_pace pace = {0};
-    assert_int_equal(plan_pace_ahead_ns(&pace) / MS, 100); /* one and a half of 15 a second */
+    assert_int_equal(plan_pace_ahead_ns(&pace) / MS, 100); /* 1.5 frames of 15 a second */
     plan_pace_add(&pace, SECOND - 300 * MS, SECOND);       /* the first one waits for a picture at rest */
     assert_int_equal(plan_pace_ahead_ns(&pace) / MS, 100);
     for (uint64_t at = 1; at <= 2; at++)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the viewer remembers: it comes back as it was, and a file that holds anything else does no harm. */
+/* Remembered settings of the viewer: they come back unchanged, and a file that holds anything else does no
+ * harm. */
 #include "viewer/input/recall.h"
 #include "tests/harness/test.h"
 
@@ -60,7 +61,8 @@ TEST(what_keys_have_chosen_comes_back_and_nothing_else)
     assert_int_equal(later.tracer, PROTOCOL_TRACER_LDC);
     assert_int_equal(later.overlay, OVERLAY_FIGURES);
     assert_int_equal(later.local, LOCAL_ON);
-    assert_true(later.tone_map == PROTOCOL_TONE_NEUTRAL && later.coarser == 2); /* as the command line says */
+    assert_true(later.tone_map == PROTOCOL_TONE_NEUTRAL &&
+                later.coarser == 2); /* the command line has precedence */
 }
 
 TEST(a_file_that_holds_something_else_is_as_none)
@@ -77,7 +79,7 @@ TEST(a_file_that_holds_something_else_is_as_none)
         "{\"x\": 99999999999999999999, \"y\": 0}",
         "{\"x\": 5, \"y\": 100000}",
         "{\"tracer\": 1, \"tone_map\": \"none such\", \"overlay\": null, \"scale\": \"3\"}",
-        "{\"tracer\": \"naive\", \"full_screen\": 1}", /* that one is for tests */
+        "{\"tracer\": \"naive\", \"full_screen\": 1}", /* this tracer is for tests */
     };
     const struct recall none = {0};
     struct recall loaded;

@@ -95,7 +95,7 @@ TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
 {
     struct views_key key = some_key(100);
     const uint64_t first = start(0);
-    assert_false(views_take(views, &picture, &made)); /* of what? */
+    assert_false(views_take(views, &picture, &made)); /* there is no picture yet */
     key.sticking = malloc(EDGE * EDGE);
     assert_non_null(key.sticking);
     memset(key.sticking, 51, EDGE * EDGE); /* a fifth */
@@ -213,7 +213,7 @@ TEST(both_eyes_are_those_of_views_half_the_distance_aside)
         const float right =
             expect_eye(alike.warp, over ? 0 : EDGE / 2, over ? EDGE / 2 : 0, width, height, 0.01f + 0.05f);
         assert_true(left > 0 && right > 0);
-        assert_float_equal(made.counts.behind, (left + right) / 2, 1e-6); /* of both: rounding alone */
+        assert_float_equal(made.counts.behind, (left + right) / 2, 1e-6); /* mean of both: rounding alone */
     }
     fl_warp_destroy(alike.warp);
 }
@@ -252,7 +252,7 @@ TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
     views_give_key(views, &key);
     for (int motion = 0; motion < 20; motion++) {
         start(0.05f);
-        poll(NULL, 0, motion % 4); /* it is made, or it is not */
+        poll(NULL, 0, motion % 4); /* the view is made, or not yet */
         views_stop(views);
         assert_false(views_take(views, &picture, &made));
         const uint64_t request = start(-0.05f);

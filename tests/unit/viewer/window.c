@@ -68,7 +68,7 @@ static struct input next(struct window *window)
 static void push_key(Uint32 type, SDL_Keycode key, bool repeats)
 {
     SDL_Event event;
-    SDL_zero(event); /* all of the union */
+    SDL_zero(event); /* clears the whole union */
     event.type = type;
     event.key.keysym.sym = key;
     event.key.repeat = repeats;
@@ -121,7 +121,7 @@ TEST(mouse_and_window_events_come_as_they_are)
     event.button.x = 30;
     event.button.y = 40;
     SDL_PushEvent(&event);
-    event.button.button = 7; /* one that nothing is bound to */
+    event.button.button = 7; /* an unbound button */
     SDL_PushEvent(&event);
     SDL_zero(event);
     event.type = SDL_MOUSEWHEEL;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is given may come from a stranger: each fault ends in an error that names it, and changes nothing. */
+/* Inputs may come from a stranger: each fault ends in an error that names it, and changes nothing. */
 #include "tests/unit/warp/views.h"
 
 #include <float.h>
@@ -204,7 +204,7 @@ TEST(a_view_that_cannot_be_is_refused)
     fl_warp_destroy(warp);
 }
 
-/* Of one thread: a number that each question takes one of. */
+/* Counter of one thread, which each question lowers. */
 struct patience {
     int *questions;
 };
@@ -232,7 +232,7 @@ TEST(a_view_that_is_given_up_says_so_and_the_next_one_is_whole)
         view.given_up_context = &patience;
         assert_false(fl_warp_make(warp, &view, &picture, &error));
         assert_int_equal(error.code, FL_WARP_ERROR_GIVEN_UP);
-        assert_int_equal(questions, -1); /* it is not asked again */
+        assert_int_equal(questions, -1); /* no further question */
     }
     int questions = INT_MAX;
     view.given_up_context = &(const struct patience){&questions};

@@ -85,7 +85,7 @@ TEST(a_rotation_alone_equals_resampling)
             known++;
         }
     }
-    assert_true(known > COUNT); /* of two pictures */
+    assert_true(known > COUNT); /* known in two pictures */
     fl_warp_destroy(warp);
 }
 
@@ -114,7 +114,8 @@ static void meet_plane(const double plane[3], const struct fl_warp_camera *camer
     place[2] = u / z;
 }
 
-#define PLACE_LEVELS (255.0 / 64) /* of colours that change by 255 from texel to texel: 1 / 64 pixel */
+#define PLACE_LEVELS (255.0 / 64) /* tolerance for colours that change by 255 from texel to texel: 1 / 64 pixel   \
+                                   */
 
 TEST(a_plane_equals_its_homography_to_a_64th_of_a_pixel)
 {
@@ -204,7 +205,7 @@ TEST(a_hole_has_the_colour_of_the_background_and_a_pattern_if_that_is_wanted)
     fl_warp_destroy(warp);
 }
 
-/* Of the red, in what is filled beside the wall. */
+/* Share of the red in the fill beside the wall. */
 static double smear_in_holes(bool is_smeared)
 {
     struct fl_warp_key key = key_of(1);
@@ -230,8 +231,8 @@ TEST(holes_take_less_of_what_runs_over_an_edge)
     assert_true(as_it_is > 0 && mended < 0.6 * as_it_is);
 }
 
-/* What of the mask is known is as in the test above; where nothing is known nothing sticks. Left of where the near
- * plane was the iteration may find it or the wall. */
+/* The known part of the mask is as in the test above; unknown pixels have share 0. Left of the near plane's
+ * place the iteration may find it or the wall. */
 TEST(what_sticks_moves_with_its_texels)
 {
     static uint8_t given[COUNT], sticking[COUNT];

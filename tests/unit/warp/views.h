@@ -99,7 +99,7 @@ static inline uint32_t place_colour(uint32_t x, uint32_t y)
     return 0xff000000u | (x & 1 ? 0xffu : 0) | (y & 1 ? 0xff00u : 0);
 }
 
-/* What a bilinear filter makes of it between the centres of texels. */
+/* Value of a bilinear filter between the centres of texels. */
 static inline double wave_at(double place)
 {
     const double share = fmod(place - 0.5 + 2, 2);

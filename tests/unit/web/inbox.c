@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a browser may ask for (client/web/inbox.h), and what an edit does (client/web/editing.h). */
+/* Requests of a browser (client/web/inbox.h), and effects of an edit (client/web/editing.h). */
 #include "tests/harness/test.h"
 #include "web/editing.h"
 #include "web/inbox.h"

@@ -57,7 +57,7 @@ TEST(an_address_has_so_many_connections_and_others_have_theirs)
     }
     assert_false(web_callers_has_room(callers, "10.0.0.1", 3));
     assert_true(web_callers_has_room(callers, "10.0.0.2", 3));
-    callers->all[1].is_there = false; /* it has gone */
+    callers->all[1].is_there = false; /* the browser has gone */
     assert_true(web_callers_has_room(callers, "10.0.0.1", 3));
     for (unsigned i = 2; i < CALLERS_MAX; i++)
         assert_non_null(web_callers_add(callers, "10.0.0.3"));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the operator is told of a daemon that is away (client/web/outage.h). */
+/* Messages to the operator about a daemon that is away (client/web/outage.h). */
 #include "tests/harness/test.h"
 #include "web/outage.h"
 
@@ -28,7 +28,7 @@ TEST(outages_that_follow_each_other_are_told_at_most_every_ten_seconds)
     }
     assert_int_equal(begins, 6);
     assert_int_equal(ends, begins);
-    /* One that was not told yet, as it came soon after another, is told if it lasts. */
+    /* An outage that was not reported, as it came soon after another, is reported if it lasts. */
     assert_false(web_outage_begins(&outage, BEGIN_NS + 59900000000ull));
     assert_true(web_outage_begins(&outage, BEGIN_NS + 60000000000ull));
 }

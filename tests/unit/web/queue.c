@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What waits for a browser (client/web/queue.h). */
+/* Queue of messages for a browser (client/web/queue.h). */
 #include "tests/harness/test.h"
 #include "web/queue.h"
 
@@ -27,7 +27,7 @@ TEST(a_queue_has_room_again_once_a_picture_is_shown)
     struct web_queue queue = {0};
     assert_int_equal(fill(&queue), QUEUE_ROOM);
     free(web_queue_take(&queue));
-    assert_false(web_queue_has_room(&queue)); /* it is on its way */
+    assert_false(web_queue_has_room(&queue)); /* a message is on its way */
     web_queue_shown(&queue, 1);
     assert_int_equal(fill(&queue), 1);
     web_queue_clear(&queue);

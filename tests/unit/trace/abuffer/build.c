@@ -10,7 +10,7 @@
 
 #define RESOLUTION 64u
 #define VOXELS 16u
-/* Of the images' texels: so many at least were compared, or the test shows nothing. */
+/* Minimum of compared texels of the images; with fewer, the test shows nothing. */
 #define COMPARED_MIN 500
 
 /* A rounding of places of about `resolution` cells in 24 bits, some of them added up: of places aside it counts as
@@ -98,7 +98,7 @@ static void expect_balance(const struct contents *contents)
 
 /* ---- voxels ---- */
 
-/* What is known of a sample: where it is, and how its plane lies. */
+/* Known properties of a sample: its place, and the slopes of its plane. */
 struct patch {
     double middle[3], normal[3];
     double half_depth; /* how far its plane reaches in depth over the texel */
@@ -119,7 +119,7 @@ static struct patch patch_of(const struct contents *contents, uint32_t texel, ui
     return patch;
 }
 
-/* Of a normal of 24 bits; what is as near to a bound may be on either side of it. */
+/* Rounding of a normal of 24 bits; within it of a bound, a sample may be on either side. */
 #define NORMAL_SLACK 2e-3
 
 /* Bits that a sample sets (`certain`), or may set. */
@@ -161,8 +161,8 @@ static bool leans(const struct patch *patch, double slack)
     return fabs(n[patch->axis]) >= (double)AXES_OVERLAP * maximum + slack;
 }
 
-/* Of voxels, or subvoxels, so many along a side: what they have to know of the patches that touch them, and what
- * they may. Of a curved sphere the reach is larger than that of the plane. */
+/* Voxels or subvoxels, `along` along a side: the patches that they must have, and those that they may have.
+ * The reach of a curved sphere is larger than that of the plane. */
 static void spread_all(int *certain, int *possible, int along, const struct contents *contents, bool has_spheres)
 {
     for (uint32_t i = 0; i < texel_count_of(contents); i++)
@@ -194,7 +194,7 @@ static void expect_marks(const struct contents *contents, bool has_spheres)
     free(possible);
 }
 
-/* As is each subvoxel marked that a patch touches, and no other. */
+/* Expects a mark on each subvoxel that a patch touches, and on no other. */
 static void expect_subvoxels(const struct contents *contents, bool has_spheres)
 {
     uint32_t along = 4 * contents->store.voxels_along, count = along * along * along, set = 0;
@@ -277,7 +277,7 @@ TEST(what_is_cut_out_bounds_no_body)
     fixture_finish(&fixture);
 }
 
-/* Of a sample in the image of an axis: whether the image shows it well, 1, or not, 0; -1: rounding decides. */
+/* Whether the image of an axis shows a sample well, 1, or not, 0; -1: rounding decides. */
 static int is_shown(const struct contents *contents, uint32_t sample, uint32_t axis)
 {
     double n[3], maximum = 0;

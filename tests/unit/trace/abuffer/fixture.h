@@ -19,10 +19,10 @@ struct fixture {
     struct abuffer_builder *builder;
     struct abuffer_store store;
     struct tracer_options options;
-    uint32_t *instances, instance_count; /* that are drawn */
+    uint32_t *instances, instance_count; /* drawn instances */
 };
 
-/* To the motion; to what was committed where it is NULL. */
+/* Updates the device to the motion; NULL: to the committed scene. */
 static inline void fixture_update(struct fixture *fixture, const struct scene_motion *motion)
 {
     struct error error = {0};
@@ -67,7 +67,7 @@ static inline void place(struct fixture *fixture, uint32_t resolution, uint32_t 
         store->lower_world[k] = fixture->gpu.lower_world[k] - 0.0005f * longest;
 }
 
-/* All of it at once. */
+/* Builds in one step. */
 static inline bool try_build(struct fixture *fixture, struct error *error)
 {
     return abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
@@ -84,7 +84,7 @@ static inline void build(struct fixture *fixture, uint32_t resolution, uint32_t 
 
 /* A structure, read back. */
 struct contents {
-    struct abuffer_store store; /* as it was then */
+    struct abuffer_store store; /* copy from that time */
     uint32_t (*texels)[2];      /* first, count; image after image, row after row */
     uint32_t (*samples)[2];
     uint32_t *ids;
@@ -180,7 +180,7 @@ static inline int winding_of(const struct contents *contents, uint32_t sample)
            ABUFFER_WINDING_ZERO;
 }
 
-/* Of a sample: its entry of `drawn`. */
+/* Entry of `drawn` of a sample. */
 static inline const uint32_t *drawn_of(const struct contents *contents, uint32_t sample)
 {
     uint32_t last = 0;

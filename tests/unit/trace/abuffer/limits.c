@@ -46,7 +46,7 @@ TEST(many_layers_are_sorted)
     }
 }
 
-/* One body in another, a thousand times: 63 is the largest number that a sample can hold. */
+/* Bodies in each other, a thousand: 63 is the largest number that a sample can hold. */
 TEST_LONG(windings_beyond_the_stored_range_are_clamped)
 {
     struct test_edits edits = {.scene = test_scene_create()};
@@ -73,7 +73,7 @@ TEST_LONG(windings_beyond_the_stored_range_are_clamped)
     fixture_finish(&fixture);
 }
 
-/* Of several samples at one place the first is that of the first instance, and of this that of the first
+/* The first of several samples at one place is that of the first instance, and within it of the first
  * primitive. */
 TEST(coincident_surfaces_keep_their_order)
 {
@@ -146,7 +146,7 @@ static enum tracer_progress build_in_units(struct fixture *fixture, uint32_t res
     for (*pieces = 0; progress == TRACER_MORE && *pieces < maximum; ++*pieces) {
         for (int stage = 0; stage < ABUFFER_STAGES; stage++)
             fixture->builder->unit_items[stage] = items;
-        /* What others do in between. */
+        /* Other work changes the bindings in between. */
         for (unsigned unit = 0; unit < 8; unit++) {
             gpu_buffer_bind_image(device, &fixture->gpu.positions, unit, GL_R32UI);
             gpu_buffer_bind_texels(device, &fixture->gpu.positions, unit, GL_R32UI);
@@ -265,7 +265,7 @@ TEST(more_than_is_allowed_is_refused_with_what_it_needs)
         snprintf(expected, sizeof(expected), "need %u MiB; %u MiB", needed, allowed);
         assert_non_null(strstr(error.text, expected));
     }
-    /* It is no harm to the next one. */
+    /* The failure does not harm the next build. */
     fixture.options.limits.abuffer_mebibytes = 0;
     build_and_read(&fixture, &some, 2 * RESOLUTION);
     expect_same(&all, &some);
@@ -274,7 +274,7 @@ TEST(more_than_is_allowed_is_refused_with_what_it_needs)
     fixture_finish(&fixture);
 }
 
-/* Of a high resolution the texels are most of it, and are refused before there is memory for any. */
+/* Texels are most of the memory at a high resolution, and are refused before anything is reserved. */
 TEST(texels_alone_may_be_more_than_is_allowed)
 {
     const uint32_t resolution = 512; /* 12 MiB */

@@ -49,7 +49,7 @@ static void rays_through_it(struct ray *rays)
     }
 }
 
-/* All runs begin one place later. Samples are read two at a time, so this changes the number of rounds. */
+/* Moves all runs by one place. Samples are read two at a time, so this changes the number of rounds. */
 static void shift_runs(struct fixture *fixture)
 {
     struct abuffer_store *store = &fixture->store;

@@ -15,7 +15,7 @@ static inline struct scene_mesh *add_round_mesh(struct test_edits *edits, uint32
     for (uint32_t i = 0; i < rows * steps; i++) {
         double a = 2 * 3.14159265358979 * (i % steps) / steps;
         double b = torus ? 2 * 3.14159265358979 * (i / steps) / steps
-                         : 3.14159265358979 * (1 + i / steps) / steps; /* of a torus: from outermost, upwards */
+                         : 3.14159265358979 * (1 + i / steps) / steps; /* for a torus: from outermost, upwards */
         double across = torus ? 0.7 + 0.3 * cos(b) : sin(b), up = torus ? 0.3 * sin(b) : -cos(b);
         memcpy(positions[i], (float[3]){(float)(across * cos(a)), (float)(across * sin(a)), (float)up},
                sizeof(positions[i]));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the tracer `abuffer` promises beside its answers: it is built when what it holds has changed and at no
- * other time, and says how large it is. */
+/* Promises of the tracer `abuffer` beside its hits: it is built when its contents have changed and at no
+ * other time, and reports its size. */
 #include "tests/unit/trace/abuffer/scenes.h"
 #include "tests/unit/trace/tracer_fixture.h"
 #include "tests/fixtures/structure.h"
@@ -8,7 +8,7 @@
 
 #define RESOLUTION 64u
 #define PI_D 3.14159265358979
-#define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
+#define MARGIN_CELLS 2u /* margin of the resolution without scene: one on either side */
 
 static const struct tracer_options small = {.abuffer = {.resolution = RESOLUTION}};
 
@@ -239,7 +239,7 @@ TEST(cutouts_are_part_of_it)
     update(&fixture);
     expect_built(&fixture, true);
     assert_int_equal(told(fixture.tracer, "samples"), cut);
-    cutout = test_material(&fixture.edits, 1, 0.9f, 0.5f, 0.6f); /* of another colour */
+    cutout = test_material(&fixture.edits, 1, 0.9f, 0.5f, 0.6f); /* the mesh in another colour */
     cutout->value.alpha_mode = ALPHA_MASK;
     cutout->value.base_colour[3] = 0.25f;
     update(&fixture);
@@ -269,9 +269,9 @@ TEST(voxels_follow_the_resolution)
     }
 }
 
-/* As thin as a cell or two: the planes of its samples go on beyond its surface, and light that leaves it must not
- * stop at them. Before shadow rays verified what is near, 34 to 111 of 4096 did; of those that go along the rod
- * one in five hundred may, as planes are not verified beyond four cells. */
+/* The rod is as thin as a cell or two: the planes of its samples extend beyond its surface, and light that
+ * leaves it must not stop at them. Before shadow rays verified near hits, 34 to 111 of 4096 did; of those
+ * along the rod one in five hundred may, as planes are not verified beyond four cells. */
 TEST(a_thin_rod_does_not_darken_itself)
 {
     static const double radii_cells[] = {0.5, 1, 2};
@@ -296,7 +296,7 @@ TEST(a_thin_rod_does_not_darken_itself)
     free(visibilities);
 }
 
-/* One more than a search collects at once. */
+/* A search collects one fewer at once. */
 TEST(each_of_five_sheets_takes_its_share_of_light)
 {
     const struct tracer_options coarse_voxels = {.abuffer = {.resolution = 512, .voxels = 16}};

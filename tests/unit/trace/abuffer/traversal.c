@@ -9,7 +9,7 @@
 #define RAY_COUNT 4096u
 #define RESOLUTION 128u
 #define VOXELS 16u
-#define CELL (2.0f / RESOLUTION) /* of a scene that is two metres wide */
+#define CELL (2.0f / RESOLUTION) /* the scene is two metres wide */
 
 static bool traverse_wave(void *user, const struct wave *wave, struct error *error)
 {
@@ -67,9 +67,9 @@ static double ball_distance(const struct ray *ray, double radius)
     return b * b < a * c ? -1 : (-b - sqrt(b * b - a * c)) / a;
 }
 
-/* One smooth surface in a voxel: what the paper assumes. A ray misses the ball where it enters and leaves it
- * within a texel of one voxel, at most sqrt(3) times that across. Chords c of a ball of radius r are as long or
- * shorter for (c / 2r)^2 of parallel rays. */
+/* A voxel has one smooth surface: the paper's assumption. A ray misses the ball where it enters and leaves it
+ * within a texel of one voxel, at most sqrt(3) times that across. Chords of a ball of radius r are at most c
+ * for (c / 2r)^2 of parallel rays. */
 TEST(the_paper_misses_no_more_of_a_ball_than_its_rim)
 {
     static const float ball[1][4] = {{0, 0, 0, 1}};

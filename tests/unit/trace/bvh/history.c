@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* That the tracer `bvh` answers the same to the bit however its scene came about: frames of an animation must not
- * depend on which frames were rendered before. And what instances that all move cost. */
+/* Equality of the hits of the tracer `bvh`, to the bit, however its scene came about: frames of an animation
+ * must not depend on which frames were rendered before. Also the cost of instances that all move. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "trace/bvh/tracer.h"
@@ -127,7 +127,7 @@ static void expect_same_answers(enum look look, const struct tracer_options *opt
                      "%u, %08x in the tree that was refitted",
                      i, (double)a->distance, a->primitive, a->instance, light[0][i], (double)b->distance,
                      b->primitive, b->instance, light[1][i]);
-        assert_true(a->distance < 0 || a->instance % 2 == 0); /* of two the first */
+        assert_true(a->distance < 0 || a->instance % 2 == 0); /* the first of two */
     }
     assert_in_range(hit_count, RAY_COUNT / 4, RAY_COUNT);
     assert_in_range(tinted, look == LOOK_TINTED ? RAY_COUNT / 8 : 0, RAY_COUNT);

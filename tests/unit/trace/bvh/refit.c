@@ -9,7 +9,7 @@
 #define TRIANGLES 1500u
 #define NODE 2u
 
-/* One target: each triangle goes its own way, and turns a little. */
+/* Adds a target that moves each triangle differently, and turns it a little. */
 static void add_target(struct scene_mesh *mesh)
 {
     float(*ways)[3] = malloc(TRIANGLES * 3 * sizeof(*ways));
@@ -189,7 +189,7 @@ TEST(a_tree_that_is_worn_out_is_built_anew)
     pose(&fixture, 8.01f, 8.01f);
     assert_int_equal(stats->nodes_rebuilt, 0); /* good as new */
     expect_like_brute_force(&fixture);
-    pose(&fixture, 0, 0); /* what is near now was far apart in the tree's own pose */
+    pose(&fixture, 0, 0); /* neighbours in this pose were far apart in the tree's own */
     assert_in_range(stats->nodes_rebuilt, TRIANGLES / 4, 4 * TRIANGLES);
     expect_like_brute_force(&fixture);
     fixture_finish(&fixture);

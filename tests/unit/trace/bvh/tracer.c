@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What only the tracer `bvh` promises: edits cost what they change, and its bounds lose no hit that brute force
- * finds. That its answers are right is shown by tests/tracers. */
+/* Promises of the tracer `bvh` alone: edits cost what they change, and its bounds lose no hit that brute
+ * force finds. tests/tracers shows that its hits are right. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "trace/bvh/tracer.h"
@@ -255,7 +255,7 @@ TEST(coherent_neighbours_are_traced_as_packets_and_a_wave_keeps_its_packet_size)
         for (int i = 0; i < WAVES; i++) {
             assert_int_equal(tracer_trace_step(fixture.tracer, &fixture.gpu, waves[i], 0, &error), TRACER_MORE);
             assert_int_equal(packet_of(waves[i]), packets[i]);
-            upload_rays(&rays[i], spreads[1 - i]); /* what is left is as the other wave was */
+            upload_rays(&rays[i], spreads[1 - i]); /* the other half is as in the other wave */
         }
     }
     for (int i = 0; i < WAVES; i++) {
@@ -356,7 +356,7 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
     fixture_finish(&fixture);
 }
 
-/* So many tests of a ray at a time, as GPUs do; 0: all in one dispatch, as software GL does. */
+/* Traces so many tests of a ray at a time, as GPUs do; 0: all in one dispatch, as software GL does. */
 static void *trace_as_hardware(struct scene *scene, const struct ray *rays, enum wave_kind kind,
                                const struct tracer_options *options, uint32_t ray_tests)
 {
@@ -421,7 +421,7 @@ TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
     enum tracer_progress progress = TRACER_MORE;
     gpu_scene_bind(&fixture.gpu);
     while (progress == TRACER_MORE) {
-        /* One of the smallest range and one without regard to it, in turns. */
+        /* Steps alternate between the smallest range and the whole one. */
         progress = tracer_trace_step(fixture.tracer, &fixture.gpu, wave, steps++ % 2, &error);
         if (steps % 8 == 0 && progress == TRACER_MORE)
             trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, other_rays, RAY_COUNT, other_hits, NULL);

@@ -10,7 +10,7 @@
 #include "tests/harness/test.h"
 
 #define RESOLUTION 64u
-/* Of the images' texels: so many at least were compared, or the test shows nothing. */
+/* Minimum of compared texels of the images; with fewer, the test shows nothing. */
 #define COMPARED_MIN 500
 
 /* A rounding of places of about `resolution` cells in 24 bits, some of them added up, and a slope of one. */
@@ -147,7 +147,7 @@ static void build_by(struct fixture *fixture, struct contents *contents, ldc_uni
                         fixture->gpu.instance_count, &fixture->options, &error);
     for (int unit = 0; progress == TRACER_MORE; unit++) {
         progress = ldc_build_step(fixture->builder, true, &error);
-        if (unit == 0) /* it has begun */
+        if (unit == 0) /* the build has begun */
             fixture->builder->task.next = way;
     }
     expect_ok(progress == TRACER_DONE, &error);
@@ -155,7 +155,7 @@ static void build_by(struct fixture *fixture, struct contents *contents, ldc_uni
     expect_consistent(contents);
 }
 
-/* All layers, and the nearest ones alone. */
+/* Both all layers, and only the nearest ones. */
 TEST_LONG(peels_and_lists_are_the_same_samples)
 {
     struct scene *(*const scenes[])(void) = {test_scene_spheres, test_scene_translucent, test_scene_deformed,

@@ -23,7 +23,7 @@ struct fixture {
     uint32_t *instances; /* 0, 1, 2, .. */
 };
 
-/* To the motion; to what was committed where it is NULL. */
+/* Updates the device to the motion; NULL: to the committed scene. */
 static inline void fixture_update(struct fixture *fixture, const struct scene_motion *motion)
 {
     struct error error = {0};
@@ -67,7 +67,7 @@ static inline void place(struct fixture *fixture, unsigned which, uint32_t resol
         cube->lower_world[k] = fixture->gpu.lower_world[k] - 0.0005f * longest;
 }
 
-/* All of it at once. */
+/* Builds in one step. */
 static inline bool try_build(struct fixture *fixture, unsigned which, const uint32_t *instances, uint32_t count,
                              struct error *error)
 {
@@ -87,7 +87,7 @@ static inline void build(struct fixture *fixture, unsigned which, const uint32_t
 
 /* A cube, read back. */
 struct contents {
-    struct ldc_cube cube; /* as it was then */
+    struct ldc_cube cube; /* copy from that time */
     uint32_t (*texels)[4];
     float *quads;
     uint32_t (*geometry)[2];
@@ -148,7 +148,7 @@ static inline uint32_t sample_of(const struct contents *contents, uint32_t texel
     return contents->texels[texel][0] - contents->cube.first_sample;
 }
 
-/* What is said of a texel twice or thrice is the same, and its samples are its own. */
+/* Repeated statements about a texel agree, and its samples are its own. */
 static inline void expect_consistent(const struct contents *contents)
 {
     const struct ldc_cube *cube = &contents->cube;

@@ -60,7 +60,7 @@ TEST(coincident_triangles_are_one_sample)
     fixture_finish(&doubled);
 }
 
-/* Of each texel the first of those that `all` has. */
+/* Expects the first samples of each texel of `all`. */
 static void expect_nearest(const struct contents *some, const struct contents *all, uint32_t layers)
 {
     uint64_t lost = 0;
@@ -103,7 +103,7 @@ TEST(memory_limits_the_layers)
     build_and_read(&fixture, &some, 2 * RESOLUTION);
     assert_int_equal(some.cube.layers_needed, 60);
     assert_in_range(some.cube.layers_kept, 1, 59);
-    /* Of what is kept no more than is allowed; another layer would have been too much. */
+    /* Kept samples are within the limit; another layer would have been beyond it. */
     uint64_t bytes = some.cube.sample_count * 32ull + some.cube.quad_count * 16ull, allowed = 2 << 20;
     assert_in_range(bytes, 1, allowed);
     assert_true(bytes + (32 + 16) * 4ull * RESOLUTION * RESOLUTION > allowed);
@@ -214,7 +214,7 @@ TEST_LONG(a_texel_that_is_drawn_more_often_than_it_was_counted_stays_within_its_
                                                     fixture.instances, 1, &fixture.options, &error);
     for (int unit = 0; progress == TRACER_MORE; unit++) {
         progress = ldc_build_step(fixture.builder, true, &error);
-        if (unit != 1) /* all is counted */
+        if (unit != 1) /* everything is counted */
             continue;
         gpu_buffer_read(device, &fixture.builder->counts, 0, counts, TEXELS * sizeof(*counts));
         for (uint32_t i = 0; i < TEXELS; i += 3)
@@ -253,7 +253,7 @@ TEST(cubes_leave_each_other_alone)
     place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
     build(&fixture, LDC_CUBE_STATIC, fixture.instances, half);
     contents_read(&before, &fixture.store, LDC_CUBE_STATIC);
-    for (uint32_t times = 1; times <= 4; times++) { /* it grows, and the buffers with it */
+    for (uint32_t times = 1; times <= 4; times++) { /* the cube grows, and the buffers with it */
         place(&fixture, LDC_CUBE_DYNAMIC, times * RESOLUTION);
         build(&fixture, LDC_CUBE_DYNAMIC, fixture.instances + half, rest);
     }
@@ -263,14 +263,14 @@ TEST(cubes_leave_each_other_alone)
     contents_read(&moving, &fixture.store, LDC_CUBE_DYNAMIC);
     expect_consistent(&moving);
     assert_true(moving.cube.sample_count > before.cube.sample_count);
-    /* As it would be without the other. */
+    /* Resolution without the other cube. */
     fixture.store.cubes[LDC_CUBE_STATIC].resolution = 0;
     place(&fixture, LDC_CUBE_DYNAMIC, 4 * RESOLUTION);
     build(&fixture, LDC_CUBE_DYNAMIC, fixture.instances + half, rest);
     contents_read(&alone, &fixture.store, LDC_CUBE_DYNAMIC);
     assert_int_equal(alone.cube.first_sample, 0);
     expect_same(&alone, &moving);
-    /* What lies behind the static one goes with it. */
+    /* Data behind the static cube goes with it. */
     place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
     build(&fixture, LDC_CUBE_STATIC, fixture.instances, half);
     assert_int_equal(fixture.store.cubes[LDC_CUBE_DYNAMIC].resolution, 0);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What the tracer `ldc` promises beside its answers: what stands still is built once, what moves alone costs its
- * frame, and it says how large its cells are and what was lost. That its answers are right to the size of a cell
- * is shown by tests/accuracy/sampled_against_reference.c. */
+/* Promises of the tracer `ldc` beside its hits: still geometry is built once, moving geometry costs its
+ * frame, and it reports the size of its cells and its losses. tests/accuracy/sampled_against_reference.c
+ * shows that hits are right up to the size of a cell. */
 #include "tests/unit/trace/stack_scene.h"
 #include "tests/unit/trace/tracer_fixture.h"
 
@@ -11,7 +11,7 @@
 #include "trace/ldc/store.h"
 
 #define RESOLUTION 64u
-#define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
+#define MARGIN_CELLS 2u /* margin of the resolution without scene: one on either side */
 
 static const struct tracer_options small = {.ldc = {.resolution = RESOLUTION}};
 
@@ -303,7 +303,7 @@ TEST(after_a_failure_the_next_update_starts_anew)
     fixture_finish(&fixture);
 }
 
-/* As a renderer that is switched between tracers asks for them. */
+/* A renderer that is switched between tracers makes these requests. */
 TEST(a_tracer_that_was_away_builds_what_has_changed_meanwhile)
 {
     static const struct tracer_options options = {.ldc = {.resolution = RESOLUTION}};

@@ -72,8 +72,8 @@ static struct hit hits[RAY_COUNT], expected[RAY_COUNT];
 
 ALL_TESTS(open_device, close_device)
 
-/* What blocks find is not verified: a plane may be half a cell off, and along silhouettes it is met where the
- * surface is not, or the other way round. */
+/* Hits in blocks are not verified: a plane may be half a cell off, and along silhouettes it may be hit where
+ * the surface is not, or the other way round. */
 TEST(where_cells_do_not_fit_blocks_are_traversed)
 {
     const uint64_t texels_max = device->facts.texture_buffer_texels_max;

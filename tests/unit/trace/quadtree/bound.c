@@ -183,8 +183,8 @@ static bool pixel_of(const struct layers_view *view, const double eye[3], const 
     return b[2] < -1e-3;
 }
 
-/* What the nodes make of a flat surface is off by no more than this between the pictures of two eyes, in pixels:
- * their 64 bits alone, whatever the bound is. */
+/* Maximum error of flat surfaces from the nodes between the pictures of two eyes, in pixels: from their 64
+ * bits alone, whatever the bound is. */
 static double worst_of_planes(const struct layers *layers, const struct layers_view *view, const double eye[3],
                               const double turn[2])
 {

@@ -102,7 +102,7 @@ static void draw(struct drawn *drawn)
         draw_one_way(drawn);
 }
 
-/* What the host sees at places about the texels' centres, of which the first are the centres themselves. */
+/* Visibility on the host at places about the texels' centres, of which the first are the centres themselves. */
 static void see_shifted(struct drawn *drawn)
 {
     static const double shifts[SHIFTS][2] = {{0, 0}, {1, 1}, {-1, 1}, {1, -1}, {-1, -1}};
@@ -166,7 +166,7 @@ static bool is_settled(const struct drawn *drawn, uint32_t face, uint32_t texel)
     return true;
 }
 
-/* Of a texel: true if all layers are as the host has them. */
+/* True if all layers of a texel are as on the host. */
 static bool is_right(const struct drawn *drawn, uint32_t face, uint32_t texel)
 {
     const struct quadtree_uniforms *u = &drawn->store.uniforms;
@@ -344,7 +344,7 @@ static uint32_t primitives_in_spans(const struct quadtree_layers *layers)
     return count;
 }
 
-/* Of the hills, of 18432 triangles, and the balls: no texel of any face misses them. */
+/* The hills have 18432 triangles, and there are balls: no texel of any face misses them. */
 TEST(layers_are_the_same_where_what_lies_beside_a_face_is_left_out)
 {
     struct error error = {0};
@@ -487,7 +487,7 @@ TEST_LONG(where_a_sphere_is_cut_out_its_far_side_is_the_first_layer_and_its_leaf
 
 /* ---- steps ---- */
 
-/* What another job of the same context may leave behind. */
+/* Leaves bindings as another job of the same context may. */
 static void do_something_else(void)
 {
     glEnable(GL_SCISSOR_TEST);

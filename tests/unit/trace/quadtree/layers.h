@@ -179,7 +179,7 @@ static inline void see_triangle(struct layers *layers, uint32_t face, double cor
         }
 }
 
-/* Of an instance: both intersections, with the tangent planes there. */
+/* Both intersections with an instance, with the tangent planes there. */
 static inline void see_sphere(struct layers *layers, uint32_t face, const struct instance *instance,
                               const float sphere[4], const uint32_t what[2])
 {
@@ -258,7 +258,7 @@ static inline void see_instance(struct layers *layers, uint32_t face, uint32_t i
     }
 }
 
-/* Of all slices, also for the device. */
+/* Fills all slices, also for the device. */
 static inline void see_all(struct layers *layers)
 {
     struct error error = {0};
@@ -288,12 +288,12 @@ static inline void see_all(struct layers *layers)
 
 /* ---- the structure ---- */
 
-/* What a test chooses of a view; the rest is derived. */
+/* Choices of a test for a view; all else is derived. */
 struct layers_view {
     uint32_t width, height, faces, layers;
     double focal;          /* texels; of an orthographic view texels a metre */
     double near, far;      /* metres */
-    double pixels, radius; /* of the bound */
+    double pixels, radius; /* parameters of the bound */
     double turn;           /* radians about y */
     float eye[3];          /* looks along -z where there is no turn */
     bool orthographic;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What is in the nodes of quadtrees: the bits of one, exact planes of leaves, flags, boxes, and what the settings
- * of a build change. */
+/* Contents of the nodes of quadtrees: their bits, exact planes of leaves, flags, boxes, and effects of the
+ * settings of a build. */
 #include "tests/fixtures/shader_probe.h"
 #include "tests/unit/trace/quadtree/layers.h"
 #include "tests/unit/trace/quadtree/scenes.h"
@@ -21,7 +21,8 @@ static const struct layers_view usual = {.width = 160,
 
 #define CASES 65536u
 
-/* Of case i: packs a plane whose slopes are the half floats i and 65535 - i, and a box; unpacks the plane. */
+/* Case i packs a plane whose slopes are the half floats i and 65535 - i, and a box; then it unpacks the
+ * plane. */
 static const char probe[] =
     "#include \"common/dispatch.glsl\"\n"
     "#include \"quadtree/node.glsl\"\n"
@@ -89,12 +90,12 @@ TEST(c_and_glsl_agree_on_every_bit_of_a_node_and_on_its_place)
 
 /* ---- leaves ---- */
 
-/* Of float arithmetic, of triangles of a centimetre some metres away. Of slopes, half floats round a share; a
- * small triangle leaves a share of w over half a texel open; and seen at a grazing angle of cosine c, which is
- * about w / (f slope), a surface has c^2 rounded by some 2^-24 of the distance over its size, and a point of a
- * sphere lies some 2^-22 / c of the distance aside, as its root has that. */
+/* Rounding of float arithmetic, for triangles of a centimetre some metres away. Slopes, half floats, round a
+ * share; a small triangle leaves a share of w over half a texel open; and at a grazing angle of cosine c,
+ * which is about w / (f slope), a surface has c^2 rounded by some 2^-24 of the distance over its size, and a
+ * point of a sphere lies some 2^-22 / c of the distance aside, as its root has that. */
 #define W_SHARE 1e-5
-#define PLACE_METRES 1e-6 /* of a point among others some metres away */
+#define PLACE_METRES 1e-6 /* rounding of a point some metres away */
 #define SLOPE_SHARE 2e-3
 #define SLOPE_OF_W 1e-4
 #define GRAZING 2e-6
@@ -152,7 +153,7 @@ TEST(a_leaf_is_the_exact_plane_of_what_its_texel_shows)
     view = usual;
     view.eye[2] = 3;
     expect_leaves(test_scene_spheres(), &view, 7500);
-    view = usual; /* all faces of a cube */
+    view = usual; /* with all faces of a cube */
     view.width = view.height = 64;
     view.focal = 32;
     view.faces = 6;

@@ -17,7 +17,7 @@ struct tree_plane {
 struct tree_box {
     double w_max, w_min;
     bool has_gaps;
-    double w_least; /* of surfaces */
+    double w_least; /* minimum w of surfaces */
 };
 
 static inline double tree_float(uint32_t bits)
@@ -27,7 +27,7 @@ static inline double tree_float(uint32_t bits)
     return value;
 }
 
-/* Of a half float that is finite. */
+/* Value of a finite half float. */
 static inline double tree_half(uint32_t bits)
 {
     const int exponent = bits >> 10 & 31, fraction = bits & 1023;
@@ -69,7 +69,7 @@ static inline uint32_t tree_index(const struct quadtree_uniforms *u, uint32_t sl
     return slice * u->slice_nodes + tree_level_first(u, level) + y * (u->padded_width >> level) + x;
 }
 
-/* Of a plane at texel coordinates, where it is node (i, j) of the level. */
+/* Value of a plane at texel coordinates, for node (i, j) of the level. */
 static inline double tree_plane_at(const struct tree_plane *plane, uint32_t level, uint32_t i, uint32_t j,
                                    double x, double y)
 {

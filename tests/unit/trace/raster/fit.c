@@ -12,7 +12,8 @@
 #define RESOLUTION 256u
 /* Both scenes have more at this resolution. */
 #define SAMPLES_MAX 1000000u
-/* Of the prediction: texels at silhouettes are in or out. ldc keeps one of the samples that coincide. */
+/* Tolerance of the prediction: texels at silhouettes are in or out. ldc keeps one of the samples that
+ * coincide. */
 #define TOLERANCE 0.1
 /* Rods that lie along the texels cover whole rows or none: of 20 places, each covered with a chance of 0.6, the
  * number has a standard deviation of 0.18 of its mean. */
@@ -61,7 +62,7 @@ static void add_rod(struct test_edits *edits, uint32_t id, uint32_t axis, float 
     test_mesh(edits, id, (const float(*)[3])positions, 8, (const uint32_t *)triangles, ROD_TRIANGLES);
 }
 
-/* Of along x along rods on each axis; a rod is about a texel wide. */
+/* A lattice of along x along rods on each axis; a rod is about a texel wide. */
 static struct scene *lattice(uint32_t along)
 {
     struct test_edits edits = {.scene = test_scene_create()};
@@ -176,7 +177,8 @@ TEST(deep_scenes_have_a_lower_one_and_a_warning)
             assert_in_range(row.number, AXES_FITTED_MIN, RESOLUTION - 1);
             assert_non_null(strstr(row.warning, "instead of 256 texels"));
             expect_predicted(&fixture, sampled[i], tolerance);
-            /* As fine as is allowed: a texel more along a side would be less than a hundredth. */
+            /* The resolution is as fine as is allowed: a texel more along a side would be less than a
+             * hundredth. */
             const double samples = (double)told(fixture.tracer, row_of(sampled[i], "static/samples"));
             assert_true(samples < (1 + tolerance) * SAMPLES_MAX);
             assert_true(samples > (1 - tolerance - 0.02) * SAMPLES_MAX);
@@ -215,7 +217,7 @@ TEST(a_resolution_that_is_chosen_costs_what_goes_with_the_picture)
     }
 }
 
-/* As frames of one window, which the user makes a little smaller or larger, must not need another structure. */
+/* Frames of one window, which the user makes a little smaller or larger, must not need another structure. */
 TEST(pictures_of_almost_the_same_size_have_the_same_structure)
 {
     struct tracer_options options[3] = {0};
@@ -289,7 +291,7 @@ TEST(a_stack_is_as_deep_as_it_has_plates)
     fixture_finish(&fixture);
 }
 
-/* Of ldc, which would peel it for minutes, though its layers are few on average. */
+/* Peeling by ldc would take minutes, though the layers are few on average. */
 TEST(what_is_too_deep_in_one_place_is_refused_with_a_remedy)
 {
     const struct tracer_options options = options_at(1024);

@@ -313,7 +313,7 @@ static bool hits(const struct ray *ray, const struct triangle *t)
 
 /* ---- the device ---- */
 
-/* As the shader has it. */
+/* Layout of the shader's struct. */
 struct element {
     float centre_radius[4], lower[4], upper[4];
 };
@@ -336,7 +336,8 @@ static void bound_by_box(const struct triangle *t, struct element *e)
     e->centre_radius[3] = sqrtf(squared) * 1.000004f;
 }
 
-/* Of each pair: bit 0 the cone meets the sphere, 1 the slabs the box, 2 it may meet, 3 a ray of it is alive. */
+/* Result for each pair: bit 0 the cone intersects the sphere, 1 the slabs the box, 2 it may intersect, 3 a
+ * ray of it is alive. */
 static const char probe_text[] =
     "#include \"common/dispatch.glsl\"\n"
     "#include \"rayspace/meet.glsl\"\n"
@@ -374,7 +375,7 @@ struct run {
     struct gpu_program programs[2]; /* for closest hits, and for shadow rays, which alone are turned round */
     struct rayspace_state state;
     struct gpu_buffer rays, elements, met;
-    uint32_t places[RAYS]; /* of each ray, in level 0 */
+    uint32_t places[RAYS]; /* place of each ray, in level 0 */
     uint32_t node_count;   /* with the rays themselves */
     uint32_t *words;
 };
@@ -478,7 +479,7 @@ static uint32_t node_over(const struct rayspace_levels *levels, uint32_t level, 
     return level == 0 ? place : RAYS + levels->first[level] + (place >> 2 * level);
 }
 
-/* What each ray hits. */
+/* Finds the hits of each ray. */
 static void find_hits(const struct fuzz *fuzz, bool *found)
 {
     for (uint32_t ray = 0; ray < RAYS; ray++)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What only the tracer `rayspace` promises: its answers are brute force's to the bit, in batches of any size, also
- * where these are halved or memory is short. And what it says of its waves. */
+/* Promises of the tracer `rayspace` alone: its hits are brute force's to the bit, in batches of any size,
+ * also where these are halved or memory is short. Also its report on its waves. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "shared/wave.h"
@@ -17,7 +17,7 @@
 ALL_TESTS(open_device, close_device)
 
 struct pair {
-    struct fixture naive, rayspace; /* of scenes that are alike */
+    struct fixture naive, rayspace; /* fixtures of equal scenes */
 };
 
 static void pair_init_by(struct pair *pair, struct scene *(*create)(void), const struct tracer_options *options)
@@ -101,7 +101,7 @@ static void expect_same_answers(struct pair *pair, const struct ray *rays, uint3
     expect_alike(ask(&pair->rayspace, rays, count), ask(&pair->naive, rays, count), count, what);
 }
 
-/* Of the last wave. */
+/* Control of the last wave. */
 static struct rayspace_control control_of(const struct fixture *fixture)
 {
     struct rayspace_control control;
@@ -299,7 +299,7 @@ TEST(a_pass_that_overflows_is_halved_and_no_answer_is_lost)
 static bool trace_shadows(void *user, const struct wave *wave, struct error *error)
 {
     struct wave own = *wave;
-    own.family = RAY_SHADOW * WAVE_BOUNCES + 3; /* of some bounce */
+    own.family = RAY_SHADOW * WAVE_BOUNCES + 3; /* a wave of some bounce */
     return trace_by_tracer(user, &own, error);
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Trees of meshes, spheres and instances: bounds, order, refits. */
 #include "trace/tree/build.h"
 #include "trace/tree/build_top.h"
 
@@ -428,7 +429,7 @@ TEST(shapes_far_from_the_origin_lie_within_their_grid)
     }
 }
 
-/* What bvh_grid_over promises, for boxes of all sizes at all places: flat ones as wide as others are narrow. */
+/* Promises of bvh_grid_over, for boxes of all sizes at all places: flat ones as wide as others are narrow. */
 TEST(a_grid_holds_the_box_it_was_made_for)
 {
     uint32_t seed = 24;
@@ -689,7 +690,7 @@ static void expect_top_contains(const struct bvh_top *top, const struct bvh_worl
     expect_copies_alike(&view);
 }
 
-/* What is not marked as moved is what it was, in each copy. */
+/* Elements that are not marked as moved are unchanged, in each copy. */
 static void expect_rest_unchanged(const struct bvh_top *top, const uint8_t *before)
 {
     size_t bytes = bvh_element_words(&top->settings) * sizeof(uint32_t);
@@ -778,7 +779,7 @@ TEST(an_instance_that_leaves_the_grid_needs_a_new_top_tree)
     }
 }
 
-/* What overflows gets a box of all numbers (trace/bvh/tracer.c). A new tree would be no better. */
+/* An instance that overflows gets a box of all numbers (trace/bvh/tracer.c). A new tree would be no better. */
 TEST(a_top_tree_over_an_endless_instance_is_not_stale_when_new)
 {
     struct bvh_world_box boxes[INSTANCES];
