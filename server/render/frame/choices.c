@@ -8,8 +8,8 @@
 #include "shared/ray.h"
 
 /* Rays of a slice, unless the buffers of its waves would take more than 1 / SLICE_MEMORY_PART of the device's
- * memory; SLICE_RAYS_UNTOLD if the memory is not known. Long waves are traced in parts (waves/trace.h), except where
- * tracers are compared. */
+ * memory; SLICE_RAYS_UNTOLD if the memory is not known. Long waves are traced in parts (waves/trace.h), except
+ * where tracers are compared. */
 #define SLICE_RAYS_UNTOLD (1u << 18)
 #define SLICE_RAYS_MIN (1u << 12)
 /* Minimum where there are many lights: a work group of the passes over hits. */

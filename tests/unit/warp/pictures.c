@@ -114,8 +114,8 @@ static void meet_plane(const double plane[3], const struct fl_warp_camera *camer
     place[2] = u / z;
 }
 
-#define PLACE_LEVELS (255.0 / 64) /* tolerance for colours that change by 255 from texel to texel: 1 / 64 pixel   \
-                                   */
+/* Tolerance for colours that change by 255 from texel to texel: 1 / 64 pixel. */
+#define PLACE_LEVELS (255.0 / 64)
 
 TEST(a_plane_equals_its_homography_to_a_64th_of_a_pixel)
 {
