@@ -140,7 +140,7 @@ static double direction_length(const struct ray *ray)
     return sqrt(x * x + y * y + z * z);
 }
 
-/* Both hit something. */
+/* Whether two hits are far apart. */
 static bool are_far(const struct wave_compare_settings *settings, const struct ray *ray, const struct hit *first,
                     const struct hit *second)
 {
@@ -201,7 +201,7 @@ static double degrees_between(uint first, uint second)
     return atan2(sqrt(cross), cosine) * (180.0 / 3.14159265358979323846);
 }
 
-/* Both hit something, at the same distance. */
+/* Whether two hits at the same distance are of the same surface. */
 static bool same_surface(const struct hit *first, const struct hit *second)
 {
     return ((first->material ^ second->material) & (HIT_MATERIAL_MASK | HIT_BACK_FACE)) == 0 &&

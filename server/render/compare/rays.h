@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Two tracers' answers to the same rays, compared ray by ray on the host. Pure: arrays in, statistics out.
  *
- * The first answer is the one under examination, the second the reference. What is added commutes: the order of
- * rays, of slices and of samples changes no figure.
+ * The first answer is the one under examination, the second the reference. Tallies add up in any order of rays, of
+ * slices and of samples.
  *
- * Two exact tracers may differ where a ray passes within rounding of an edge, and neither is wrong. So a ray whose
- * answers differ is not settled at once: the reference is asked again for WAVE_MOVES copies of it, moved by a few
- * rounding steps, and if for one of them its answer is that of the first tracer, the ray was on an edge.
+ * Two exact tracers may differ where a ray passes within rounding of an edge, and neither is wrong. So a ray with
+ * different answers is a suspect: the reference traces WAVE_MOVES copies of it, moved by a few rounding steps, and
+ * if one of its answers is that of the first tracer, the ray was on an edge.
  *
  *   uint32_t n = wave_compare(tally, &settings, &answers, suspects);
  *   for each suspect: wave_moved_rays(..), traced by the reference, wave_settle(..) */
@@ -28,8 +28,8 @@
 #define COMPARISONS_MAX (COMPARED_WAVES_MAX * 2)
 
 #define WAVE_MOVES 8
-/* Default of `far_share`: some hundred times what rounding does, and far below the distance between surfaces that
- * a picture shows apart. */
+/* Default of `far_share`: some hundred times the rounding, and far below the distance between surfaces that a
+ * picture shows apart. */
 #define WAVE_FAR_SHARE 1e-4f
 /* Beyond this two transmittances differ. */
 #define WAVE_FAR_TRANSMITTANCE (2.0 / 255.0)
@@ -39,7 +39,7 @@
 /* Errors by size, in bins of the float's upper bits: seven of the mantissa, so that a percentile is true to 0.4 %
  * however many errors there are. Below 2^-48 counts as 0, from 2^16 on as the maximum. */
 #define ERROR_BINS (64 * 128 + 2)
-#define ERROR_MAX 1e30f /* in place of greater ones, and of what is no number */
+#define ERROR_MAX 1e30f /* in place of greater errors, and of NaN */
 struct error_histogram {
     uint64_t counts[ERROR_BINS];
     uint64_t count;
@@ -54,7 +54,7 @@ float error_histogram_percentile(const struct error_histogram *histogram, double
 struct wave_tally {
     uint32_t wave;
     enum ray_kind kind;
-    uint64_t rays; /* alive ones, and dead ones that something was hit by */
+    uint64_t rays; /* alive rays, and dead ones with a hit */
     uint64_t both_hit, both_missed, only_first, only_second;
     uint64_t far;           /* among both_hit */
     uint64_t edges;         /* among only_first, only_second and far */

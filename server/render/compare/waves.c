@@ -154,8 +154,7 @@ void comparison_begin(struct comparison *comparison, struct gpu_scene *scene, st
     comparison->tracers[0] = first;
     comparison->tracers[1] = second;
     comparison->settings = (struct wave_compare_settings){
-        .diagonal =
-            scene->diagonal > 0.0f ? scene->diagonal : 1.0f, /* a metre, where the scene has nothing but discs */
+        .diagonal = scene->diagonal > 0.0f ? scene->diagonal : 1.0f, /* a metre, if the scene has only discs */
         .far_share = far_share > 0.0f ? far_share : WAVE_FAR_SHARE,
     };
 }

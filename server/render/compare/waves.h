@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The waves of a frame traced a second time by another tracer, and both answers compared. What is compared and
- * counted: render/compare/rays.h. */
+/* Traces the waves of a frame a second time by another tracer, and compares both answers
+ * (render/compare/rays.h). */
 #ifndef FARLIGHT_RENDER_COMPARE_WAVES_H
 #define FARLIGHT_RENDER_COMPARE_WAVES_H
 
@@ -22,9 +22,9 @@ uint64_t comparison_device_bytes(const struct comparison *comparison);
  * wave_compare_settings, 0: WAVE_FAR_SHARE. */
 void comparison_begin(struct comparison *comparison, struct gpu_scene *scene, struct tracer *first,
                       struct tracer *second, float far_share);
-/* Before the first tracer traces the wave: has both trace it once unmeasured if it is the frame's first of its
- * number and kind, which compiles what they need for it, so that their times are of tracing alone; and waits until
- * the device has nothing else to do. */
+/* Before the first tracer traces the wave: if it is the frame's first of its number and kind, both trace it
+ * once unmeasured, which compiles their programs, so that measured times are of tracing alone; then waits
+ * until the device is idle. */
 bool comparison_prepare(struct comparison *comparison, const struct wave *wave, uint32_t wave_number,
                         struct error *error);
 /* The wave has been traced, in first_ns, and its buffers hold the answers. The scene is bound. */

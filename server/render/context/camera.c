@@ -101,7 +101,7 @@ void frame_camera_around(struct frame_camera *camera, const struct frame_framing
                      (supports[TO_TOP] - supports[TO_BOTTOM]) / 2.0};
     eye[2] = fmax((supports[TO_RIGHT] + supports[TO_LEFT]) / (2.0 * axes.slope_x),
                   (supports[TO_TOP] + supports[TO_BOTTOM]) / (2.0 * axes.slope_y));
-    /* Something without an extent across the view, or without any. */
+    /* A box without an extent across the view, or without any. */
     eye[2] = fmax(eye[2], supports[TO_EYE] + (size > 0.0 ? NEAREST_SHARE * size : 1.0));
     *camera = (struct frame_camera){
         .fov_y = (float)(2.0 * atan(tan((double)framing->fov_y / 2.0) / (double)framing->zoom))};

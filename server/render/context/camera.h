@@ -22,7 +22,7 @@ void frame_camera_directions(double directions[FRAME_CAMERA_DIRECTIONS][3], cons
                              float aspect);
 void frame_camera_around(struct frame_camera *camera, const struct frame_framing *framing, float aspect,
                          const double supports[FRAME_CAMERA_DIRECTIONS], double size);
-/* Places such a camera around a box. */
+/* Places a camera of path auto around a box. */
 void frame_camera_auto(struct frame_camera *camera, const struct frame_framing *framing, const float lower[3],
                        const float upper[3], float aspect);
 /* Pixels of one view. */

@@ -4,7 +4,7 @@
 
 #include "base/clock.h"
 
-/* A little below what the timer's ring holds: spans beyond it would lose their GPU time. */
+/* Limit a little below the capacity of the timer's ring: spans beyond it would lose their GPU time. */
 #define SPANS_MAX 240
 
 void context_span_begin(struct render_device *device, enum stage stage)

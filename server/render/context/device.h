@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The device as a frame's passes use it: programs, the time that each pass takes, and who waits for whom. */
+/* The device for a frame's passes: programs, the time of each pass, and the way of waiting for counts. */
 #ifndef FARLIGHT_RENDER_CONTEXT_DEVICE_H
 #define FARLIGHT_RENDER_CONTEXT_DEVICE_H
 
@@ -15,8 +15,8 @@ struct render_device {
     struct stage_times collected; /* scratch memory, on the way to `times` */
     uint32_t wave_number;         /* the wave that new spans are noted for */
     uint32_t span_count;          /* spans begun since the timer was last collected */
-    /* Either the host waits for the counts of each wave and dispatches as many groups as there is work for, or it
-     * queues a slice's waves at their largest size and the device skips what is not there (waves/compact.h). */
+    /* True: the host waits for the counts of each wave and dispatches as many groups as it needs. False: it
+     * queues a slice's waves at their largest size, and the device skips the rest (waves/compact.h). */
     bool counts_on_host;
 };
 

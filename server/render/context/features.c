@@ -13,7 +13,7 @@ static bool has_specular(const struct scene_material *material)
            material->textures[MATERIAL_SPECULAR_COLOUR].texture != 0;
 }
 
-/* Mirrors of varnish and of what is no metal are strong at grazing angles alone. */
+/* Mirrors of varnish and of dielectrics are strong at grazing angles only. */
 static bool is_clear(const struct scene_material *material)
 {
     const bool textured = material->textures[MATERIAL_METALLIC_ROUGHNESS].texture != 0;

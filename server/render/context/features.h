@@ -13,7 +13,7 @@ struct scene_features {
     bool bump;                 /* a texture is a bump map */
     bool area_lights;          /* some light is a rectangle or a sphere */
     bool anisotropy;           /* some material has a grain */
-    bool specular;             /* some material's mirror differs from what Fresnel's equations say */
+    bool specular;             /* some material's mirror differs from Fresnel's equations */
     bool glass;                /* some material lets light through */
     bool blend;                /* some is blended by its alpha */
     bool volume;               /* some body of glass absorbs light */

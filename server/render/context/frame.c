@@ -25,7 +25,7 @@ void context_bind_tiles(const struct render_frame *frame, const struct gpu_progr
     gpu_uniform_uint(program, "first_tile", frame->tiles.first_tile);
 }
 
-/* Numbers of lights share a word with what paths know of emitters. */
+/* Numbers of lights share a word with the state of emitters along a path. */
 bool context_samples_emitters(const struct render_frame *frame)
 {
     return frame->scene->has_emitters && frame->scene->light_count < PATH_LIGHT_MASK &&

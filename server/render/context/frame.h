@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The frame in progress: its request, its scene, and what follows from both. It is set when the frame, or one of
- * the pictures that it needs, begins; passes read it. */
+/* The frame in progress: its request, its scene, and the values derived from both. It is set when the frame,
+ * or one of the pictures that it needs, begins; passes read it. */
 #ifndef FARLIGHT_RENDER_CONTEXT_FRAME_H
 #define FARLIGHT_RENDER_CONTEXT_FRAME_H
 
@@ -37,7 +37,7 @@ struct render_frame {
     uint32_t layer;
     struct frame_tiles tiles;
     struct gpu_buffer *tile_samples; /* samples of tiles that stop one by one; NULL: no tile stops */
-    struct comparison *comparison;   /* NULL: nothing is compared */
+    struct comparison *comparison;   /* NULL: tracers are not compared */
     struct frame_request request;
     struct scene_features features;
     struct frame_uniforms uniforms;
@@ -54,8 +54,8 @@ void context_bind_frame(const struct render_frame *frame);
 /* Sets the tiles that are rendered, for programs that have HAS_TILES. */
 void context_bind_tiles(const struct render_frame *frame, const struct gpu_program *program);
 bool context_upload_uniforms(struct render_frame *frame, struct error *error);
-/* Whether emissive triangles are sampled as lights. Stored samples do not tell spheres from triangles, so where
- * spheres glow as well, rays of such a tracer find all of that light when they hit it. */
+/* Whether emissive triangles are sampled as lights. Stored samples do not distinguish spheres from triangles,
+ * so if spheres glow as well, rays of such a tracer find all of that light by hitting it. */
 bool context_samples_emitters(const struct render_frame *frame);
 /* Ambient occlusion: rays a sample, and their reach in metres. */
 uint32_t context_ao_rays(const struct render_frame *frame);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Buffers of the wave in progress, and what passes over it bind. */
+/* Buffers of the wave in progress, and bindings of the passes over it. */
 #include "render/context/wave.h"
 
 #include "shared/bindings.h"

@@ -25,9 +25,9 @@ struct render_wave {
     uint32_t number;               /* 0: first hits */
     uint32_t ray_count, hit_count; /* without counts_on_host: their maxima */
     struct gpu_buffer rays, paths, hits;
-    struct gpu_buffer ray_times;            /* float a ray; empty where nothing moves */
+    struct gpu_buffer ray_times;            /* float a ray; empty if all stands still */
     bool sampled_hits;                      /* the hits, but for those of discs, are stored samples */
-    struct gpu_buffer hit_list, hit_places; /* the paths that hit something, see waves/compact.h */
+    struct gpu_buffer hit_list, hit_places; /* the paths with a hit, see waves/compact.h */
     uint32_t asked;                         /* shadow rays of each hit that are traced */
     uint32_t asking; /* shadow rays of each hit that are made but not traced to the end; 0: none */
     struct gpu_buffer block_offsets;
@@ -52,7 +52,7 @@ void context_bind_hits(struct render_wave *wave);
 size_t context_surface_defines(const struct render_wave *wave, struct gpu_define *defines);
 /* Reserves buffers for slices of `samples` samples and waves of `capacity` rays. */
 bool context_reserve(struct render_wave *wave, uint32_t slice_samples, struct error *error);
-/* The times of the wave's rays; NULL: nothing moves. */
+/* The times of the wave's rays; NULL: all stands still. */
 struct gpu_buffer *context_ray_times(struct render_wave *wave);
 uint64_t context_device_bytes(const struct render_wave *wave);
 void context_finish(struct render_wave *wave);

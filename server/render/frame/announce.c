@@ -17,8 +17,8 @@ static const struct gpu_texel_formats texel_formats = {.of_unit = {[UNIT_TANGENT
                                                                    [UNIT_SHADE_ENVIRONMENT] = GL_R32F,
                                                                    [UNIT_RAY_TIMES] = GL_R32F}};
 
-/* The program that depends on the scene's materials alone, for hits that are met exactly. A guess that is wrong
- * costs time, so nothing is announced where more decides. */
+/* Announces the program that depends on the scene's materials alone, for exact hits. A wrong guess costs
+ * time, so nothing is announced if more decides. */
 void announce_first(struct frame_renderer *renderer)
 {
     struct frame_work *work = renderer->work;
@@ -53,7 +53,7 @@ void announce_shading(struct frame_renderer *renderer)
     gpu_program_announce(renderer->device, NULL);
 }
 
-/* Threads compile while this one goes on. */
+/* Threads compile while the calling thread continues. */
 void announce_programs(struct frame_renderer *renderer)
 {
     struct frame_work *work = renderer->work;

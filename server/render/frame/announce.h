@@ -5,7 +5,7 @@
 
 #include "render/frame/state.h"
 
-/* While a device that has nothing of the scene is brought to it: the program that depends on materials alone. */
+/* Called while a new scene is uploaded: announces the program that depends on materials alone. */
 void announce_first(struct frame_renderer *renderer);
 /* While the structure is built, for a frame that is made in one pass: programs that depend on no structure. */
 void announce_shading(struct frame_renderer *renderer);

@@ -18,7 +18,7 @@ static enum tracer_progress bring(struct frame_renderer *renderer, const struct 
                                                      &update, shared->step_ns, error);
     if (tracer != renderer->second || tracer == renderer->tracer)
         context_add_times(&work->device, spans);
-    else /* a structure that is no part of what the frame's own tracer cost */
+    else /* a structure that does not count as a cost of the frame's own tracer */
         context_add_cpu_time(&work->device, STAGE_COMPARE, start_ns);
     return progress;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Refuses frames that cannot be rendered, with what is wrong and what to do. */
+/* Refuses frames that cannot be rendered, with the reason and the remedy. */
 #include "render/frame/check.h"
 
 #include "render/context/camera.h"
@@ -215,7 +215,7 @@ bool frame_has_motion_layer(const struct frame_renderer *renderer)
     return frame_request_layers(&renderer->request) & LAYER_BIT_MOTION;
 }
 
-/* Stored samples do not know what they are part of. */
+/* Stored samples do not know the object that they are part of. */
 bool frame_check_moves(const struct frame_renderer *renderer, struct error *error)
 {
     const struct tracer_impl *impl = renderer->tracer->impl;

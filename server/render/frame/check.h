@@ -5,14 +5,15 @@
 
 #include "render/frame/state.h"
 
-/* Checks what the session's checks of a client's request do not cover, and that its tracers exist. */
+/* Checks the parts of a request that the session does not check, and that its tracers exist. */
 bool frame_check_request(const struct frame_renderer *renderer, const struct frame_request *request,
                          struct error *error);
-/* Refuses layers of light in a scene whose light is a display's values. */
+/* Refuses layers of light in a scene whose light is in display values. */
 bool frame_check_light(const struct scene *scene, const struct frame_request *request, struct error *error);
-/* Refuses light groups of surfaces that the tracer cannot tell apart; once the tracer is known. */
+/* Refuses light groups of surfaces that the tracer cannot distinguish; called once the tracer is known. */
 bool frame_check_groups(const struct frame_renderer *renderer, struct error *error);
-/* Refuses the layer motion where hits do not say what moves them; once it is known how first hits are found. */
+/* Refuses the layer motion if hits do not name the moving object; called once the method of first hits is
+ * known. */
 bool frame_check_moves(const struct frame_renderer *renderer, struct error *error);
 bool frame_has_motion_layer(const struct frame_renderer *renderer);
 /* The tracer of that number, or its stand-in. */

@@ -168,7 +168,7 @@ static bool is_alone(const struct frame_renderer *renderer)
 bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *scene,
                      const struct scene_motion *motion, const struct frame_request *request)
 {
-    struct error refused = {0}; /* by frame_begin, before it changes anything */
+    struct error refused = {0}; /* set by frame_begin, before it changes anything */
     const struct tracer_impl *const wanted[] = {
         frame_find_tracer(renderer, request->tracing.tracer, "tracer", &refused),
         request->comparison.compare

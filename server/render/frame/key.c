@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames whose eyes are made from a key view's layers (key.h): which picture of the frame is rendered. First,
- * where the kept layers are of something else, each layer is rendered by the frame's tracer and integrator; then
- * the eyes. */
+/* Frames whose eyes are made from a key view's layers (key.h): the choice of the picture that is rendered
+ * next. If the kept layers are outdated, each layer is rendered first by the frame's tracer and integrator;
+ * then the eyes. */
 #include "render/frame/key.h"
 
 #include "render/context/camera.h"
@@ -29,8 +29,8 @@ struct frame_camera frame_key_camera(const struct frame_request *request)
     return frame_is_from_layers(request) && request->has_key ? request->key_camera : request->camera;
 }
 
-/* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be
- * rendered. The picture has room for the intersection of one sample a pixel; other points of a lens look at other
+/* Only texels that the eyes of this frame see are rendered: other eyes that the layers could serve do not
+ * follow. The picture has room for the intersection of one sample a pixel; other points of a lens see other
  * texels. */
 static bool is_for_these_eyes(const struct frame_request *request)
 {
@@ -97,7 +97,7 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
     else
         set_layers(request, &options.quadtree);
     if (options.quadtree.hits == QUADTREE_HITS_AUTO)
-        options.quadtree.hits = QUADTREE_HITS_PLANE; /* things thinner than a texel are there as well */
+        options.quadtree.hits = QUADTREE_HITS_PLANE; /* it also has objects thinner than a texel */
     if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
         return false;
     if (!impl->texel_view || !impl->layer_hits)
@@ -212,7 +212,7 @@ bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
     };
     renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
     renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
-    slices_ahead_forget(&work->ahead); /* rays of another pass cost something else */
+    slices_ahead_forget(&work->ahead); /* rays of another pass have another cost */
     return true;
 }
 
@@ -237,7 +237,7 @@ void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_re
         request->picture.height = renderer->key.tile_rows[renderer->pass] * 8;
 }
 
-/* Keeps the layer, all of whose samples are in its sums. */
+/* Keeps a layer whose samples are all in its sums. */
 static enum pass_progress keep(struct frame_renderer *renderer, struct error *error)
 {
     struct key_view *key = &renderer->key;
@@ -273,7 +273,7 @@ static enum pass_progress run_keep(void *self, struct render_wave *wave, struct 
 
 const struct pass keep_pass = {.name = "keep", .wants = wants_keep, .run = run_keep};
 
-/* Where most of a picture is filled from the background, what was asked for is hardly meant. */
+/* Warns if most of a picture is filled from the background: such a request is hardly meant. */
 static void warn_of_unknown(struct structure_row *row, const struct frame_request *request)
 {
     if (row->measure < UNKNOWN_WARNED)

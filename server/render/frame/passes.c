@@ -32,7 +32,7 @@ static const struct entry frame_passes[PHASE_COUNT] = {
 
 static const struct entry slice_passes[] = {
     {.pass = &primary_pass, OF_WORK(primary)}, /* makes rays of the camera and finds their hits */
-    {.pass = &eyes_pass, OF_WORK(eyes)},       /* or finds what eyes see of a key view */
+    {.pass = &eyes_pass, OF_WORK(eyes)},       /* or finds the surfaces of a key view that eyes see */
     /* Each wave of the slice, the first hits included: */
     {.pass = &ground_pass, .is_brief = true},
     {.pass = &wireframe_pass, .is_brief = true},

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The list of passes: what a frame does, in order, and what it does for each slice of its samples. */
+/* The list of passes of a frame, in order, and of each slice of its samples. */
 #ifndef FARLIGHT_RENDER_FRAME_PASSES_H
 #define FARLIGHT_RENDER_FRAME_PASSES_H
 
@@ -7,7 +7,7 @@
 
 /* Runs a step of the frame's pass renderer->phase. */
 enum pass_progress passes_run(struct frame_renderer *renderer, struct error *error);
-/* The first phase from that one on whose pass the frame wants; PHASE_COUNT: there is none. */
+/* The first phase from that one on with a pass that the frame wants; PHASE_COUNT: there is none. */
 enum frame_phase passes_next(const struct frame_renderer *renderer, enum frame_phase phase);
 
 /* Begins the passes over a slice, which the wave has, and runs the first step of the first one. */
@@ -16,7 +16,7 @@ enum pass_progress passes_begin_slice(struct frame_renderer *renderer, struct er
 enum pass_progress passes_run_slice(struct frame_renderer *renderer, struct error *error);
 /* Reserves the buffers of all passes over slices. */
 bool passes_reserve(struct frame_work *work, uint32_t slice_samples, struct error *error);
-/* Releases what all passes hold. */
+/* Releases the memory of all passes. */
 void passes_finish(struct frame_work *work, struct gpu_device *device);
 
 #endif

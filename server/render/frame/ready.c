@@ -80,8 +80,8 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
     return choices_slice_rays(renderer->device, frame->request.comparison.compare, frame->uniforms.light_count);
 }
 
-/* A wave for each bounce and one before them, or one alone where nothing sends rays on; more if a slice has needed
- * more. */
+/* Number of waves to queue: one for each bounce and one before them, or a single one if hits send no rays;
+ * more if a slice has needed more. */
 static uint32_t waves_queued(const struct frame_renderer *renderer)
 {
     struct frame_work *work = renderer->work;
@@ -103,7 +103,7 @@ static uint32_t sample_shift_max(const struct frame_renderer *renderer)
     return shift;
 }
 
-/* Room for more than the first hits is needed by what they send on, and to ask several lights at once. Memory that
+/* Rays per path: children of hits, and several lights at once, need more space than first hits. Memory that
  * is touched for the first time takes longer than most passes of a picture. */
 static uint32_t rays_a_path(const struct frame_renderer *renderer)
 {
@@ -182,7 +182,7 @@ static void limit_samples(const struct frame_renderer *renderer, struct frame_re
     request->sampling.samples = request->sampling.samples < lacking ? request->sampling.samples : lacking;
 }
 
-/* Sets what needs no memory of the device. */
+/* Sets the members that need no memory of the device. */
 static bool set_up(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
@@ -261,7 +261,7 @@ void reserve_begin(const struct frame_renderer *renderer)
     gpu_reserve_begin(renderer->device, RESERVE_NS);
 }
 
-/* The next step goes on with what has not failed for good. */
+/* The next step continues with reservations that were postponed. */
 bool reserve_end(const struct frame_renderer *renderer, bool made, const struct error *failed, struct error *error)
 {
     bool put_off = gpu_reserve_end(renderer->device);

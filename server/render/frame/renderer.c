@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The life of what renderers of a scene share, and of a renderer; their memory on the device. */
+/* The life of the shared state of a scene's renderers, and of a renderer; their memory on the device. */
 #include "render/frame/renderer.h"
 
 #include "host_passes/host_passes.h"

@@ -24,9 +24,8 @@ struct frame_renderer;
 /* `shared` stays the caller's and outlives the renderer. */
 struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct error *error);
 void frame_renderer_destroy(struct frame_renderer *renderer);                /* accepts NULL */
-uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer); /* without what is shared */
-/* For frame/ alone: the set that a tracer belongs to, the scene's or the renderer's, by what the tracer depends
- * on. */
+uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer); /* without the shared state */
+/* For frame/ alone: the set that a tracer belongs to, the scene's or the renderer's, by its dependencies. */
 struct tracer_set *frame_tracers(struct frame_renderer *renderer, const struct tracer_impl *impl);
 
 #endif

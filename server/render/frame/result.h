@@ -40,14 +40,14 @@ struct frame_result {
     uint32_t attachments;
     size_t size_bytes;
     uint32_t width, height;
-    /* Samples held per pixel, those of frames that it goes on from included; with noise: at most. */
+    /* Samples held per pixel, those of earlier frames that it continues included; with noise: at most. */
     uint32_t samples;
     float noise; /* with noise in the request: the largest error of a tile, as far as is known; else 0 */
     enum pixel_format format;
     enum ycbcr ycbcr; /* in place of the RGBA8; base/ycbcr.h says how the planes lie in size_bytes */
     uint64_t revision;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
-    uint32_t sorted_waves; /* whose rays were brought into the order of their directions */
+    uint32_t sorted_waves; /* waves whose rays were sorted by direction */
     uint32_t device_waits; /* how often the host has waited for the device, bringing the scene there included */
     uint32_t dispatches, barriers; /* compute passes, and barriers between passes of any kind */
     uint64_t uploaded_bytes, structure_bytes;

@@ -90,8 +90,8 @@ static bool rasterise(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
-/* A wave did not fit. Nothing of the slice has reached the picture, so it is traced again: as two halves, or, if
- * the rays of one pixel are too many, with larger buffers. */
+/* Repeats a slice whose wave did not fit, before any of it has reached the picture: as two halves, or, if the
+ * rays of one pixel are too many, with larger buffers. */
 static bool split_slice(struct frame_renderer *renderer, struct error *error)
 {
     struct frame_work *work = renderer->work;
@@ -109,7 +109,8 @@ static bool split_slice(struct frame_renderer *renderer, struct error *error)
     return samples_reserve(renderer, error);
 }
 
-/* The device has stopped a slice: the picture has what was before it, and nothing of what is queued behind it. */
+/* Repeats a slice that the device stopped: the picture has the slices before it, and none of those queued
+ * behind it. */
 static bool do_again(struct frame_renderer *renderer, const struct slice_ahead *stopped, uint32_t why,
                      struct error *error)
 {
@@ -233,7 +234,7 @@ static bool end_slice(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
-/* Goes on from a step of the slice's passes. */
+/* Continues after a step of the slice's passes. */
 static bool follow(struct frame_renderer *renderer, enum pass_progress progress, struct error *error)
 {
     renderer->samples_phase = SAMPLES_PASSES;

@@ -8,7 +8,7 @@
 
 /* Adds the request's samples to the picture. PASS_REPEAT: another picture of the frame follows (frame/key.h). */
 extern const struct pass samples_pass;
-/* Adds the slice's sums, and what was noted beside them, to the picture. */
+/* Adds the slice's sums, and its notes, to the picture. */
 extern const struct pass sums_pass;
 
 /* Reserves buffers for slices of slice_rays_max rays and waves of wave.capacity rays. */

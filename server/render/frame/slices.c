@@ -4,7 +4,8 @@
 
 #include "shared/path.h"
 
-/* A dead ray costs some hundredths of one that is traced, and a slice as much as some hundred of these. */
+/* Bound: a dead ray costs some hundredths of one that is traced, and a slice as much as some hundred of
+ * these. */
 #define DEAD_PER_LIVE 4u
 
 uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples)
@@ -43,8 +44,8 @@ static uint32_t next_going_on(const struct picture *picture, uint32_t slot)
     return slot;
 }
 
-/* How many of a slice's slots there are up to the last tile that goes on before so many have stopped that another
- * slice costs less than their dead rays. The first tile goes on. */
+/* Number of a slice's slots up to the last unfinished tile before so many finished ones that another slice
+ * costs less than their dead rays. The first tile is unfinished. */
 static uint32_t worth_together(const struct picture *picture, const struct slice *slice)
 {
     const uint32_t end = slice->first_slot + slice->slot_count;

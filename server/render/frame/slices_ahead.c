@@ -6,9 +6,9 @@
 
 #include <epoxy/gl.h>
 
-/* Rays of a slice: before one was measured, and at the least and most. Fewer do not fill a GPU. Nothing is known
- * of the first slice, and a driver ends what takes seconds: it is small, and the second one is as large as it
- * should be, or SLICE_GROWTH times as large, since its rays may cost more. */
+/* Rays of a slice: before one was measured, minimum and maximum. Fewer do not fill a GPU. The cost of the
+ * first slice is unknown, and a driver ends work that takes seconds: it is small, and the second one has its
+ * final size, or is SLICE_GROWTH times as large, since its rays may cost more. */
 #define SLICE_RAYS_FIRST (1u << 14)
 #define SLICE_RAYS_MIN (1u << 12)
 #define SLICE_RAYS_MAX (1u << 30)
@@ -81,9 +81,9 @@ static uint64_t time_of(unsigned query)
     return time_ns;
 }
 
-/* A slice has a wave after the other, each as long as its longest ray takes, however few there are: in
- * waves of many bounces that can be more than a step. The fixed part of what two slices of different sizes took,
- * on a line through both; 0 if there is none. */
+/* Fixed time of a slice. It has one wave after the other, each as long as its longest ray takes, however few
+ * rays there are: many bounces can take longer than a step. A line through the times of two slices of
+ * different sizes has it; 0: there is none. */
 static uint64_t slices_ahead_fixed_ns(struct slice_cost one, struct slice_cost other)
 {
     const struct slice_cost fewer = one.rays < other.rays ? one : other,

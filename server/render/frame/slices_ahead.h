@@ -11,7 +11,7 @@
 /* While the device works on one, the next is there already. */
 #define SLICES_AHEAD_MAX 2
 
-/* A queued slice, and what is needed to do it again. */
+/* A queued slice, with the data to repeat it. */
 struct slice_ahead {
     struct gpu_readback state; /* a struct wave_state, as it is behind the slice's last pass */
     struct slices slices;      /* before it was taken */
@@ -39,21 +39,22 @@ uint32_t slices_ahead_rays(const struct slices_ahead *ahead, uint32_t maximum);
 /* A slice is about to be taken from `slices`, at that sample. There is a place for it. */
 void slices_ahead_begin(struct slices_ahead *ahead, struct gpu_device *device, const struct slices *slices,
                         uint32_t sample);
-/* Adds the slice, all of whose passes are queued; its first wave has that many rays. */
+/* Adds the slice after all of its passes were queued; its first wave has that many rays. */
 bool slices_ahead_add(struct slices_ahead *ahead, struct gpu_device *device, const struct gpu_buffer *wave_state,
                       uint32_t rays, struct error *error);
 /* Whether the oldest is done; false if there is none. */
 bool slices_ahead_has_done(const struct slices_ahead *ahead);
-/* Takes the oldest, which is done: what became of it. *slice is valid until the next one begins. */
+/* Takes the oldest slice, which is done, with its outcome. *slice is valid until the next one begins. */
 bool slices_ahead_take(struct slices_ahead *ahead, struct gpu_device *device, const struct slice_ahead **slice,
                        struct wave_state *state, struct error *error);
-/* From the slice just taken, how large those to come are to be for the device to work about `step_ns` on one. */
+/* Derives the size of later slices from the slice just taken, so that the device works about `step_ns` on
+ * one. */
 void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *slice, uint64_t step_ns);
 /* Learns from a slice that took so long. is_rest: it has fewer rays than were asked for, as a band of the picture
  * ended. */
 void slices_ahead_note(struct slices_ahead *ahead, struct slice_cost cost, bool is_rest, uint64_t step_ns);
-/* How many rays the next slices have, after such a one: the device works about `step_ns` on each, or twice as long
- * as it takes anyway if that is more, so that half of its time at least goes into rays. */
+/* Number of rays of the next slices: the device works about `step_ns` on each, or twice its fixed time if
+ * that is more, so that at least half of its time goes into rays. */
 uint32_t slices_ahead_next_rays(struct slice_cost cost, uint64_t fixed_ns, uint64_t step_ns);
 /* Other rays, or by another tracer: the next slice is a first one. */
 void slices_ahead_forget(struct slices_ahead *ahead);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to frame/: what the renderers of a scene share, what each has, and the state of its frame. */
+/* Private to frame/: the shared state of a scene's renderers, that of each of them, and that of a frame. */
 #ifndef FARLIGHT_RENDER_FRAME_STATE_H
 #define FARLIGHT_RENDER_FRAME_STATE_H
 
@@ -42,13 +42,13 @@ struct frame_scene {
     uint64_t step_ns;                               /* time of a step that brings them to the scene */
     struct environment environment, no_environment; /* the latter for scenes that their lamps light */
     struct environment_choice environment_choice;
-    uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
+    uint64_t showing;        /* counts the contents of the copy: revisions, poses */
     uint32_t frames;         /* in progress, of all renderers */
     struct frame_work *idle; /* owned: the resources that ended frames leave to those that begin */
     uint32_t idle_count;
 };
 
-/* The state of a frame while it is in progress, of which nothing is kept. */
+/* The state of a frame in progress; none of it is kept. */
 struct frame_work {
     struct frame_work *next;             /* idle */
     struct trace_state *trace_state;     /* state of its waves; NULL: no frame has traced any yet */
@@ -89,10 +89,10 @@ struct frame_renderer {
     struct frame_work *work; /* owned until the frame ends */
     struct trace_view view;
     const struct scene *scene;         /* until the copy is of it */
-    const struct scene_motion *motion; /* until then too; NULL: nothing moves */
+    const struct scene_motion *motion; /* kept until then; NULL: all stands still */
     struct tracer *tracer, *second;    /* held; NULL: none */
     struct tracer *key_tracer;         /* the tracer of the structure that eyes are made from */
-    bool built;                        /* `tracer` is what the scene is */
+    bool built;                        /* `tracer` is up to date with the scene */
     bool second_built;                 /* `second` is */
     bool key_built;                    /* `key_tracer` is */
     struct frame_request request; /* the frame's; work->frame has that of the picture that is rendered (key.h) */
@@ -102,10 +102,10 @@ struct frame_renderer {
     bool announced;               /* programs of the picture that is being reserved are announced */
     bool announced_early;         /* programs that depend on no structure are */
     bool announced_first;         /* the program that depends on materials alone is */
-    uint32_t samples_before;      /* samples that the picture holds of frames that this one goes on from */
+    uint32_t samples_before;      /* samples in the picture from earlier frames that this one continues */
     uint32_t sample;              /* samples of this frame that are done */
     uint32_t plane, band;         /* the band that is handed out next */
-    bool copying;                 /* copies[copied % 2] is on its way, of these: */
+    bool copying;                 /* copies[copied % 2] is on its way, with these parameters: */
     uint32_t copied, copied_plane, copied_band;
     struct slices slices;
     uint32_t slice_rays_max; /* rays of a slice that the buffers are for */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tracers that are kept, what each has not yet been told, and which of them may be replaced. */
+/* Sets of tracers that are kept: the changes that each still has to receive, and the choice of the one to
+ * replace. */
 #include "render/frame/tracer_set.h"
 
 #include <string.h>

@@ -11,7 +11,7 @@
 #include "render/frame/work.h"
 #include "render/waves/integrator.h"
 
-/* The time of a step in which a thread packs what is large of the scene. */
+/* Time of a step in which a thread packs large arrays of the scene. */
 #define UPDATE_STEP_NS UINT64_C(6000000)
 
 /* An update that failed leaves no revision. */
@@ -35,8 +35,8 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     note_showing(shared, revision_before, &changes);
     if (!updated)
         return false;
-    /* Things that others moved and put back may be in other parts of a tracer's structure, which are not added up.
-     */
+    /* Objects that other frames moved and put back may be in other parts of a tracer's structure, whose costs
+     * are not added up. */
     if (renderer->kept_showing != shared->showing)
         renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;

@@ -9,7 +9,7 @@
 struct frame_work *frame_work_take(struct frame_scene *shared, const struct integrator *integrator,
                                    struct error *error);
 void frame_work_give(struct frame_scene *shared, struct frame_work *work); /* accepts NULL */
-void frame_work_finish(struct frame_scene *shared);                        /* destroys what is idle */
+void frame_work_finish(struct frame_scene *shared);                        /* destroys idle state */
 /* Makes one of the work's trace states fit the tracer. */
 bool frame_work_trace_by(struct frame_work *work, struct trace_state **state, const struct tracer *tracer,
                          struct error *error);

@@ -84,7 +84,7 @@ static void add_sky(double sums[9][3])
     }
 }
 
-/* Goes on with the rows until about `end_ns`. */
+/* Continues with the rows until about `end_ns`. */
 static bool add_image(struct environment *environment, const struct scene_environment *image, uint64_t end_ns,
                       struct error *error)
 {

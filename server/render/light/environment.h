@@ -28,7 +28,7 @@ struct environment {
 
 /* The float of an image's texel; infinity becomes the largest half, NaN becomes 0. */
 float environment_float_from_half(uint16_t half);
-/* Works until about `end_ns`; *done false: it is to be called again. */
+/* Works until about `end_ns`; *done false: call it again. */
 bool environment_update(struct environment *environment, struct gpu_device *device, const struct gpu_scene *gpu,
                         uint64_t end_ns, bool *done, struct error *error);
 void environment_fill_uniforms(const struct environment *environment, struct frame_uniforms *uniforms,

@@ -88,7 +88,7 @@ static bool image_luminances(float *cells, const struct scene_environment *image
     float *scratch = lines + (size_t)3 * width, *ring[3] = {lines, lines + width, lines + (size_t)2 * width};
     memset(cells, 0, (size_t)rows * columns * sizeof(*cells));
     image_row(ring[0], scratch, image, 0);
-    memcpy(ring[2], ring[0], width * sizeof(float)); /* beyond the pole there is what is before it */
+    memcpy(ring[2], ring[0], width * sizeof(float)); /* rows beyond the pole repeat the row before it */
     for (uint32_t v = 0; v < height; v++) {
         float *own = ring[v % 3], *below = ring[(v + 1) % 3];
         const float *above = ring[(v + 2) % 3];

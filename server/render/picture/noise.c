@@ -12,8 +12,8 @@
 
 /* Fewer samples say little about how far they are off. */
 #define SAMPLES_FIRST 16u
-/* A tile goes on beside one whose error is that many times the limit: what is rare, as light from a small mirror,
- * shows itself in one tile before it does in the next. */
+/* A tile continues beside one whose error is this many times the limit: rare light, as from a small mirror,
+ * appears in one tile before it does in the next. */
 #define NEIGHBOUR_FACTOR 4.0f
 
 void picture_noise_finish(struct picture_noise *noise, struct gpu_device *device)

@@ -5,14 +5,14 @@
  * Illumination. 2010, section 3), from the mean of all n samples and that of a part of them. The part is the first
  * a samples, a the power of two that is at least n / 2, and not every second one: samples are stratified
  * (sequence.h), so each half of a stratified set is one itself, and every second one is not. Were the two parts
- * independent, their difference would tell the mean's standard error: |mean of all - mean of the first a| * sqrt(a
+ * independent, their difference would give the mean's standard error: |mean of all - mean of the first a| * sqrt(a
  * / (n - a)). They are not: they complete each other, and the estimate is rather too high. A tile's error is the
  * root mean square of that over its pixels and channels, after exposure, divided by the tile's mean plus
- * 0.03 of white; or that of alpha, if it is larger. It is looked at when there are 16, 24, 32, 48,
- * 64, 96 .. samples.
+ * 0.03 of white; or that of alpha, if it is larger. It is measured at 16, 24, 32, 48, 64, 96 ..
+ * samples.
  *
- * For what filters pictures by their noise: the same expression, squared, is a variance of each pixel's mean;
- * halves and half_samples stand beside the picture's bands. */
+ * Filters use the same expression, squared, as the variance of each pixel's mean; halves and half_samples stand
+ * beside the picture's bands. */
 #ifndef FARLIGHT_RENDER_PICTURE_NOISE_H
 #define FARLIGHT_RENDER_PICTURE_NOISE_H
 
@@ -25,8 +25,8 @@
 struct picture_noise {
     uint32_t tile_count;            /* in the order of slots */
     uint32_t going_on;              /* tiles that get samples */
-    float error;                    /* the largest of a tile, as last looked at */
-    uint32_t *samples;              /* owned; where a tile has stopped; 0: it goes on */
+    float error;                    /* maximum over the tiles, as last measured */
+    uint32_t *samples;              /* owned; samples of each finished tile; 0: it is unfinished */
     float *errors;                  /* owned; of each tile */
     struct gpu_buffer tile_samples; /* `samples` on the device */
     struct gpu_buffer tile_errors;
@@ -37,17 +37,17 @@ struct picture_noise {
 struct picture;
 struct render_frame;
 
-/* Begins the request's picture, whose bands are there, or goes on from `samples_before`. */
+/* Begins the request's picture, whose bands are there, or continues it after `samples_before`. */
 bool picture_noise_begin(struct picture *picture, const struct render_frame *frame, uint32_t samples_before,
                          struct error *error);
-/* The next number of samples, after that many, at which something has to be measured. */
+/* The next number of samples after that many at which the error is measured. */
 uint32_t picture_noise_next(uint32_t samples);
 bool picture_noise_is_due(const struct picture *picture, uint32_t samples);
-/* Each tile that goes on has that many samples, and all of them are in the picture: stops those that have enough.
- * Waits for the device. */
+/* Measures each unfinished tile, with that many samples, all of which are in the picture, and finishes those
+ * with enough. Waits for the device. */
 bool picture_noise_measure(struct picture *picture, const struct render_frame *frame, uint32_t samples,
                            struct error *error);
-/* Primary rays of what has been added to that many samples. */
+/* Primary rays of the picture up to that many samples. */
 uint64_t picture_noise_rays(const struct picture *picture, uint32_t samples_before);
 uint64_t picture_noise_device_bytes(const struct picture_noise *noise);
 void picture_noise_finish(struct picture_noise *noise, struct gpu_device *device);

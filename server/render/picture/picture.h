@@ -25,7 +25,7 @@ struct picture {
     size_t size_bytes;
 };
 
-/* Another frame: all of it is to be cleared. */
+/* Begins another frame: all of the picture is to be cleared. */
 void picture_restart(struct picture *picture);
 /* Gives it the request's size; a picture of `samples_before` samples per pixel, to which the request adds, is
  * kept. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB, or Y'CbCr of that; of
- * light that is a display's values these, clamped, and for floats what a display emits for them. */
+/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB, or Y'CbCr of that.
+ * Light in display values is only clamped, and for floats becomes the light that a display emits for it. */
 #include "render/picture/resolve.h"
 
 #include "shared/layers.h"
@@ -15,7 +15,7 @@ static bool is_exposed(enum layer layer)
     return layer == LAYER_BEAUTY || frame_request_is_light(layer);
 }
 
-/* The factor from the sum of a layer's samples to what its pixels show. */
+/* The factor from the sum of a layer's samples to its pixels. */
 static float scale_of(const struct picture *picture, const struct frame_request *request, enum layer layer)
 {
     float mean = 1.0f / (float)picture->samples;
@@ -30,7 +30,7 @@ static const char *counts_tiles(const struct render_frame *frame, enum layer lay
     return frame->tile_samples && !frame_request_is_first_sample(layer) ? "HAS_TILE_SAMPLES" : NULL;
 }
 
-/* Layers that are no colours stay as they are. */
+/* Layers that are no colours stay unchanged. */
 static const char *shows_display_values(const struct render_frame *frame, enum layer layer)
 {
     const bool is_colour = layer == LAYER_BEAUTY || layer == LAYER_ALBEDO;
@@ -87,7 +87,7 @@ static const struct gpu_program *use_ycbcr(const struct render_frame *frame, uin
     return program;
 }
 
-/* Layers beside the picture have none, but for those of what lies behind. */
+/* Sets the background; layers beside the picture have none, except those of light behind surfaces. */
 static void set_background(const struct gpu_program *program, const struct render_frame *frame, enum layer layer)
 {
     const struct frame_request *request = &frame->request;

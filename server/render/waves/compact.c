@@ -26,7 +26,7 @@ void compact_begin(struct render_wave *wave)
     wave->shadow_rays = 0;
     *state = (struct wave_state){.rays = counts_of(wave->ray_count),
                                  .ray_blocks = counts_of(blocks_of(wave->ray_count))};
-    /* But for what became of the slices that are in flight. */
+    /* Writes all but the outcomes of slices in flight. */
     gpu_buffer_write(wave->device->gpu, &wave->state, 0, state, offsetof(struct wave_state, stopped));
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Lists made on the device by prefix sums: their order is that of what they are made from, every time, and they
- * have no holes; or made by the host (host_passes). The device notes their lengths in wave->state, from which the
- * passes over them are dispatched. */
+/* Lists made on the device by prefix sums, in the order of their sources, every time, and without holes; or
+ * made by the host (host_passes). The device notes their lengths in wave->state, from which the passes over
+ * them are dispatched. */
 #ifndef FARLIGHT_RENDER_WAVES_COMPACT_H
 #define FARLIGHT_RENDER_WAVES_COMPACT_H
 
@@ -27,7 +27,7 @@ struct compact_order {
 /* Finds the places of the hits' children (wave->block_offsets) and their number, wave->ray_count. */
 bool compact_children(struct render_wave *wave, const struct compact_order *order, struct gpu_buffer *child_counts,
                       struct error *error);
-/* Makes the wave one of `count` shadow rays of each hit. `all_count`: they count as rays of the slice as they are;
+/* Makes the wave one of `count` shadow rays of each hit. `all_count`: all of them count as rays of the slice;
  * else the children's scan counts those that are alive. */
 bool compact_shadow_rays(struct render_wave *wave, uint32_t count, bool all_count, struct wave *rays,
                          struct error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The table of integrators, and what each sets up for its shader. */
+/* The table of integrators, and the setup of each one's shader. */
 #include "render/waves/integrator.h"
 
 #include "render/light/environment_choice.h"
@@ -134,7 +134,7 @@ static void set_path(const struct render_frame *frame, const struct gpu_program 
     set_environment_choice(frame, program);
 }
 
-/* scene_features.mirrors leaves nothing out, but what a tracer stores is rounded, and a grain narrows a lobe. */
+/* scene_features.mirrors leaves nothing out, but stored samples are rounded, and a grain narrows a lobe. */
 static size_t whitted_defines(const struct render_wave *wave, struct gpu_define *defines)
 {
     if (wave->frame->features.mirrors || wave->frame->features.anisotropy || wave->sampled_hits ||
@@ -147,8 +147,8 @@ static size_t whitted_defines(const struct render_wave *wave, struct gpu_define 
 /* ---- the table ---- */
 
 static const struct integrator integrators[] = {
-    /* Whitted. An Improved Illumination Model for Shaded Display. 1980: at each hit the light of every light that
-     * a shadow ray reaches, and a ray each for what is mirrored and what is refracted. */
+    /* Whitted. An Improved Illumination Model for Shaded Display. 1980: at each hit the light of every light
+     * that a shadow ray reaches, a mirrored ray and a refracted one. */
     [INTEGRATOR_WHITTED] =
         {
             .name = "whitted",
@@ -194,7 +194,7 @@ static const struct integrator integrators[] = {
             .shadow_rays_a_hit = no_shadow_rays,
             .set = set_raycast,
         },
-    /* Ambient occlusion: of each first hit the share of the directions above it in which nothing is within a
+    /* Ambient occlusion: for each first hit the share of the directions above it without a surface within a
      * distance. Some any-hit rays a sample, and no light. */
     [INTEGRATOR_AO] =
         {

@@ -9,13 +9,13 @@
 
 struct integrator {
     const char *name;
-    const char *shader;      /* over the hits; shaders/render/shade.glsl says what it writes */
+    const char *shader;      /* shader over the hits; shaders/render/shade.glsl defines its output */
     uint32_t children_a_hit; /* at most */
     bool scatters;           /* children in many directions, at most one a hit: a wave of them may be sorted */
     bool random;             /* radiance differs from sample to sample, beside by the place in the pixel */
     bool lit_by_surfaces;    /* emissive ones are lights */
     bool follows_eye;        /* mirrors, glass and highlights are seen from where the eye is */
-    /* These three say only what is compiled ahead: */
+    /* These three determine the programs that are compiled ahead only: */
     bool always_bounces;     /* hits of any material may have children, unless the depth is 0 */
     bool mirrors;            /* hits of scene_features.mirrors have children */
     bool meets_lights;       /* rays hit area lights, by their weights */

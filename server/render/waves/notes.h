@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Notes of shading beside radiance, for layers of a picture: the parts of the light, and what covers samples. */
+/* Notes of shading beside radiance, for layers of a picture: the parts of the light, and the covers of
+ * samples. */
 #ifndef FARLIGHT_RENDER_WAVES_NOTES_H
 #define FARLIGHT_RENDER_WAVES_NOTES_H
 
@@ -8,12 +9,13 @@
 
 #include <stdint.h>
 
-/* An all-zero one notes nothing. */
+/* Notes of the frame's layers; all-zero: none. */
 struct wave_notes {
     uint32_t layers;            /* bits of the picture's layers beside the beauty */
     uint32_t plane_samples;     /* samples of the slice, in each plane of the sums */
     uint32_t environment_group; /* light group of the environment; 0: none */
-    bool covers_by_shading; /* shading, not first hits, finds what covers samples: surfaces show through others */
+    bool
+        covers_by_shading; /* shading, not first hits, finds the covers of samples: surfaces show through others */
     struct gpu_buffer sums; /* shared/layers.h; also of layers that other passes note */
     struct gpu_buffer covers;
 };

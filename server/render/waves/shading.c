@@ -134,8 +134,8 @@ static const struct gpu_program *shade_program(struct wave_shading *shading, str
     return program;
 }
 
-/* Over the hits, of which there are some: shadow rays first .. first + count - 1 of each; where first is 0 also
- * what the hit sends out, and its children. */
+/* Shades the hits, of which there are some: shadow rays first .. first + count - 1 of each; if first is 0
+ * also the light that the hit emits, and its children. */
 static bool shade_hits(struct wave_shading *shading, struct render_wave *wave, uint32_t first, uint32_t count,
                        struct error *error)
 {
@@ -191,8 +191,8 @@ static const struct gpu_program *gather_program(const struct wave_shading *shadi
     return context_use_with(wave->device, "render/gather.comp", defines, error);
 }
 
-/* Adds the light that they let through to the wave's radiance, and after the last batch that to the samples, with
- * what the paths that left the scene bring home. */
+/* Adds the light of unobstructed rays to the wave's radiance, and after the last batch that to the samples,
+ * with the light of the paths that left the scene. */
 static bool gather(struct wave_shading *shading, struct render_wave *wave, bool last, uint32_t rays_a_hit,
                    struct error *error)
 {

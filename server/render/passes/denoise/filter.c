@@ -9,13 +9,13 @@
 #include <math.h>
 
 #define LEVELS 4u /* levels of the wavelet: the widest sees 15 pixels far */
-/* Rows that a strip's own depend on: each level sees 2^level pixels far and its risk DENOISE_CHOICE_RADIUS times
- * that, and noise is looked for 4 pixels around. */
+/* Rows on both sides that a strip depends on: each level reads up to 2^level pixels away and its risk
+ * DENOISE_CHOICE_RADIUS times that, and the noise is estimated from 4 pixels around. */
 #define EDGE_ROWS (((1u << LEVELS) - 1) * (1 + DENOISE_CHOICE_RADIUS) + 4)
 /* Pixels of a dispatch: software GL does them within some ten milliseconds; a GPU has no use for more than this.
  */
 #define STEP_PIXELS (1u << 15) /* times step_scale */
-/* Up to so many samples, noise weighs more than the detail that looks like it. */
+/* Number of samples up to which noise weighs more than detail that resembles it. */
 #define FEW_SAMPLES 16u
 
 enum filter_pass {
@@ -148,8 +148,8 @@ static void bind_give(struct denoise_filter *filter, const struct render_frame *
     gpu_buffer_bind_storage(denoise_sums_band(filter->sums, DENOISE_SUM_RESULT, band), BIND_DENOISE_OUT);
 }
 
-/* Noise of few samples of mirrors and glass hides what is seen there; halves of many samples differ by that, and
- * so do those that come from the picture before, as the eye moves. */
+/* With few samples, the noise of mirrors and glass hides the things in them. With many, the halves of the
+ * samples differ by those things, and so does the history, as the eye moves. */
 static float mirror_doubt(const struct denoise_history *history, uint32_t samples)
 {
     const float many = fminf(fmaxf((float)samples / (float)FEW_SAMPLES - 1.0f, 0.0f), 1.0f);
@@ -169,8 +169,9 @@ static void bind_noise(struct denoise_filter *filter, const struct render_frame 
     gpu_uniform_float(program, "white", exp2f(-frame->request.picture.exposure_stops));
 }
 
-/* The more samples, the less of what the halves of a picture differ by is noise: edges within pixels stay. With
- * few, how fast the error falls is guessed by quarters of two samples, so half of a fall is not believed. */
+/* Share of the halves' difference that counts as noise: it falls with the samples, so that edges within
+ * pixels stay. With few samples the fall of the error is estimated from quarters of two samples, so half of
+ * it is not believed. */
 static float believed(uint32_t samples)
 {
     return samples < FEW_SAMPLES ? 2.0f : 5.0f / (1.0f + log2f((float)samples));
@@ -258,7 +259,7 @@ static void rows_of_pass(const struct denoise_filter *filter, uint32_t *begin, u
     *end = gives ? filter->own_end - filter->strip_row : filter->strip_rows;
 }
 
-/* Passes over bands, whose slots are in tiles. */
+/* Whether the frame has bands with slots in tiles. */
 static bool has_band(const struct denoise_filter *filter)
 {
     return filter->pass == PASS_TAKE || filter->pass == PASS_GIVE;

@@ -13,7 +13,7 @@ struct denoise_filter {
     struct denoise_history *history;
     struct picture *picture;
     struct gpu_buffer notes;                   /* notes of the slice */
-    struct gpu_buffer guides, slopes;          /* guides by what is seen */
+    struct gpu_buffer guides, slopes;          /* guides of the first surfaces */
     struct gpu_buffer motions;                 /* motions, where the sums have them */
     struct gpu_buffer first, wider, levels[2]; /* halves of the light: at first; filtered; as it was chosen */
     struct gpu_buffer risks;
@@ -23,9 +23,9 @@ struct denoise_filter {
     uint32_t pass, row;             /* the next step's; row: of the strip, or of the picture */
 };
 
-/* Notes what the hits of a slice are, for its denoiser. */
+/* Notes properties of a slice's hits, for its denoiser. */
 extern const struct pass guides_pass;
-/* Filters a picture whose samples are complete: DENOISE_SUM_RESULT has it then. Same state. */
+/* Filters a picture whose samples are complete, into DENOISE_SUM_RESULT. Same state. */
 extern const struct pass denoise_pass;
 
 /* A picture begins. */

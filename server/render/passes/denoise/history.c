@@ -10,8 +10,7 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* Keeps pictures of one eye through a pinhole: the pixels of others see what several places of another picture
- * show. */
+/* Keeps pictures of one eye through a pinhole: a pixel of others shows several places of another picture. */
 static bool may_keep(const struct render_frame *frame)
 {
     const struct frame_request *request = &frame->request;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A view's last picture, kept for the next one: for each pixel the light that falls there, how many samples that
- * is worth, and the guide; and where it was seen from. The next frame finds there what it sees again (Schied et
- * al. Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). README.md says what of it is trusted. */
+/* A view's last picture, kept for the next one: for each pixel its light, the number of samples that it is
+ * worth, and the guide; and the camera. The next frame finds there the places that it sees again (Schied et
+ * al. Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). README.md has the conditions. */
 #ifndef FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
 #define FARLIGHT_RENDER_PASSES_DENOISE_HISTORY_H
 
@@ -27,20 +27,20 @@ struct denoise_history {
     bool is_moving;  /* the current frame, or the last one, moves */
     /* DENOISE_MOVED_TEXELS an instance, where some have moved since the picture before. */
     struct gpu_buffer moved;
-    bool things_moved; /* `moved` has something */
+    bool things_moved; /* `moved` is not empty */
 };
 
-/* Once it is known what the frame shows. `goes_on`: it adds samples to the picture that was written last, and
- * follows the one before that. */
+/* Called once the contents of the frame are known. `goes_on`: it adds samples to the last written picture,
+ * and follows the one before that. */
 bool denoise_history_begin(struct denoise_history *history, struct render_frame *frame, uint64_t showing,
                            bool goes_on, struct error *error);
-/* How things have moved since the picture before; NULL: not at all. */
+/* Motion of instances since the previous picture; NULL: none. */
 struct gpu_buffer *denoise_history_moved(struct denoise_history *history);
 /* `fits`: the picture is filtered in one strip, and the guides are those of first hits; others have no history.
  * `has_motion`: of each pixel it is known how it has moved. False: there is no memory. */
 bool denoise_history_reserve(struct denoise_history *history, const struct render_frame *frame, bool fits,
                              bool has_motion, struct error *error);
-/* For the pass that reprojects, of a picture of so many samples. */
+/* Binds the history for the pass that reprojects, for a picture of this many samples. */
 void denoise_history_bind(struct denoise_history *history, const struct render_frame *frame,
                           const struct gpu_program *program, uint32_t samples);
 /* The current picture, behind that pass. */

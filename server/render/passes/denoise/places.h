@@ -20,8 +20,8 @@ struct denoise_places {
 void denoise_places_note(struct denoise_places *places, const struct gpu_scene *scene);
 /* Whether both are of the same instances. */
 bool denoise_places_match(const struct denoise_places *a, const struct denoise_places *b);
-/* For places that match: the matrix of each instance that leads from where a point of it is to where it was. That
- * of an instance with another shape leads as far as DENOISE_ANEW. */
+/* Computes for matching places the matrix of each instance from its present to its previous place. An
+ * instance with another shape gets DENOISE_ANEW. */
 void denoise_places_compare(const struct denoise_places *before, const struct denoise_places *now,
                             float (*before_from_now)[12]);
 void denoise_places_finish(struct denoise_places *places);

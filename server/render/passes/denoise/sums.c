@@ -10,7 +10,7 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* By DENOISE_AUTO a picture is filtered in full up to half of these samples, and not at all from all of them on
+/* Number of samples from which DENOISE_AUTO does not filter; up to half of it filters in full
  * (protocol/words.def). */
 #define AUTO_SAMPLES 128u
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Sums of a denoised picture beside its samples' radiance: the radiance of half of them, and what their first hits
- * are. Slices note it, and it reaches the sums when the slice reaches the picture. */
+/* Sums of a denoised picture beside its samples' radiance: the radiance of half of them, and properties of
+ * their first hits. Slices note them, and they reach the sums when the slice reaches the picture. */
 #ifndef FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
 #define FARLIGHT_RENDER_PASSES_DENOISE_SUMS_H
 
@@ -13,7 +13,7 @@ enum denoise_sum {
     DENOISE_SUM_DOUBLED, /* the light of as many samples as the last power of two, which will be half of them */
     DENOISE_SUM_ALBEDO,
     DENOISE_SUM_NORMAL,
-    DENOISE_SUM_MOTION, /* where has_motion; else nothing */
+    DENOISE_SUM_MOTION, /* with has_motion */
     DENOISE_SUM_RESULT, /* the denoised picture's, of as many samples; no sum of slices */
     DENOISE_SUM_COUNT
 };
@@ -21,16 +21,16 @@ enum denoise_sum {
 struct denoise_sums {
     struct gpu_buffer *bands; /* owned; sum after sum, as the picture's bands; vec4 a slot */
     uint32_t band_count;
-    /* Notes say what is seen in smooth mirrors and behind glass. Not where pictures follow one another: what each
-     * sample meets there differs from one to the next. */
+    /* Whether notes follow mirrors and glass to the surfaces in them. Not for pictures of one view that
+     * follow each other: each sample meets other surfaces from one to the next. */
     bool follows;
-    bool has_motion; /* `follows`, or something has moved since the picture before */
+    bool has_motion; /* `follows`, or an object has moved since the previous picture */
 };
 
-/* Whether the frame has noise, and is to lose it: of those that trace no rays at random, and of pictures made from
- * others, nothing is noted and nothing changes. */
+/* Whether the frame is to be filtered. Frames without random rays, and pictures made from others, have no
+ * notes and stay unchanged. */
 bool denoise_is_wanted(const struct render_frame *frame);
-/* Whether the samples that come next are noted: by DENOISE_AUTO those behind the last that it looks at are not. */
+/* Whether the next samples are noted: DENOISE_AUTO reads none behind a limit. */
 bool denoise_notes_samples(const struct render_frame *frame);
 /* How much of the filtering a picture of that many samples gets, 0 to 1. */
 float denoise_strength(const struct frame_request *request, uint32_t samples);
@@ -38,14 +38,14 @@ float denoise_strength(const struct frame_request *request, uint32_t samples);
  * picture has that of pictures before in it. */
 const struct gpu_program *denoise_use(const struct render_frame *frame, const struct denoise_sums *sums,
                                       const char *shader, bool reprojected, struct error *error);
-/* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
+/* Called after picture_begin(): reserves the sums, and clears them unless the frame continues. */
 bool denoise_sums_begin(struct denoise_sums *sums, const struct render_frame *frame, const struct picture *picture,
                         uint32_t samples_before, const struct denoise_history *history, struct error *error);
-/* The wave has hits of a new slice: notes what they are. `moved`: see denoise_history_moved(). Inside no span. */
+/* Notes properties of the hits of a new slice, which the wave has. `moved`: see denoise_history_moved().
+ * Inside no span. */
 bool denoise_note(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
                   struct render_wave *wave, struct error *error);
-/* The wave has hits of the rays that these have sent on: they say more of what is seen in mirrors and through
- * glass. */
+/* Notes the hits of the next rays, which the wave has: they are the surfaces in mirrors and behind glass. */
 bool denoise_follow(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
                     struct render_wave *wave, struct error *error);
 /* Adds the current slice, before the picture has it. Call it once the slice cannot be repeated, but on the device.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The ground of a picture (frame_ground of request.h). It is no part of the scene: no tracer knows it, and rays
- * meet it where they meet nothing else. */
+/* The ground of a picture (frame_ground of request.h). It is no part of the scene: no tracer knows it, and a
+ * ray hits it if it hits no surface. */
 #ifndef FARLIGHT_RENDER_PASSES_GROUND_H
 #define FARLIGHT_RENDER_PASSES_GROUND_H
 

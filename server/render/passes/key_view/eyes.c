@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Eyes that look at a key view: where their rays hit its layers, and the radiance that these have there. */
+/* Eyes of a key view: the hits of their rays in its layers, and the radiance of these. */
 #include "render/passes/key_view/eyes.h"
 
 #include "render/light/environment.h"

@@ -17,7 +17,7 @@ struct key_eyes {
         KEY_GATHER_MARK, /* keeps the intersections as sums, and marks texels */
         KEY_GATHER_KEPT, /* takes the intersections from the picture, and leaves black there */
     } what;
-    bool are_found; /* wave->hits have what shared/eye_hit.h says; else there are rays and intersections */
+    bool are_found; /* wave->hits have the form of shared/eye_hit.h; else there are rays and intersections */
 };
 
 /* Intersects the eyes of a slice with the structure of the key view and gathers their radiance. LAYER_UNKNOWN is

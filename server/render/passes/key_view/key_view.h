@@ -15,21 +15,21 @@ struct key_view {
     struct picture sums;                      /* sums of the layer that is rendered */
     struct gpu_buffer layers[KEY_LAYERS_MAX]; /* shared/key_view.h */
     struct gpu_buffer counts;                 /* uint: samples of eyes that no layer shows, of the current frame */
-    struct gpu_buffer marks, tiles;           /* shared/key_view.h: texels that eyes look at, of all layers */
+    struct gpu_buffer marks, tiles;           /* shared/key_view.h: texels that eyes see, of all layers */
     struct gpu_readback copy;                 /* a copy of the counts */
     /* Made layers are of this view, request and scene: */
     bool is_made;
     uint32_t first_sample;          /* first sample of the pixels that were texels */
-    struct trace_view view, texels; /* the view that was asked for; and the one whose pixels are texels */
+    struct trace_view view, texels; /* the requested view; and the view whose pixels are texels */
     struct frame_request request;   /* the frame's that they were rendered for */
     uint64_t showing;               /* the scene's, see frame/state.h */
     uint32_t layer_count;
-    bool is_marked; /* only what the eyes of the current frame look at is rendered: of no use to others */
+    bool is_marked; /* only texels that the eyes of the current frame see are rendered: of no use to others */
     uint32_t first_tile[KEY_LAYERS_MAX]; /* then, of each layer, in `tiles` */
     uint32_t tile_rows[KEY_LAYERS_MAX];
 };
 
-/* Whether the layers show what that frame asks for. */
+/* Whether the layers are those of that frame. */
 bool key_view_is_of(const struct key_view *key, const struct trace_view *view, const struct frame_request *request,
                     uint64_t showing);
 /* Makes room for layers of that view. */
@@ -40,7 +40,7 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 /* Keeps a band of the layer's picture, which is key->sums. */
 bool key_view_keep_band(struct key_view *key, const struct render_frame *frame, uint32_t layer, uint32_t band,
                         struct error *error);
-/* Clears the marks: no texel is looked at yet. */
+/* Clears the marks: no texel is seen yet. */
 bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error);
 /* Lists the tiles; waits for the device. */
 bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error);

@@ -146,7 +146,7 @@ static bool note_sticking(struct layers *layers, struct render_wave *wave, struc
     return program && gpu_check(wave->device->gpu, "what sticks", error);
 }
 
-/* The plane of what first surfaces do comes behind those of light, of which it is one. */
+/* The plane of emission follows those of light, of which it is one. */
 static uint32_t light_planes_end(const struct wave_notes *notes)
 {
     const uint32_t planes = (uint32_t)__builtin_popcount(notes->layers & ~LAYER_BITS_CRYPTO);
@@ -191,7 +191,7 @@ static bool begin_covers(struct layers *layers, struct render_wave *wave, struct
     return program && gpu_check(wave->device->gpu, "what covers samples", error);
 }
 
-/* Whether the current slice has anything to add: for some layers, samples after the first are zero. */
+/* Whether the current slice adds to a layer: for some layers, samples after the first are zero. */
 static bool adds(const struct render_frame *frame, enum layer layer)
 {
     return frame->uniforms.sample_index == 0 || !frame_request_is_first_sample(layer);
@@ -270,7 +270,7 @@ static bool gather_ao(struct layers *layers, struct render_wave *wave, uint32_t 
     return program && gpu_check(wave->device->gpu, "ambient occlusion", error);
 }
 
-/* Marks secondary rays that came to where the tracer knows nothing. */
+/* Marks secondary rays that reached places unknown to the tracer. */
 static bool mark_unknown(struct layers *layers, struct render_wave *wave, struct error *error)
 {
     context_span_begin(wave->device, STAGE_SHADE);
@@ -294,7 +294,7 @@ static bool any_adds(const struct layers *layers, const struct render_wave *wave
     return false;
 }
 
-/* Notes what first hits are; *done false: there is more. Rays and hits stay as they are, and rays that it traces
+/* Notes properties of first hits; *done false: there is more. Rays and hits stay unchanged, and its own rays
  * count as shadow rays. */
 static bool note_first(struct layers *layers, struct render_wave *wave, bool *done, struct error *error)
 {
@@ -323,7 +323,7 @@ static bool note_first(struct layers *layers, struct render_wave *wave, bool *do
     return gather_ao(layers, wave, count, error);
 }
 
-/* Adds what covers the slice to the ranks of one kind, objects or materials: its planes are those in `bits`. */
+/* Adds the slice's covers to the ranks of one kind, objects or materials: its planes are those in `bits`. */
 static bool rank_covers(struct layers *layers, struct picture *picture, struct render_wave *wave, uint32_t bits,
                         struct error *error)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where things and the camera are a frame earlier and a frame later, for the layer `motion`. */
+/* Places of objects and the camera a frame earlier and a frame later, for the layer `motion`. */
 #ifndef FARLIGHT_RENDER_PASSES_LAYERS_MOVES_H
 #define FARLIGHT_RENDER_PASSES_LAYERS_MOVES_H
 
@@ -11,12 +11,12 @@
 struct moves {                   /* an all-zero one has none */
     struct gpu_buffer instances; /* shared/layers.h: struct move */
     struct gpu_buffer vertices;
-    bool has_any; /* else nothing but the camera moves */
+    bool has_any; /* else only the camera moves */
 };
 
 /* Finds them for a copy that has just been updated to `motion`, which is read now and not later. NULL, or one
- * without neighbours: things stand still. ERROR_OUT_OF_MEMORY; ERROR_LIMIT: a buffer would be too large for the
- * device. */
+ * without neighbours: objects stand still. ERROR_OUT_OF_MEMORY; ERROR_LIMIT: a buffer would be too large for
+ * the device. */
 bool moves_find(struct moves *moves, const struct gpu_scene *gpu, const struct scene_motion *motion,
                 struct error *error);
 /* Binds them, and sets the cameras, for render/layers_motion.comp, which is in use. */

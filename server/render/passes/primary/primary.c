@@ -140,7 +140,7 @@ static const struct gpu_program *rays_program(bool rasterised, const struct rend
     return gpu_program_get(frame->device->gpu, &source, error);
 }
 
-/* Rays, paths, and what the rasteriser saw. */
+/* Makes rays, paths, and hits of the rasteriser. */
 static bool make_rays(const struct primary *primary, struct render_wave *wave, struct error *error)
 {
     const struct gpu_program *program = rays_program(primary != NULL, wave->frame, error);
@@ -316,7 +316,8 @@ void primary_announce(struct render_wave *wave, bool rasterised)
     if (rasterised) {
         (void)rays_program(true, wave->frame, NULL);
         (void)fill_program(wave->frame, NULL);
-    } else { /* the wave takes longest, while this thread makes what makes the rays */
+    } else { /* the wave's program takes longest: other threads compile it while this one compiles that of the rays
+              */
         const struct wave rays = camera_wave(wave);
         wave_announce(wave, &rays);
         (void)rays_program(false, wave->frame, NULL);

@@ -14,13 +14,13 @@ struct primary {
     bool rasterises;           /* first hits of the frame are rasterised, else traced */
     uint32_t strip_rows;       /* rows that are rasterised together */
     uint32_t sample_shift_max; /* 2^this samples are rendered together at most */
-    /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the strip's uppermost. An array. */
+    /* RG32UI: instance + 1 (0: no surface), primitive; row 0 is the strip's uppermost. An array. */
     struct gpu_texture visible;
     struct gpu_texture depth; /* reversed, 32-bit float; of the layer that is drawn */
     struct gpu_framebuffer framebuffers[SAMPLES_TOGETHER_MAX]; /* a framebuffer for each layer */
     uint32_t first_row;                                        /* the strip's first row in the picture */
     uint32_t layer_count;                                      /* layers that are drawn */
-    /* where drawing goes on */
+    /* layer at which drawing continues */
     uint32_t layer;
     struct raster_view view;
     bool cleared;
@@ -33,11 +33,11 @@ extern const struct pass primary_pass;
  * is done. */
 void primary_rasterise_begin(struct primary *primary, uint32_t first_row, uint32_t samples);
 bool primary_rasterise(struct primary *primary, const struct render_frame *frame, bool *done, struct error *error);
-/* Parts of the pass for eyes that look at a key view (key_view/eyes.h). Begin a slice: with rays, or, where the
- * tracer finds what eyes look at without rays (tracer_finds_eyes), without them. */
+/* Parts of the pass for eyes of a key view (key_view/eyes.h). Begin a slice: with rays, or without them if
+ * the tracer finds the eyes' hits itself (tracer_finds_eyes). */
 bool primary_begin_traced(struct render_wave *wave, struct error *error);
 void primary_begin_eyes(struct render_wave *wave);
-/* Find what eyes look at: shared/eye_hit.h in place of hits. */
+/* Find the hits of eyes: shared/eye_hit.h in place of hits. */
 bool primary_find_eyes(struct render_wave *wave, struct error *error);
 /* Find the rays' intersections alone, a part of them a call; and, if their surfaces are needed after all, make
  * hits of them and list these. */

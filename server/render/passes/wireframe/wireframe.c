@@ -6,7 +6,7 @@
 
 #include <epoxy/gl.h>
 
-/* Hits that are stored samples name no triangle and get no edges; eyes that look at a key view have no hits. */
+/* Stored samples name no triangle and get no edges; eyes of a key view have no hits. */
 static bool wants(const void *self, const struct render_wave *wave)
 {
     (void)self;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Edges of triangles, drawn on what is seen first: shaders/render/wireframe.comp. */
+/* Edges of triangles, drawn on first hits: shaders/render/wireframe.comp. */
 #ifndef FARLIGHT_RENDER_PASSES_WIREFRAME_H
 #define FARLIGHT_RENDER_PASSES_WIREFRAME_H
 
