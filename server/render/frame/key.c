@@ -97,7 +97,7 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
     else
         set_layers(request, &options.quadtree);
     if (options.quadtree.hits == QUADTREE_HITS_AUTO)
-        options.quadtree.hits = QUADTREE_HITS_PLANE; /* it also has objects thinner than a texel */
+        options.quadtree.hits = QUADTREE_HITS_PLANE; /* planes also show objects thinner than a texel */
     if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
         return false;
     if (!impl->texel_view || !impl->layer_hits)
