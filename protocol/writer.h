@@ -15,7 +15,7 @@ struct writer {
     size_t capacity_bytes;
     size_t used_bytes;
     bool failed;
-    struct decode_error error; /* says what, once failed */
+    struct decode_error error; /* the failure */
 };
 
 void writer_init(struct writer *writer, void *data, size_t capacity_bytes);

@@ -8,9 +8,10 @@
 
 #include <stdbool.h>
 
-/* Confines this process to what drivers need, to the caches of compiled programs, to the trace file `trace_path`
- * ("": none) and to the folder `store_path` ("": none), which are made where they are missing. Before any thread
- * is started, unless server.sandbox says no. False and *error: it failed, and clients must not be served. */
+/* Confines this process to the files of drivers, the caches of compiled programs, the trace file `trace_path`
+ * ("": none) and the folder `store_path` ("": none), which are created if they are missing. Called before any
+ * thread is started, unless server.sandbox says no. False and *error: it failed, and clients must not be
+ * served. */
 bool confine(const struct config *config, const char *trace_path, const char *store_path, struct error *error);
 
 #endif

@@ -46,7 +46,7 @@ enum fl_error_code {
     FL_ERROR_ARGUMENT,    /* the caller passed something that is not allowed */
     FL_ERROR_FILE,        /* a file cannot be read or written */
     FL_ERROR_CONNECTION,  /* no daemon answers at the address, or the connection is lost */
-    FL_ERROR_PROTOCOL,    /* the peer sent what the protocol forbids */
+    FL_ERROR_PROTOCOL,    /* the peer violated the protocol */
     FL_ERROR_REFUSED,     /* the daemon answered with an error: see `server_code` */
     FL_ERROR_MODEL,       /* the importer refused the model */
     FL_ERROR_TIMEOUT,     /* a deadline passed */
@@ -250,8 +250,8 @@ FL_API bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *
 FL_API bool fl_scene_refresh(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error);
 /* The highest revision that the daemon has reported, of this client's edits or another client's. */
 FL_API uint64_t fl_scene_revision(const struct fl_scene *scene);
-/* The path of a file that a loaded scene is made of: its models, its environment, and what the models name, which
- * need not exist. NULL beyond the last; valid until the scene is destroyed. */
+/* The path of a file of a loaded scene: its models, its environment, and the files that the models name,
+ * which need not exist. NULL beyond the last; valid until the scene is destroyed. */
 FL_API const char *fl_scene_file(const struct fl_scene *scene, size_t index);
 FL_API const struct fl_import_stats *fl_scene_import_stats(const struct fl_scene *scene);
 FL_API size_t fl_scene_camera_count(const struct fl_scene *scene);
@@ -553,7 +553,7 @@ FL_API struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *erro
 FL_API struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *done,
                                        struct fl_error *error);
 FL_API void fl_frame_destroy(struct fl_frame *frame);
-/* Ends the job early and waits until the daemon confirms it; what was sent meanwhile is dropped. */
+/* Ends the job early and waits until the daemon confirms it; frames that arrive meanwhile are dropped. */
 FL_API bool fl_render_cancel(struct fl_job *job, struct fl_error *error);
 FL_API void fl_render_destroy(struct fl_job *job); /* cancels a running job */
 
@@ -755,9 +755,9 @@ struct fl_y4m_options {
     int interrupt_fd; /* see fl_connect_options */
 };
 
-/* Nothing is written before the first frame. The samples are 8-bit Y'CbCr by BT.709 in limited range (said in the
- * header: XCOLORRANGE=LIMITED) of the frame's sRGB values; the format has no word for matrix, primaries and
- * transfer curve, so a tool must be told (ffmpeg: -colorspace bt709 -color_primaries bt709 -color_trc
+/* Nothing is written before the first frame. The samples are 8-bit Y'CbCr by BT.709 in limited range (the
+ * header has XCOLORRANGE=LIMITED) of the frame's sRGB values; the format has no word for matrix, primaries
+ * and transfer curve, so tools need options (ffmpeg: -colorspace bt709 -color_primaries bt709 -color_trc
  * iec61966-2-1). */
 FL_API struct fl_y4m *fl_y4m_begin(const struct fl_y4m_options *options, struct fl_error *error);
 /* Writes the whole frame; pixel format rgba8, all of one size; transparent pixels are composited over black. A
@@ -816,8 +816,8 @@ struct fl_comparison {
      * over all windows that lie within the picture. */
     bool has_ssim; /* true if the picture is at least 11x11 */
     double ssim;
-    /* Butteraugli distance as libjxl computes it, of what a screen of 80 cd/m2 shows: about 1 where a difference
-     * is just seen. */
+    /* Butteraugli distance as libjxl computes it, of the display values on a screen of 80 cd/m2: about 1
+     * where a difference is just visible. */
     bool has_butteraugli;                /* true if the picture is at least 8x8 and has at most 2^24 pixels */
     double butteraugli, butteraugli_max; /* 3-norm over the picture; maximum */
     uint64_t visible;                    /* pixels with a distance above 1 */
@@ -835,7 +835,7 @@ FL_API bool fl_compare(const struct fl_compare_options *options, struct fl_compa
 /* ---- elsewhere ----------------------------------------------------------------------------------- */
 
 /* Copies bytes both ways between descriptors and the socket at `address` ("unix:PATH", "tcp:HOST:PORT") until
- * both directions have ended: what runs at the far end of an ssh connection. */
+ * both directions have ended: the far end of an ssh connection. */
 FL_API bool fl_bridge(const char *address, int in_fd, int out_fd, struct fl_error *error);
 
 #ifdef __cplusplus

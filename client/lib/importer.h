@@ -28,7 +28,7 @@ struct fl_importer {
     struct fl_camera_object *objects;
     size_t object_count, object_capacity;
     struct fl_catalogue catalogue;
-    char **files; /* paths: what the options name, then what the models name */
+    char **files; /* paths: those of the options, then those that the models name */
     size_t file_count, file_capacity;
     struct fl_error complaint; /* the importer's last note of severity error */
 };

@@ -16,7 +16,7 @@ enum fl_wiring {
 
 struct fl_process {
     pid_t pid;    /* 0: none */
-    int input_fd; /* > 0: the program's standard input, set by the caller, who keeps it; 0: none */
+    int input_fd; /* > 0: the program's standard input; the caller sets it and keeps it; 0: none */
     int talk_fd;  /* memory file with the program's standard output and error; -1: none */
     /* Set by the caller: the program's memory comes in huge pages, if the C library can do that. */
     bool has_large_arrays;

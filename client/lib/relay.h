@@ -20,7 +20,7 @@ struct fl_relay {
 enum fl_relay_verdict {
     FL_RELAY_FORWARD, /* pass to the daemon, as *request */
     FL_RELAY_LOCAL,   /* meant for the client */
-    FL_RELAY_REFUSE,  /* not allowed: *error says what; the importer must be ended */
+    FL_RELAY_REFUSE,  /* not allowed: *error has the reason; the importer must be ended */
 };
 
 /* May change message->edit_begin.scene to the daemon's number. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Scenes of a connection, and what a loaded one has. */
+/* Scenes of a connection, and the contents of a loaded one. */
 #include "lib/scene.h"
 #include "lib/text.h"
 

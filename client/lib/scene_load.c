@@ -300,7 +300,7 @@ static void adopt_callbacks(struct fl_importer *importer, const struct fl_load_o
     importer->options.sharing = options->sharing;
     importer->options.scene_name = options->scene_name;
     importer->options.will_reload = options->will_reload;
-    importer->begin_ns = monotonic_now_ns(); /* `load_ns` is what the caller waits */
+    importer->begin_ns = monotonic_now_ns(); /* `load_ns` is the caller's waiting time */
 }
 
 /* Moves the import's results into the scene, in place of an earlier import's. */

@@ -11,7 +11,7 @@ bool cli_job_complete(struct cli_job *job, bool is_series);
 /* Completes the settings of a window, which has no output. */
 bool cli_job_complete_view(struct cli_job *job);
 bool cli_writes_to_stdout(const struct cli_job *job);
-/* Shows a ground beneath models that bring no light, in pictures to look at, unless a camera of theirs is used. */
+/* Shows a ground beneath models without lights, in pictures for viewing, unless a camera of theirs is used. */
 void cli_choose_ground(const struct cli_job *job, struct message_render *render, const struct fl_scene *scene);
 /* A camera by name or number; without one the model's first, unless keys or something else place it. `framed`: the
  * node that is to be in view, name or number; NULL: all. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Actions of the user or of a replay: keys, clips, cameras and what is under the pointer. */
+/* Actions of the user or of a replay: keys, clips, cameras and the object under the pointer. */
 #include "state.h"
 #include "protocol/common/clock.h"
 
@@ -51,7 +51,7 @@ static void next_camera(struct viewer *viewer, int step)
     view->tasks.next = TASK_CAMERA;
 }
 
-/* Starts a query for what is under the pointer. */
+/* Starts a query for the object under the pointer. */
 static void point(struct viewer *viewer, enum view_task task)
 {
     struct view *view = &viewer->view;
@@ -260,7 +260,7 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
     const struct editor *edit = &viewer->edit;
     while (viewer->replaying.next < viewer->replaying.events.count && view->failure.code == FL_ERROR_NONE) {
         const struct replay_event *event = &viewer->replaying.events.events[viewer->replaying.next];
-        /* An event after an edit or a reload waits until that is done, but a drag goes on. */
+        /* An event after an edit or a reload waits until that is done, but a drag continues. */
         if (session_reads(view->session))
             return;
         if ((edit->works || edit->choice.has_pending) && !(edit->choice.dragging && event->kind == REPLAY_INPUT))

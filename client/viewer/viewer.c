@@ -115,7 +115,7 @@ static void begin_showing(struct viewer *viewer)
 
 /* ---- the loop ---- */
 
-/* Advances what moves without input: the tour and glides. */
+/* Advances motion without input: the tour and glides. */
 static void tick(struct viewer *viewer, uint64_t now_ns)
 {
     struct view *view = &viewer->view;

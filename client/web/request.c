@@ -133,7 +133,7 @@ static bool read_change(const char *field, json_t *values, struct fl_assignment 
     if (strlen(field) >= sizeof(wanted->field))
         return refuse(error, "edit.field", "there is no such field");
     memcpy(wanted->field, field, strlen(field) + 1);
-    const size_t count = json_array_size(values); /* 0 of what is no array */
+    const size_t count = json_array_size(values); /* 0 if `values` is no array */
     if (count < 1 || count > FL_FIELD_VALUES_MAX)
         return refuse(error, "edit.values", "no field has this many values");
     wanted->way = FL_ASSIGN;

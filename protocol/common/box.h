@@ -6,9 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-/* The box around what the matrix (3x4, row-major) makes of a box, in its place.
- *
- * Arvo. Transforming Axis-Aligned Bounding Boxes (Graphics Gems, 1990). */
+/* Replaces a box by the box around its image under the matrix (3x4, row-major).  Arvo. Transforming Axis-
+ * Aligned Bounding Boxes (Graphics Gems, 1990). */
 static inline void box_transform(const float matrix[12], double lower[3], double upper[3])
 {
     double low[3], high[3];

@@ -30,7 +30,7 @@ struct aside;
 
 /* `on_done` is called on a thread of the pool after each. NULL and *error: no memory, or no thread. */
 struct aside *aside_create(void (*on_done)(void *context), void *context, struct error *error);
-/* Abandons what is not finished and waits for that. Accepts NULL. */
+/* Abandons unfinished tasks and waits for their end. Accepts NULL. */
 void aside_destroy(struct aside *aside);
 
 void aside_submit(struct aside *aside, struct aside_commit *commit);

@@ -295,7 +295,7 @@ void engine_destroy(struct engine *engine)
     if (!engine)
         return;
     atomic_store(&engine->stop, true);
-    /* Threads that wait on a queue continue, and what they push is dropped. */
+    /* Threads that wait on a queue continue, and their later entries are dropped. */
     if (engine->commands)
         queue_close(engine->commands);
     if (engine->events)

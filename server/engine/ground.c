@@ -9,7 +9,8 @@
 /* Radius in diagonals of the scene: a sun 1 degree above the horizon casts shadows 57 times as long as things are
  * high. */
 #define RADIUS 64.0
-/* Distance below the lowest point, in diagonals: a floor of the model's own lies on it, and no ray can tell. */
+/* Distance below the lowest point, in diagonals: a floor of the model's own lies on the ground, and the
+ * difference is invisible. */
 #define DEPTH (1.0 / 8192.0)
 
 static double job_end_s(const struct engine_job *job, const struct scene *scene)

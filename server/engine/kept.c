@@ -8,8 +8,8 @@
  * one. */
 #define PAUSE_NS UINT64_C(1000000000)
 #define PAUSE_OF_READ 20
-/* Time for saves at the end, since clients were told that their changes are made: a daemon that is told to stop
- * ends within a second. */
+/* Time for saves at the end, as clients have got answers that their changes are made: a daemon that is asked
+ * to stop ends within a second. */
 #define STOP_NS UINT64_C(800000000)
 
 static bool has_news(const struct engine_scene *scene)

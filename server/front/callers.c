@@ -13,7 +13,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Places beyond limits.clients for the daemon's own user and for root, who can always look at it. */
+/* Places beyond limits.clients for the daemon's own user and for root, so that these can always see its
+ * state. */
 #define PLACES_AT_HOME 4u
 
 struct source {
@@ -77,8 +78,8 @@ static bool may_be_turned_away(const struct caller *caller, const struct source 
     return caller->source == source && (caller->connection->state == CONNECTION_WRONG_KEY || !has_wrong_key);
 }
 
-/* Closes a random caller of the source: a client that takes every place loses its own, and cannot tell which.
- * Callers that are known to have a wrong key go first. */
+/* Closes a random caller of the source: a client that takes every place loses one of its own, and does not
+ * know which. Callers that are known to have a wrong key go first. */
 static void turn_one_away(struct front *front, const struct source *source)
 {
     uint32_t wrong = 0;
@@ -121,7 +122,7 @@ static uint64_t on_seal_wait_ns(void *context)
 {
     const struct caller *caller = context;
     struct front *front = caller->front;
-    /* Unix peers have no address by which they could be told apart. */
+    /* Unix peers have no address that distinguishes them. */
     return address_is_unix(&caller->peer)
                ? 0
                : attempts_wait_ns(&front->attempts, address_network(&caller->peer),

@@ -177,7 +177,7 @@ static void on_stop_timer(void *context)
     workers_kill(context);
 }
 
-/* systemd's notify-reload requires the time, to tell this answer from one to an earlier signal. */
+/* systemd's notify-reload requires the time, to distinguish this answer from one to an earlier signal. */
 static void reload(struct front *front)
 {
     char state[64];
@@ -325,8 +325,8 @@ static bool watch_all_listeners(struct front *front, struct error *error)
     return true;
 }
 
-/* Starts the workers of owners who have kept scenes; with none, a worker that belongs to nobody yet, so that the
- * device is tried and the first user need not wait. */
+/* Starts the workers of owners with kept scenes; without any, a worker that belongs to nobody yet, so that
+ * the device is tried and the first user need not wait. */
 static bool start_workers(struct front *front, struct error *error)
 {
     const struct front_options *options = &front->options;

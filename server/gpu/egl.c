@@ -8,8 +8,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Keeps the driver loaded: Mesa's maps 10 MiB for code once it is used, and leaves them when it is unloaded. Leaks
- * of a driver are told from ours by its name, too, which only a loaded one has. */
+/* Keeps the driver loaded: Mesa's maps 10 MiB for code once it is used, and leaves them when it is unloaded.
+ * Leak reports also recognise a driver by its name, which only a loaded one has. */
 static int pin_driver(struct dl_phdr_info *info, size_t size, void *data)
 {
     (void)size, (void)data;

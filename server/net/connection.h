@@ -126,7 +126,7 @@ struct connection *connection_create(struct loop *loop, int fd, const struct con
  * queued. `message` was read from it already, and is to be read first; NULL: none. False: out of memory. */
 bool connection_save(const struct connection *connection, const uint8_t *message, size_t message_bytes,
                      struct connection_saved *saved);
-/* Tells a client whose hello has arrived why it is refused, and closes. */
+/* Refuses a client whose hello has arrived, with the reason, and closes. */
 void connection_refuse(struct connection *connection, const char *text, uint64_t capabilities);
 
 /* Sends a control message. False, with a line in the log: it cannot be encoded, or the connection is closing. */

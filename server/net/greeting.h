@@ -11,7 +11,8 @@ struct connection;
 /* Processes the bytes so far. A whole hello is answered; then the connection is open, or about to close if the
  * client was refused. */
 void greeting_process(struct connection *connection);
-/* Tells a client from which nothing was read why it is refused, as far as the kernel accepts the bytes at once. */
+/* Sends the reason for its refusal to a client of which nothing was read, as far as the kernel accepts the
+ * bytes at once. */
 void greeting_turn_away(int fd, const char *why, uint64_t capabilities);
 /* Reserves space for messages of any size, if there is none yet. False: out of memory. */
 bool greeting_reserve_input(struct connection *connection);

@@ -37,7 +37,7 @@ struct daemon {
 void daemon_block_signals(void);
 /* Zeroes it. */
 void daemon_init(struct daemon *daemon);
-/* Makes loop and hub. On failure daemon_finish() takes down what was begun. */
+/* Makes loop and hub. After a failure daemon_finish() releases whatever was made. */
 bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error);
 /* Serves the client at this connected socket; the daemon ends with it. Takes over the descriptor when it succeeds.
  */

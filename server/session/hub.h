@@ -60,7 +60,7 @@ struct hub {
     /* Commands that did not fit the engine's queue, in order. */
     struct engine_command *waiting, **waiting_end;
     size_t waiting_count;
-    bool held; /* whether so many wait that clients are not read from */
+    bool held; /* whether so many wait that nothing is read from clients */
     struct loop_timer retry_timer;
 };
 

@@ -52,8 +52,8 @@ struct session {
 /* Creates the session of a client; see hub_add_client(). */
 struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct handover *handover,
                                struct error *error);
-/* Moves the client to another worker, which reads `message` first. False: it cannot move, as it has more than this
- * one request, or does not read what it is sent; nothing is changed. */
+/* Moves the client to another worker, which reads `message` first. False: it cannot move, as it has more than
+ * this one request, or does not read its messages; nothing is changed. */
 bool session_move(struct session *session, uint32_t worker, uint32_t request, const struct message *message);
 /* Disconnects the client if its key is no longer one of the daemon's. */
 void session_check_key(struct session *session);

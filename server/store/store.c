@@ -267,7 +267,7 @@ static bool is_what_was_written(const uint8_t *bytes, size_t size_bytes)
     return memcmp(hash, bytes + MAGIC_BYTES, BLOB_HASH_BYTES) == 0;
 }
 
-/* Parses a whole file; *entry is not in the list. False: it is not what was written. */
+/* Parses a whole file; *entry is not in the list. False: it is damaged. */
 static bool parse_record(struct store *store, const uint8_t name[STORE_NAME_BYTES], const uint8_t *bytes,
                          size_t size_bytes, struct entry **entry)
 {

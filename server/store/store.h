@@ -54,12 +54,12 @@ void store_remove(struct store *store, const uint8_t name[STORE_NAME_BYTES]);
 /* Lists the names of all records, the oldest first: an array to free(). NULL: out of memory. */
 uint8_t (*store_names(struct store *store, size_t *count))[STORE_NAME_BYTES];
 /* Reads a record without its blobs, and marks it: if the process ends before store_tried(), the next one will
- * skip it. False and *error: it does not exist, or is not what was written. */
+ * skip it. False and *error: it does not exist, or is damaged. */
 bool store_try(struct store *store, const uint8_t name[STORE_NAME_BYTES], struct store_record *record,
                struct error *error);
 void store_tried(struct store *store, const uint8_t name[STORE_NAME_BYTES]);
-/* Reads a blob and verifies it; the reference is the caller's. NULL and *error: it does not exist, or is not
- * what was written. */
+/* Reads a blob and verifies it; the reference is the caller's. NULL and *error: it does not exist, or is
+ * damaged. */
 struct blob *store_read_blob(struct store *store, const uint8_t hash[BLOB_HASH_BYTES], uint64_t size_bytes,
                              struct error *error);
 

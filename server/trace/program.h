@@ -12,7 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define TRACE_DEPTH_BYTES 16u /* per ray, where rays go on from one dispatch to the next (RAYS_GO_ON) */
+#define TRACE_DEPTH_BYTES 16u /* per ray, if rays continue from one dispatch to the next (RAYS_GO_ON) */
 
 #define TRACE_RAYS_MULTIPLE 192u /* a multiple of every packet size */
 /* Rays of a dispatch that fill any GPU; more of them come near the time after which a driver ends a dispatch. */

@@ -155,7 +155,7 @@ struct tracer_impl {
      * counts, the second adds rows from the copy, and waits for no more than that. Both NULL: none. */
     bool (*state_copy_counts)(struct trace_state *state, struct error *error);
     bool (*state_report)(struct trace_state *state, struct structure_rows *rows, struct error *error);
-    /* Begins state->wave: decides what holds for the whole wave. NULL: nothing to do. */
+    /* Begins state->wave: makes the decisions for the whole wave. NULL: there are none. */
     bool (*trace_begin)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                         struct error *error);
     /* Exactly one of trace_range and trace_step finds the intersections (shared/hit.h) or visibilities of
@@ -205,7 +205,7 @@ struct tracer_impl {
 
 /* Implementations by the protocol's tracer number; NULL where this build leaves one out. */
 const struct tracer_impl *tracer_impl_by_number(unsigned number);
-/* Finds an implementation by number; if there is none, ERROR_UNSUPPORTED says why and what can be done. */
+/* Finds an implementation by number; if there is none, ERROR_UNSUPPORTED with the reason and the remedy. */
 const struct tracer_impl *tracer_find(unsigned number, const char *field, struct error *error);
 
 /* Whether the tracer can show motion while the shutter is open, if there is any; otherwise ERROR_UNSUPPORTED. */

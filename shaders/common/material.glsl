@@ -366,7 +366,7 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
         apply_textures(s, colour, h, m, uv01, detail.footprint);
 #endif
 #ifdef NO_GLASS
-    s.transmission = 0.0; // already 0: tells the compiler so
+    s.transmission = 0.0; // already 0: lets the compiler know
 #endif
     s.base = clamp(colour.rgb, vec3(0.0), vec3(1.0));
     s.alpha = 1.0;

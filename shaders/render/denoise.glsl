@@ -20,7 +20,7 @@ struct halves {
 
 struct guide {
     vec3 normal;    // mean of the samples' unit normals: shorter where they see several surfaces
-    float share;    // share of mirrors and glass in what is seen
+    float share;    // share of mirrors and glass in the colour
     float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth; 0: nothing
     float tone;     // square root of the albedo's luminance, up to 1
 };

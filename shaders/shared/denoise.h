@@ -13,13 +13,13 @@
 #else
 #define DENOISE_NOTE_TEXELS 2u
 #endif
-#define DENOISE_SAYS 1u      /* the sample has a guide; 0: it went another way than most samples of its pixel */
+#define DENOISE_SAYS 1u      /* the sample has a guide; 0: it took another way than most samples of its pixel */
 #define DENOISE_MIRRORS 2u   /* most of the light at that place is seen in a smooth mirror; */
 #define DENOISE_PASSES 4u    /* or through glass */
 #define DENOISE_WAVES_MAX 3u /* bounces that are followed: into glass, out of it, and to the surface behind */
 /* Share of the light that must go one way for that way to be followed. */
 #define DENOISE_MOST 0.75f
-/* Weight of samples that went another way. */
+/* Weight of samples that took another way. */
 #define DENOISE_WHISPER (1.0f / 4096.0f)
 /* Stands for a motion that is not known. */
 #define DENOISE_ANEW 1e30f

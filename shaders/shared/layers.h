@@ -51,7 +51,7 @@
  * rays that go straight on, a uvec4 per sample in each: instance of a hit, material with its HIT bits, bits of
  * the share, 0. Share 0: nothing. */
 #define BIND_COVERS BIND_PASS_4
-#define COVERS_MAX 8u   /* waves; behind so many blended surfaces little light is left */
+#define COVERS_MAX 8u   /* waves; behind this number of blended surfaces little light is left */
 #define CRYPTO_PLANES 3 /* per kind, with two identifiers each */
 
 /* Places of an instance a frame earlier and a frame later; a storage buffer, in the order of the instances. The

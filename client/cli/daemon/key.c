@@ -13,7 +13,7 @@
 
 struct key_options {
     const char *path;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds the error of the arguments */
 };
 
 static error_t parse(int key, char *value, struct argp_state *state)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A daemon's state in Prometheus' text format, version 0.0.4. Names follow its conventions: base units, `_total`
- * for what only grows. Clients and scenes are counted, not named, as each name would be a time series of its own.
- */
+/* A daemon's state in Prometheus' text format, version 0.0.4. Names follow its conventions: base units,
+ * `_total` for counters. Clients and scenes are counted, not named, as each name would be a time series of
+ * its own. */
 #ifndef FARLIGHT_CLI_DAEMON_METRICS_H
 #define FARLIGHT_CLI_DAEMON_METRICS_H
 

@@ -19,7 +19,7 @@ struct merging {
     const char *output;
     bool parents;
     struct fl_merge_options wanted;
-    struct cli_job job; /* holds the error of what was typed */
+    struct cli_job job; /* holds the error of the arguments */
 };
 
 static const struct argp_option options[] = {

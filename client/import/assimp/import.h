@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The reader of library.h's formats: see model/scene.h for what readers promise. */
+/* The reader of library.h's formats: model/scene.h has the duties of readers. */
 #ifndef FARLIGHT_IMPORT_ASSIMP_IMPORT_H
 #define FARLIGHT_IMPORT_ASSIMP_IMPORT_H
 

@@ -48,8 +48,8 @@ std::string mend_binary(reader &r, const unsigned char *bytes, size_t size_bytes
     return out;
 }
 
-// The corners of text whose words are not those that the library looks for: other letters, or no facets around
-// them. Three make a triangle, whose normal is found later.
+// The corners of text whose words the library does not recognise: other letters, or no facets around them. Three
+// make a triangle, whose normal is found later.
 std::string from_corners(const unsigned char *bytes, size_t size_bytes)
 {
     const char *const end = reinterpret_cast<const char *>(bytes) + size_bytes, word[] = "vertex";

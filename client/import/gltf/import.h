@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The reader of glTF 2.0, JSON or binary: see model/scene.h for what readers promise. */
+/* The reader of glTF 2.0, JSON or binary: model/scene.h has the duties of readers. */
 #ifndef FARLIGHT_IMPORT_GLTF_IMPORT_H
 #define FARLIGHT_IMPORT_GLTF_IMPORT_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The reader of the Neutral File Format of the Standard Procedural Databases: see model/scene.h for what readers
- * promise. */
+/* The reader of the Neutral File Format of the Standard Procedural Databases: model/scene.h has the duties of
+ * readers. */
 #ifndef FARLIGHT_IMPORT_NFF_IMPORT_H
 #define FARLIGHT_IMPORT_NFF_IMPORT_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The reader of Wavefront OBJ with its MTL files: see model/scene.h for what readers promise. */
+/* The reader of Wavefront OBJ with its MTL files: model/scene.h has the duties of readers. */
 #ifndef FARLIGHT_IMPORT_OBJ_IMPORT_H
 #define FARLIGHT_IMPORT_OBJ_IMPORT_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The reader of the 3D Manufacturing Format: see model/scene.h for what readers promise. */
+/* The reader of the 3D Manufacturing Format: model/scene.h has the duties of readers. */
 #ifndef FARLIGHT_IMPORT_THREEMF_IMPORT_H
 #define FARLIGHT_IMPORT_THREEMF_IMPORT_H
 

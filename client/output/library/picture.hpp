@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: MIT
-// An image file as floats, as it is stored; and what a screen shows of it.
+// An image file as floats, as stored; and its display values.
 #pragma once
 
 #include "output/library.h"
@@ -44,14 +43,14 @@ struct picture {
 // Floats of these dimensions, zero. Throws std::bad_alloc.
 OIIO::ImageBuf make_plane(int width, int height, int channels);
 
-// Decodes EXR, HDR, PNG or JPEG, known by their first bytes; what the header claims is checked before a pixel is
-// read. False: `reason` says why.
+// Decodes EXR, HDR, PNG or JPEG, known by their first bytes; the claims of the header are checked before a pixel
+// is read. False: `reason` says why.
 bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made, std::string &reason);
 // Leaves the colours alone.
 void picture_drop_alpha(struct picture &picture);
 
-// The colours, alpha aside, become what a PNG of the renderer holds: divided by alpha, through the tone map and
-// the sRGB curve. Does nothing to a picture that is not linear.
+// The colours, alpha aside, become those of a PNG of the renderer: divided by alpha, through the tone map and the
+// sRGB curve. Does nothing to a picture that is not linear.
 void picture_to_screen(struct picture &picture, enum protocol_tone_map tone_map);
-// Red, green and blue of what a screen shows, 0 to 1.
+// Red, green and blue of the display values, 0 to 1.
 OIIO::ImageBuf picture_screen_colours(const struct picture &picture, enum protocol_tone_map tone_map);

@@ -201,7 +201,7 @@ static bool same_camera(const struct view *view)
     return same;
 }
 
-/* The last frame already shows what the camera sees. */
+/* The last frame already shows the newest camera. */
 static bool is_newest(const struct view *view)
 {
     const bool is_asked = view->frames.last.command == view->sent.command && !view->sent.must_send_camera;

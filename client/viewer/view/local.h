@@ -30,7 +30,7 @@ struct view_local {
 bool view_has_local(const struct view *view); /* views are made while the camera moves */
 /* Decides after a frame whether views are made while the camera moves. */
 void view_plan_local(struct view *view, uint64_t now_ns);
-/* Adds to a view request what warping needs: depths, margin and hidden layers. */
+/* Adds the fields for warping to a view request: depths, margin and hidden layers. */
 void view_ask_local(struct view *view, struct message_render *render);
 bool view_asks_otherwise(const struct view *view); /* the view needs another request than the last one */
 /* Turns off what may be the reason for the daemon's refusal of the view. */

@@ -16,7 +16,7 @@ struct abuffer_builder;
 
 struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct error *error);
 void abuffer_builder_destroy(struct abuffer_builder *builder); /* accepts NULL */
-/* Frees what it keeps from build to build. No build may be in progress. */
+/* Frees the buffers that it keeps between builds. No build may be in progress. */
 void abuffer_builder_clear(struct abuffer_builder *builder);
 uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Sorts long lists on the host: a loop over more than ABUFFER_LIST_MAX samples would be cut short on some
- * devices. Few texels, if any, have so many. */
+ * devices. Few texels, if any, have such lists. */
 #include "trace/abuffer/build_state.h"
 
 #include <stdlib.h>

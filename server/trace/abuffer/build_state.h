@@ -61,8 +61,8 @@ struct abuffer_builder {
 #define ABUFFER_SUM_BYTES 16
 #define ABUFFER_SUBVOXELS_BYTES (8 * ABUFFER_SUBVOXELS_TEXELS) /* per voxel */
 
-/* Functions of a stage. begin counts its items and reserves its output; run does some items, after it has made
- * all its bindings; end reads what they gave. */
+/* Functions of a stage. begin counts its items and reserves its output; run does some items, after it has
+ * made all its bindings; end reads their results. */
 typedef bool abuffer_stage_begin(struct abuffer_task *task, uint32_t *items, struct error *error);
 typedef bool abuffer_stage_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error);
 /* Returns how many of the next items make a unit no longer than others, at least one. */
@@ -75,7 +75,7 @@ abuffer_stage_begin abuffer_clear_begin, abuffer_draw_begin, abuffer_occupied_be
 abuffer_stage_run abuffer_clear_run, abuffer_draw_run, abuffer_occupied_run;
 abuffer_stage_fit abuffer_draw_fit;
 abuffer_stage_end abuffer_occupied_end;
-/* build_lists.c: whether the options allow so many texels, empty ones included. */
+/* build_lists.c: whether the options allow this number of texels, empty ones included. */
 bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error);
 /* build_lists.c: reserves lists for a first pass. */
 bool abuffer_lists_reserve(struct abuffer_task *task, struct error *error);

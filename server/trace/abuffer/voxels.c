@@ -22,7 +22,7 @@ bool abuffer_voxels_reserve(struct abuffer_store *store, struct error *error)
     return gpu_buffer_reserve(store->device, &store->voxels, texels * TEXEL_BYTES, error);
 }
 
-/* Turns the sums of each voxel's samples into what a ray needs to know of it. */
+/* Turns the sums of each voxel's samples into the data that traversal needs. */
 static bool judge(struct abuffer_store *store, uint32_t first, uint32_t end, struct error *error)
 {
     const struct gpu_program_source source = {.compute = "abuffer/voxels.comp"};

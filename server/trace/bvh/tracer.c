@@ -213,7 +213,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
     if (scene_tree_only_instance(&bvh->tree) != BVH_NONE)
         defines[n++] = (struct gpu_define){"BVH_ONE_INSTANCE", "1"};
-    /* A common origin in the world becomes many in the object spaces of what moves. */
+    /* A common origin in the world becomes many in the object spaces of moving instances. */
     if (wave->shared_origin && packet_rays > 1 && !scene->has_motion)
         defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
     if (bvh->tree.store.deforms)

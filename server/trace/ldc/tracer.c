@@ -214,7 +214,7 @@ static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene
     if (!ldc_parts_update(&ldc->parts, scene, &settings, changed & CHANGED_GEOMETRY, ldc->stale, error))
         return TRACER_FAILED;
     for (unsigned i = 0; i < LDC_CUBES_MAX; i++) {
-        any = any || ldc->stale[i]; /* building a cube overwrites what lies behind it */
+        any = any || ldc->stale[i]; /* building a cube overwrites the cubes behind it */
         ldc->stale[i] = any;
     }
     ldc->which = 0;

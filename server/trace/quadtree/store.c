@@ -113,8 +113,9 @@ static uint32_t cube_texels(const struct trace_view *view, const struct quadtree
  * texel. */
 #define ERROR_TO_PRIMITIVES (1.0f / 64.0f)
 
-/* The error of w that moves what an eye within the radius sees by the allowed number of pixels: e / (f R), as a
- * difference of 1 / Z. An orthographic view has no parallax; there the error is a depth of so many pixels. */
+/* The error of w that displaces surfaces, seen by an eye within the radius, by the allowed number of pixels:
+ * e / (f R), as a difference of 1 / Z. An orthographic view has no parallax; there the error is that of a
+ * depth of as many pixels. */
 static float error_of_w(const struct quadtree_uniforms *u, const struct trace_view *view,
                         const struct quadtree_settings *settings)
 {
@@ -132,7 +133,7 @@ static float diagonal_of(const struct gpu_scene *scene)
 static void place_depths(struct quadtree_uniforms *u, const struct gpu_scene *scene, const struct trace_view *view)
 {
     const bool orthographic = view->fov_y == 0.0f && u->faces == 1;
-    /* A mirror may show what the picture's near plane cuts off. */
+    /* A mirror may show surfaces that the picture's near plane cuts off. */
     const float near = raster_near(scene, u->faces == 1 ? view->near : 0.0f, orthographic);
     u->depths[0] = orthographic ? near : fmaxf(diagonal_of(scene) * UNIT_OF_DIAGONAL, 1e-6f);
     u->depths[1] = fmaxf(far_distance(scene, u->eye_world, orthographic), 2.0f * near);

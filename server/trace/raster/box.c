@@ -6,7 +6,7 @@
 
 /* Maximum coordinate: squares of the lengths in a larger box, which traversals compute, would overflow a float. */
 #define PLACE_MAX 1e18
-/* Minimum of a cell relative to a coordinate: a smaller one could not be told from its neighbours, as positions
+/* Minimum of a cell relative to a coordinate: neighbours of a smaller one would have equal positions, which
  * are floats. */
 #define CELL_RELATIVE_MIN 0x1p-22
 #define CELL_MIN 1e-12 /* metres; keeps squares of cells well above zero, too */

@@ -10,9 +10,9 @@
 
 #include <stdint.h>
 
-/* Finds where primitives first .. end - 1 (at least one) begin to cover more than `maximum` texels of the three
- * images together. Returns the end of those before, at least one. *texels: about what they cover; deforming
- * meshes count at rest. */
+/* Finds the first primitive of first .. end - 1 (at least one) with which more than `maximum` texels of the
+ * three images together are covered. Returns the end of those before, at least one. *texels: an estimate of
+ * their texels; deforming meshes count at rest. */
 uint32_t axes_cover_end(const struct axes_draw *draw, const struct gpu_scene *scene, float cell_world,
                         uint32_t first, uint32_t end, double maximum, double *texels);
 

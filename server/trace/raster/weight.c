@@ -115,7 +115,7 @@ float raster_pixels_of_run(const struct raster_sight *sight, uint32_t run)
                         .area = own->area * sight->scale * sight->scale * sight->swelling};
     float centre[3];
     memcpy(centre, own->centre, sizeof(centre));
-    if (geometry->node) { /* a run of what deforms may be anywhere in the bounds */
+    if (geometry->node) { /* a run of a deforming mesh may be anywhere in the bounds */
         for (int k = 0; k < 3; k++)
             centre[k] = 0.5f * (geometry->lower[k] + geometry->upper[k]);
         ball.radius = 0.5f * sqrtf(diagonal_squared(geometry->lower, geometry->upper)) * sight->scale;

@@ -135,7 +135,7 @@ static uint32_t reserved_of(const struct rayspace_state *state)
     return at_most(PAIRS_RESERVED, state->capacity / 4);
 }
 
-/* Pairs of a pass, or items of a batch: the last waves of the family needed so many halvings. */
+/* Pairs of a pass, or items of a batch, after the halvings that the last waves of the family needed. */
 static uint32_t batch_of(const struct rayspace_state *state, uint32_t maximum)
 {
     const uint32_t batch = maximum >> state->halved[state->base.wave.family];

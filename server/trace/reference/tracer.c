@@ -47,8 +47,8 @@ bool reference_check(struct reference *reference, const char *what, struct error
     return error_set(error, kind, NULL, "Embree, %s: %s (error %d)", what, reference->failure_text, (int)code);
 }
 
-/* Embree's memory counts as the device's: it is what this tracer keeps in place of buffers. Called before (or,
- * with `post`, after) an allocation, on any thread. */
+/* Embree's memory counts as the device's, as this tracer has no buffers. Called before (or, with `post`,
+ * after) an allocation, on any thread. */
 static bool count_memory(void *context, ssize_t bytes, bool post)
 {
     struct reference *reference = context;
@@ -213,7 +213,7 @@ static bool reference_waits(struct tracer *tracer)
 
 static enum tracer_progress fail(struct reference *reference)
 {
-    struct error second = {0}; /* repeats what the first one says */
+    struct error second = {0}; /* would repeat the first one */
     reference_scene_finish(reference);
     book_memory(reference, &second);
     return TRACER_FAILED;

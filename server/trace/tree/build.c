@@ -164,7 +164,7 @@ static void move_piece(void *context, uint32_t piece)
          cut->range->end - 1 - (begin - left), &cut->split);
 }
 
-/* Does with all threads what move() does with the whole range. */
+/* Does move() of the whole range with all threads. */
 static uint32_t move_together(struct cut *cut)
 {
     const uint32_t pieces = bvh_piece_count(size_of(cut->range));
