@@ -44,7 +44,7 @@ static inline struct blob *fixture_blob(const void *data, size_t size_bytes)
     return blob;
 }
 
-static inline void fixture_set_camera(struct fixture *fixture, float x, float y, float z, float fov_y)
+static inline void fixture_look(struct fixture *fixture, float x, float y, float z, float fov_y)
 {
     const float eye[3] = {x, y, z}, target[3] = {0.0f, 0.0f, 0.0f};
     const float up[3] = {0.0f, x == 0.0f && z == 0.0f ? 0.0f : 1.0f, x == 0.0f && z == 0.0f ? -1.0f : 0.0f};

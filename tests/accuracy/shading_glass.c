@@ -168,12 +168,12 @@ TEST(light_is_totally_reflected_inside_glass)
     fixture_environment(fixture, 1.0f, 0.5f, 0.25f);
     fixture->request.picture.width = fixture->request.picture.height = 9;
     /* from behind the square, which is inside; the critical angle is 41.8 degrees */
-    fixture_set_camera(fixture, 5.0f * (float)sin(0.9), 0.0f, -5.0f * (float)cos(0.9), 0.01f);
+    fixture_look(fixture, 5.0f * (float)sin(0.9), 0.0f, -5.0f * (float)cos(0.9), 0.01f);
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.secondary_rays, 9 * 9);
     assert_near(fixture_pixel(&result, 4, 4)[1], 0.5, 1e-5);
     frame_result_finish(&result);
-    fixture_set_camera(fixture, 5.0f * (float)sin(0.5), 0.0f, -5.0f * (float)cos(0.5), 0.01f);
+    fixture_look(fixture, 5.0f * (float)sin(0.5), 0.0f, -5.0f * (float)cos(0.5), 0.01f);
     result = fixture_render(fixture);
     assert_int_equal(result.secondary_rays, 2 * 9 * 9);
     frame_result_finish(&result);
@@ -247,7 +247,7 @@ TEST(a_pane_of_glass_shares_light_out_as_the_series_of_its_reflections)
                 fixture->request.picture.width = fixture->request.picture.height = 3;
                 fixture->request.light.depth = depth;
                 double angle = slant * PI / 180.0;
-                fixture_set_camera(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
+                fixture_look(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
                 struct frame_result result = fixture_render(fixture);
                 double expected = pane_series(fresnel(cos(angle), 2.4), depth, through);
                 worst = fmax(worst, fabs((double)fixture_pixel(&result, 1, 1)[0] - expected));
