@@ -74,7 +74,7 @@ static struct job *replaced_by(struct engine *engine, const struct engine_comman
 {
     for (size_t i = 0; command->job.kind == JOB_VIEW && i < engine->job_count; i++) {
         struct job *job = engine->jobs[i];
-        if (job->spec.wishes == command->job.wishes && !job_output_is_closed(job->output))
+        if (job->spec.mailbox == command->job.mailbox && !job_output_is_closed(job->output))
             return job;
     }
     return NULL;
@@ -110,7 +110,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
     job->spec = command->job;
     command->job.keys = NULL;
     command->job.clips = NULL;
-    command->job.wishes = NULL;
+    command->job.mailbox = NULL;
     job->reference = reference;
     job->scene = reference->scene;
     job->output = output;
@@ -176,7 +176,7 @@ static void job_remove(struct engine *engine, struct job *job)
     encode_lane_unref(job->view.lane);
     free(job->spec.keys);
     free(job->spec.clips);
-    view_wishes_unref(job->spec.wishes);
+    view_mailbox_unref(job->spec.mailbox);
     free(job);
 }
 

@@ -28,7 +28,7 @@ void engine_command_destroy(struct engine_command *command)
     engine_command_release_edits(command);
     free(command->job.keys);
     free(command->job.clips);
-    view_wishes_unref(command->job.wishes);
+    view_mailbox_unref(command->job.mailbox);
     free(command);
 }
 
@@ -429,7 +429,7 @@ void engine_handle(struct engine *engine, struct engine_command *command)
         job_cancel(engine, command);
         break;
     case ENGINE_VIEW_CHANGED:
-        break; /* the command only wakes the thread, which then reads the latest wishes of each view */
+        break; /* the command only wakes the thread, which then reads the latest requests of each view */
     case ENGINE_STATS:
         report_stats(engine, command);
         break;

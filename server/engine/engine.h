@@ -23,7 +23,7 @@
 
 struct engine;
 struct engine_backend;
-struct view_wishes;
+struct view_mailbox;
 
 #define ENGINE_LINGERING_SCENES 16u                     /* default of lingering_scenes */
 #define ENGINE_FRAME_WINDOW_BYTES ((uint64_t)512 << 20) /* default of frame_window_bytes */
@@ -84,9 +84,9 @@ struct engine_job {
      * a batch renders as many frames as may be in flight and keeps them; a view begins none, so that none becomes
      * stale. */
     uint64_t credit;
-    /* A view's wishes, see engine/view_wishes.h; owned: a reference. The view replaces a view with the same
-     * wishes, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, continue. */
-    struct view_wishes *wishes;
+    /* A view's mailbox, see engine/view_mailbox.h; owned: a reference. The view replaces a view with the same
+     * mailbox, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, continue. */
+    struct view_mailbox *mailbox;
     unsigned weight; /* its share of the device's time among the jobs of all clients; 0: 1 */
 };
 
@@ -105,7 +105,7 @@ enum engine_command_kind {
     ENGINE_JOB_START,
     ENGINE_JOB_CREDIT, /* no answer */
     ENGINE_JOB_CANCEL, /* answered by ENGINE_DONE; the job's own request fails with ERROR_CANCELLED just before */
-    ENGINE_VIEW_CHANGED, /* a view's wishes have changed: wakes the engine; no answer */
+    ENGINE_VIEW_CHANGED, /* a view's requests have changed: wakes the engine; no answer */
     ENGINE_STATS,
     ENGINE_LIMITS,      /* new limits; a scene that is open keeps its limit of nodes. No answer */
     ENGINE_CLIENT_GONE, /* forgets its scenes and jobs; no answer, and no event for that client comes after

@@ -17,7 +17,7 @@
 #include "engine/scheduler.h"
 #include "engine/shot.h"
 #include "engine/totals.h"
-#include "engine/view_wishes.h"
+#include "engine/view_mailbox.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -86,7 +86,7 @@ struct view {
     bool shown_moving;
     uint32_t held_samples;
     /* Facts of the frame in progress. */
-    struct view_wish wish;
+    struct view_request latest;
     bool refining;               /* whether it only adds samples to the last picture */
     uint32_t margin_x, margin_y; /* pixels on each side */
     uint32_t hidden_layer;       /* layer of the frame in progress or the next one; 0: a picture */
@@ -270,7 +270,7 @@ void view_follow(struct job *job, const struct job *before);
 uint64_t view_due_ns(const struct job *job);
 /* Whether the view has changed since its last frame. */
 bool view_has_news(const struct job *job);
-/* Makes the shot of its next frame from the latest wishes. */
+/* Makes the shot of its next frame from the latest requests. */
 bool view_begin_frame(struct job *job, struct shot *shot, struct error *error);
 /* Planes that the encoder of the frame in progress will certainly accept. */
 enum ycbcr view_ycbcr(const struct job *job);

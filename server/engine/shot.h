@@ -5,7 +5,7 @@
 #define FARLIGHT_ENGINE_SHOT_H
 
 #include "engine/animation.h"
-#include "engine/view_wishes.h"
+#include "engine/view_mailbox.h"
 
 struct shot {
     struct frame_request request;

@@ -33,28 +33,28 @@ static bool adds_up(const struct job *job)
     return job->spec.frame.sampling.samples > job->spec.view.pass_samples;
 }
 
-/* Whether the wishes or the scene have changed since the last frame. */
-static bool has_news(const struct job *job, const struct view_wish *wish)
+/* Whether the requests or the scene have changed since the last frame. */
+static bool has_news(const struct job *job, const struct view_request *request)
 {
     const struct view *view = &job->view;
     /* A key frame that could not be finished is still requested. */
-    bool key_frame = wish->key_frame || view->wish.key_frame;
-    return !view->shown || wish->camera.command != view->shown_command || key_frame ||
+    bool key_frame = request->key_frame || view->latest.key_frame;
+    return !view->shown || request->camera.command != view->shown_command || key_frame ||
            job->scene->known.revision != view->shown_revision;
 }
 
 bool view_has_news(const struct job *job)
 {
-    struct view_wish wish = view_wishes_latest(job->spec.wishes);
-    return has_news(job, &wish);
+    struct view_request request = view_mailbox_latest(job->spec.mailbox);
+    return has_news(job, &request);
 }
 
 /* Whether a hidden layer of the last picture comes before the next picture. */
-static bool has_hidden(const struct job *job, const struct view_wish *wish)
+static bool has_hidden(const struct job *job, const struct view_request *request)
 {
     const struct view *view = &job->view;
     return view->hidden_layer > 0 && job->scene->known.revision == view->shown_revision &&
-           (view->hidden_is_paid || !has_news(job, wish));
+           (view->hidden_is_paid || !has_news(job, request));
 }
 
 /* Only a picture's first layer waits for a pause; the second follows it at once. */
@@ -84,10 +84,10 @@ static uint64_t encoder_due_ns(const struct job *job)
 
 uint64_t view_due_ns(const struct job *job)
 {
-    /* Always read: the engine is notified of the next wish only after it has read the last. */
-    struct view_wish wish = view_wishes_latest(job->spec.wishes);
-    const bool hidden = has_hidden(job, &wish);
-    if (job->view.made >= job->view.credit || !(hidden || has_news(job, &wish) || may_refine(job)))
+    /* Always read: the engine is notified of the next request only after it has read the last. */
+    struct view_request request = view_mailbox_latest(job->spec.mailbox);
+    const bool hidden = has_hidden(job, &request);
+    if (job->view.made >= job->view.credit || !(hidden || has_news(job, &request) || may_refine(job)))
         return UINT64_MAX;
     const uint64_t encoder_ns = encoder_due_ns(job);
     const uint64_t due_ns = hidden ? hidden_due_ns(&job->view) : job->view.due_ns;
@@ -105,7 +105,7 @@ static void set_due(struct job *job)
 /* Whether frames follow the link or the rate, which they do while the camera moves. */
 static bool adapts(const struct job *job)
 {
-    return (job->spec.view.adapt || job->spec.view.moving_rate > 0.0f) && job->view.wish.camera.moving;
+    return (job->spec.view.adapt || job->spec.view.moving_rate > 0.0f) && job->view.latest.camera.moving;
 }
 
 static uint32_t samples_of_next(const struct job *job)
@@ -114,8 +114,8 @@ static uint32_t samples_of_next(const struct job *job)
     uint32_t samples = job->spec.frame.sampling.samples;
     uint32_t wanted = view->refining ? samples - view->held_samples : samples;
     wanted = wanted < job->spec.view.pass_samples ? wanted : job->spec.view.pass_samples;
-    const bool limited = adapts(job) && view->wish.effort.samples > 0 && view->wish.effort.samples < wanted;
-    return limited ? view->wish.effort.samples : wanted;
+    const bool limited = adapts(job) && view->latest.effort.samples > 0 && view->latest.effort.samples < wanted;
+    return limited ? view->latest.effort.samples : wanted;
 }
 
 /* Frames while the camera moves, and the first ones at rest, reuse earlier frames of the same places; a frame that
@@ -123,7 +123,7 @@ static uint32_t samples_of_next(const struct job *job)
 static enum frame_history history_of(const struct job *job, uint32_t samples)
 {
     const struct view *view = &job->view;
-    if (view->wish.camera.moving)
+    if (view->latest.camera.moving)
         return HISTORY_MOVING;
     const uint32_t held = samples + (view->refining ? view->held_samples : 0);
     return held < job->spec.frame.sampling.samples ? HISTORY_USED : HISTORY_KEPT;
@@ -132,15 +132,14 @@ static enum frame_history history_of(const struct job *job, uint32_t samples)
 /* Bounces dropped so that the frame meets its deadline. */
 static uint32_t depth_less(const struct job *job)
 {
-    const uint32_t less = adapts(job) ? job->view.wish.effort.depth_less : 0;
+    const uint32_t less = adapts(job) ? job->view.latest.effort.depth_less : 0;
     return less < job->spec.frame.light.depth ? less : job->spec.frame.light.depth;
 }
 
 /* Reduces resolution and bounces while the camera moves, if the rate requires it. */
 static void apply_effort(const struct job *job, struct frame_request *request)
 {
-    const struct view_wish *wish = &job->view.wish;
-    uint32_t scale = wish->effort.scale_32nds;
+    uint32_t scale = job->view.latest.effort.scale_32nds;
     request->light.depth = job->spec.frame.light.depth - depth_less(job);
     if (!adapts(job) || !scale || scale >= 32)
         return;
@@ -160,7 +159,7 @@ static void widen(struct frame_camera *camera, float growth)
 
 static float margin_share(const struct job *job)
 {
-    const unsigned halves_less = adapts(job) ? job->view.wish.effort.margin_halves_less : 0;
+    const unsigned halves_less = adapts(job) ? job->view.latest.effort.margin_halves_less : 0;
     return halves_less < 2 ? job->spec.view.margin * (float)(2 - halves_less) / 2.0f : 0.0f;
 }
 
@@ -170,7 +169,7 @@ static void choose_eyes(const struct job *job, struct frame_request *request)
 {
     if (!(job->spec.view.margin > 0.0f) || !frame_has_views(request))
         return;
-    if (!job->view.wish.camera.moving) {
+    if (!job->view.latest.camera.moving) {
         request->attachments = 0;
         return;
     }
@@ -186,7 +185,7 @@ static void add_margin(struct job *job, struct frame_request *request)
 {
     struct view *view = &job->view;
     view->margin_x = view->margin_y = 0;
-    if (!view->wish.camera.moving || !(job->spec.view.margin > 0.0f))
+    if (!view->latest.camera.moving || !(job->spec.view.margin > 0.0f))
         return;
     view->margin_x = margin_pixels(margin_share(job), request->picture.width);
     view->margin_y = margin_pixels(margin_share(job), request->picture.height);
@@ -213,7 +212,7 @@ static bool begin_hidden_frame(struct job *job, struct shot *shot, struct error 
 {
     struct view *view = &job->view;
     struct frame_request *request = &shot->request;
-    if (!shot_make_at(shot, &job->spec, job->scene->scene, &view->wish.camera, &job->bounds, error))
+    if (!shot_make_at(shot, &job->spec, job->scene->scene, &view->latest.camera, &job->bounds, error))
         return false;
     view->refining = false;
     request->sampling.seed = job->spec.frame.sampling.seed;
@@ -233,16 +232,16 @@ bool view_begin_frame(struct job *job, struct shot *shot, struct error *error)
 {
     struct view *view = &job->view;
     const struct scene *scene = job->scene->scene;
-    const struct view_wish latest = view_wishes_latest(job->spec.wishes);
+    const struct view_request latest = view_mailbox_latest(job->spec.mailbox);
     if (has_hidden(job, &latest))
         return begin_hidden_frame(job, shot, error);
     view->hidden_layer = 0;
-    bool key_frame = view->wish.key_frame; /* request of an unfinished frame */
-    view->wish = view_wishes_begin_frame(job->spec.wishes);
-    view->wish.key_frame |= key_frame;
-    view->refining = !has_news(job, &view->wish);
-    bool made = view->wish.camera.command
-                    ? shot_make_at(shot, &job->spec, scene, &view->wish.camera, &job->bounds, error)
+    bool key_frame = view->latest.key_frame; /* request of an unfinished frame */
+    view->latest = view_mailbox_begin_frame(job->spec.mailbox);
+    view->latest.key_frame |= key_frame;
+    view->refining = !has_news(job, &view->latest);
+    bool made = view->latest.camera.command
+                    ? shot_make_at(shot, &job->spec, scene, &view->latest.camera, &job->bounds, error)
                     : shot_make(shot, &job->spec, scene, job->spec.first_frame, &job->bounds, error);
     if (!made)
         return false;
@@ -261,7 +260,7 @@ bool view_begin_frame(struct job *job, struct shot *shot, struct error *error)
 /* Quality of a frame: the effort's while the camera moves, the job's at rest. */
 static unsigned quality_of(const struct job *job)
 {
-    const unsigned quality = job->view.wish.effort.quality;
+    const unsigned quality = job->view.latest.effort.quality;
     return adapts(job) && quality ? quality : job->spec.quality;
 }
 
@@ -276,29 +275,29 @@ enum ycbcr view_ycbcr(const struct job *job)
     if (job->view.hidden_layer > 0)
         return YCBCR_NONE; /* empty pixels must be filled first */
     /* At rest the number of samples decides on the encoding, which is known only after rendering. */
-    bool certain = job->view.wish.camera.moving || job->spec.view.still_encoding == job->spec.encoding;
+    bool certain = job->view.latest.camera.moving || job->spec.view.still_encoding == job->spec.encoding;
     return certain ? encoder_takes(job->spec.encoding, quality_of(job)) : YCBCR_NONE;
 }
 
 bool view_is_stale(const struct job *job)
 {
-    struct view_wish wish = view_wishes_latest(job->spec.wishes);
+    struct view_request request = view_mailbox_latest(job->spec.mailbox);
     if (job->view.hidden_layer > 0)
-        return !has_hidden(job, &wish);
-    return job->view.refining && (has_news(job, &wish) || job->scene->waiting_count > 0);
+        return !has_hidden(job, &request);
+    return job->view.refining && (has_news(job, &request) || job->scene->waiting_count > 0);
 }
 
 static void note_camera(struct job *job, struct engine_frame *frame)
 {
     const struct view *view = &job->view;
-    frame->command = view->wish.camera.command;
-    frame->received_ns = view->wish.camera.received_ns;
-    frame->moving = view->wish.camera.moving;
+    frame->command = view->latest.camera.command;
+    frame->received_ns = view->latest.camera.received_ns;
+    frame->moving = view->latest.camera.moving;
     frame->quality = quality_of(job);
     frame->view = job->spec.view;
     frame->margin_x = view->margin_x;
     frame->margin_y = view->margin_y;
-    const struct view_effort *effort = &view->wish.effort;
+    const struct view_effort *effort = &view->latest.effort;
     frame->in_parts = job->spec.view.parts && (frame->moving ? effort->parts : effort->still_parts);
 }
 
@@ -318,12 +317,12 @@ static void plan_hidden(struct job *job, const struct engine_frame *frame)
 {
     struct view *view = &job->view;
     view->hidden_layer = 0;
-    if (!view->wish.camera.moving || job->spec.view.hidden_layers == 0)
+    if (!view->latest.camera.moving || job->spec.view.hidden_layers == 0)
         return;
     hidden_budget_earn(&view->hidden_budget, frame->applied_ns - view->begun_ns);
     view->begun_ns = frame->applied_ns;
     view->hidden_is_paid =
-        hidden_budget_suffices(&view->hidden_budget) && !(adapts(job) && view->wish.effort.no_hidden);
+        hidden_budget_suffices(&view->hidden_budget) && !(adapts(job) && view->latest.effort.no_hidden);
     view->hidden_ns = 0;
     view->hidden_layer = 1;
 }
@@ -340,7 +339,7 @@ bool view_drop_hidden_layers(struct job *job, const struct error *error)
 void view_done(struct job *job, struct engine_frame *frame)
 {
     struct view *view = &job->view;
-    const struct view_camera *camera = &view->wish.camera;
+    const struct view_camera *camera = &view->latest.camera;
     view->rendered_ns = frame->rendered_ns;
     view->made++;
     note_camera(job, frame);
@@ -359,17 +358,17 @@ void view_done(struct job *job, struct engine_frame *frame)
     view->held_samples = frame->result.samples;
     if (frame->result.noise <= job->spec.frame.sampling.noise && job->spec.frame.sampling.noise > 0.0f)
         view->held_samples = job->spec.frame.sampling.samples; /* the noise is low enough */
-    view->needs_key_frame |= view->wish.key_frame;
-    view->wish.key_frame = false;
+    view->needs_key_frame |= view->latest.key_frame;
+    view->latest.key_frame = false;
     if (adapts(job)) {
-        const struct view_effort *effort = &view->wish.effort;
+        const struct view_effort *effort = &view->latest.effort;
         frame->scale_32nds = effort->scale_32nds;
         frame->margin_halves_less = effort->margin_halves_less;
         frame->depth_less = depth_less(job);
         frame->wanted_bytes = effort->bytes;
     }
-    bool spares =
-        job->spec.view.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.sampling.samples;
+    bool spares = job->spec.view.adapt && view->latest.effort.sparing &&
+                  view->held_samples < job->spec.frame.sampling.samples;
     if (!camera->moving && !spares && job->spec.view.still_encoding != job->spec.encoding) {
         frame->encoding = job->spec.view.still_encoding;
         if (!encoder_loses(frame->encoding))

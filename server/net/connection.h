@@ -59,7 +59,7 @@ struct connection_handler {
     /* Little bulk is queued: more can be queued now. */
     void (*room)(void *context);
     /* Whether the client waits for an answer or a frame: it may be silent as long as it answers pings. */
-    bool (*owed)(const void *context);
+    bool (*awaited)(const void *context);
     /* The last call. The connection is freed when it returns. */
     void (*closed)(void *context);
 };

@@ -41,7 +41,8 @@ static bool is_idle(const struct connection *connection, uint64_t now_ns)
 {
     uint64_t idle_ns = connection->limits->idle_ms * NS_PER_MS;
     return idle_ns && since(connection->last_received_ns, now_ns) >= idle_ns &&
-           since(connection->last_sent_ns, now_ns) >= idle_ns && !connection->handler->owed(connection->context);
+           since(connection->last_sent_ns, now_ns) >= idle_ns &&
+           !connection->handler->awaited(connection->context);
 }
 
 static uint64_t later(uint64_t a_ns, uint64_t b_ns)
@@ -78,7 +79,7 @@ static void check_answers(struct connection *connection, uint64_t now_ns)
         connection->unanswered = 0;
         if (!connection->out.queued_bytes)
             send_ping(connection, now_ns);
-    } else if (!connection->handler->owed(connection->context)) {
+    } else if (!connection->handler->awaited(connection->context)) {
         connection->unanswered = 0;
     } else if (connection->unanswered++ < PINGS) {
         send_ping(connection, now_ns);

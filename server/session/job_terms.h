@@ -19,7 +19,7 @@ struct job *job_replaced_by(const struct session *session, const struct message_
 uint64_t job_window(const struct session *session, const struct message_render *render);
 /* Maximum memory of its frames, in the engine and waiting to be sent. */
 uint64_t job_bytes(const struct session *session, const struct message_render *render);
-/* Fills the job except credit and wishes. False: out of memory; the caller owns the incomplete job all the same.
+/* Fills the job except credit and requests. False: out of memory; the caller owns the incomplete job all the same.
  */
 bool job_fill(struct engine_job *job, const struct session *session, const struct message_render *render);
 

@@ -110,7 +110,7 @@ void jobs_start(struct session *session, struct request *request, const struct m
     }
     request->object = job;
     if (job->view)
-        command->job.wishes = view_wishes_ref(job->view->wishes);
+        command->job.mailbox = view_mailbox_ref(job->view->mailbox);
     command->job.credit = replaces ? view_find_change(job, request->id)->credit : job->engine_credit;
     command->scene = render->scene;
     session_submit(session, request, command);
@@ -186,7 +186,7 @@ void jobs_credit(struct session *session, const struct message_credit *credit)
     job_pace(job);
 }
 
-bool job_is_owed(const struct job *job)
+bool job_is_awaited(const struct job *job)
 {
     return job->first || job->frames_sent < job->client_credit;
 }

@@ -52,7 +52,7 @@ void job_pace(struct job *job);
 /* Starts the timer that notifies the client if no frame is sent for a reason that it can change. */
 void job_watch_for_blocks(struct job *job);
 void jobs_finish(struct session *session);
-bool job_is_owed(const struct job *job); /* whether the daemon has work for it, for which the client waits */
+bool job_is_awaited(const struct job *job); /* whether the daemon has work for it, for which the client waits */
 /* NULL: no job has that channel. */
 struct job *jobs_find(const struct session *session, uint32_t channel);
 

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SCENE 1u              /* its number in the messages */
-#define ABANDONED_LOOKS 1024u /* objects between two looks at whether the work is abandoned */
+#define SCENE 1u               /* its number in the messages */
+#define ABANDONED_CHECKS 1024u /* objects between two looks at whether the work is abandoned */
 
 /* ---- writing ----------------------------------------------------------------------------------------- */
 
@@ -296,7 +296,7 @@ static void put_objects(struct sink *sink, enum object_kind kind, const struct h
     size_t cursor = 0;
     void *object;
     while (!sink->failed && hashmap_next(objects, &cursor, NULL, &object)) {
-        if (sink->objects++ % ABANDONED_LOOKS == 0 && atomic_load(sink->abandoned))
+        if (sink->objects++ % ABANDONED_CHECKS == 0 && atomic_load(sink->abandoned))
             fail(sink);
         put_object(sink, kind, object);
     }

@@ -388,22 +388,22 @@ void scenes_objects_listed(struct session *session, struct request *request, con
     answer(session, request, &message);
 }
 
-struct told_object {
+struct sent_object {
     struct session *session;
     uint32_t request;
     bool sent;
 };
 
-static void tell_object(void *context, const struct message *message)
+static void send_object(void *context, const struct message *message)
 {
-    struct told_object *told = context;
-    told->sent = session_send(told->session, told->request, 0, message);
+    struct sent_object *sent = context;
+    sent->sent = session_send(sent->session, sent->request, 0, message);
 }
 
 void scenes_object_is(struct session *session, struct request *request, const struct engine_event *event)
 {
-    struct told_object told = {.session = session, .request = request->id};
-    if (scene_record_object(event->object, tell_object, &told) && told.sent) {
+    struct sent_object sent = {.session = session, .request = request->id};
+    if (scene_record_object(event->object, send_object, &sent) && sent.sent) {
         request_answer_ok(session, request, event->revision);
         return;
     }

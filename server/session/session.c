@@ -335,7 +335,7 @@ static void on_room(void *context)
     frames_pump(context);
 }
 
-static bool on_owed(const void *context)
+static bool on_awaited(const void *context)
 {
     const struct session *session = context;
     size_t cursor = 0;
@@ -344,7 +344,7 @@ static bool on_owed(const void *context)
         const struct request *request = value;
         if (request->kind == REQUEST_UPLOAD || request->kind == REQUEST_TRANSACTION)
             continue; /* the client must continue it */
-        if (request->kind != REQUEST_JOB || job_is_owed(request->object))
+        if (request->kind != REQUEST_JOB || job_is_awaited(request->object))
             return true;
     }
     return false;
@@ -393,7 +393,7 @@ static const struct connection_handler connection_handler = {
     .message = dispatch_message,
     .invalid = dispatch_invalid,
     .room = on_room,
-    .owed = on_owed,
+    .awaited = on_awaited,
     .closed = on_closed,
 };
 

@@ -74,8 +74,8 @@ struct session_view *session_view_create(const struct view_terms *terms)
     view->changes_end = &view->changes;
     pacing_init(&view->pacing, terms->frame_ns);
     pacing_set_terms(&view->pacing, terms->frame_ns, &terms->moving);
-    view->wishes = view_wishes_create();
-    if (view->wishes)
+    view->mailbox = view_mailbox_create();
+    if (view->mailbox)
         return view;
     free(view);
     return NULL;
@@ -91,7 +91,7 @@ void session_view_destroy(struct job *job)
     loop_timer_stop(loop, &view->silence_timer);
     while (view->changes)
         view_drop_change(job, view->changes);
-    view_wishes_unref(view->wishes);
+    view_mailbox_unref(view->mailbox);
     free(view);
 }
 
@@ -325,7 +325,7 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
         choose_sparing(view, frame);
     if (view->terms.parts)
         choose_parts(view, frame);
-    view_wishes_set_effort(view->wishes, &view->effort);
+    view_mailbox_set_effort(view->mailbox, &view->effort);
 }
 
 /* Whether the frame may be dropped: its client wants another camera, and no other frame needs it, unlike one of a
@@ -391,7 +391,7 @@ void view_frame_sent(struct job *job)
         start_timer(job, &view->silence_timer, on_silence_timer, SILENCE_NS);
 }
 
-/* ---- wishes ------------------------------------------------------------------------------------------ */
+/* ---- requests ------------------------------------------------------------------------------------------ */
 
 /* The view of a channel; NULL: it has ended, or is none. */
 static struct job *find_view(const struct session *session, uint32_t channel)
@@ -437,7 +437,7 @@ void views_set_camera(struct session *session, const struct message_view_camera 
     memcpy(camera.key.eye_world, message->eye_world, sizeof(camera.key.eye_world));
     memcpy(camera.key.look_at_world, message->look_at_world, sizeof(camera.key.look_at_world));
     memcpy(camera.key.up_world, message->up_world, sizeof(camera.key.up_world));
-    if (view_wishes_set_camera(job->view->wishes, &camera))
+    if (view_mailbox_set_camera(job->view->mailbox, &camera))
         notify_engine(job);
     frames_overtake(job);
     job_watch_for_blocks(job);
@@ -450,7 +450,7 @@ void views_acknowledge(struct session *session, const struct message_frame_ack *
         return;
     struct session_view *view = job->view;
     pacing_acknowledged(&view->pacing, message->frame, message->whole != 0, session->connection->last_received_ns);
-    if (message->want_key_frame && view_wishes_request_key_frame(view->wishes))
+    if (message->want_key_frame && view_mailbox_request_key_frame(view->mailbox))
         notify_engine(job);
     job_pace(job);
 }

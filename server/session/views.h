@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The state of a view beyond that of any job: the wishes that the engine reads, the pace of its link, and the
+/* The state of a view beyond that of any job: the requests that the engine reads, the pace of its link, and the
  * views that are to replace it.
  *
- * Successive views of a channel are one struct job: its credit, frame count and wishes continue. A view replaces
+ * Successive views of a channel are one struct job: its credit, frame count and requests continue. A view replaces
  * the one before when the engine says so, in the order of the client's requests. Frames of the old view that have
  * not begun on the wire are dropped then, one that has begun is finished, and then the old request is answered. */
 #ifndef FARLIGHT_SESSION_VIEWS_H
 #define FARLIGHT_SESSION_VIEWS_H
 
-#include "engine/view_wishes.h"
+#include "engine/view_mailbox.h"
 #include "protocol/messages.h"
 #include "session/jobs.h"
 #include "session/pacing.h"
@@ -35,7 +35,7 @@ struct view_change {
 };
 
 struct session_view {
-    struct view_wishes *wishes;
+    struct view_mailbox *mailbox;
     struct view_terms terms;
     struct view_change *changes, **changes_end; /* changes that the engine has not answered yet, in order */
     struct pacing pacing;
@@ -75,7 +75,8 @@ bool view_wants_more(const struct job *job);
 /* Whether no frame may go before the client acknowledges one. */
 bool view_is_unacknowledged(const struct job *job);
 bool view_may_send(const struct job *job);
-/* Whether the frame has waited for the link so long that a new one of the current wishes is better, and possible.
+/* Whether the frame has waited for the link so long that a new one of the current requests is better, and
+ * possible.
  */
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame);
 /* Whether motion overtakes the frame: it is a picture at rest or a hidden layer, and no later frame needs it. */

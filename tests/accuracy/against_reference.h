@@ -38,7 +38,7 @@ static inline void request_picture(struct fixture *fixture, uint32_t depth)
     request->picture.width = request->picture.height = SIDE;
     request->picture.format = PIXEL_FORMAT_RGBA8;
     request->light.depth = depth;
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    fixture_set_camera(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
 }
 
 #endif

@@ -121,7 +121,7 @@ TEST(nearer_surfaces_occlude_more)
     enum { SAMPLES = 2, RAYS = 16 };
     begin(fixture, TRACER_BVH);
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
-    fixture_look(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
     fixture->request.sampling.samples = SAMPLES;
     fixture->request.light.ao_rays = RAYS;
     for (size_t r = 0; r < COUNT(reaches); r++)
@@ -169,7 +169,7 @@ TEST(a_tenth_of_the_diagonal_is_the_default_distance)
     struct fixture *fixture = *state;
     begin(fixture, TRACER_BVH);
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
-    fixture_look(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
     fixture->request.light.ao_rays = 64;
     fixture->request.light.ao_distance = 0.0f;
     struct frame_result result = fixture_render(fixture);

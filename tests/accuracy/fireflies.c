@@ -88,7 +88,7 @@ TEST(what_one_rough_surface_or_smooth_ones_scatter_stays_to_the_byte)
             floor->value.metallic = ceiling->value.metallic = smooth ? 1.0f : 0.5f;
             floor->value.roughness = ceiling->value.roughness = smooth ? 0.0f : 0.4f;
             a_lamp(fixture, 0.2f, 0.0f, 2.0f, 1000.0f);
-            fixture_look(fixture, 0.5f, -2.5f, 2.0f, 0.8f);
+            fixture_set_camera(fixture, 0.5f, -2.5f, 2.0f, 0.8f);
             float *off = picture(fixture, 0.0f, 4, 1), *on = picture(fixture, 1.0f, 4, 1);
             float most = 0.0f;
             for (uint32_t k = 0; k < PIXELS; k++)
@@ -110,7 +110,7 @@ TEST(a_sample_brings_no_more_than_the_limit)
     a_square(fixture, 2.0f, 0.0f, 2.0f, -1.0f);
     a_square(fixture, 0.6f, 0.0f, 1.2f, -1.0f);
     a_lamp(fixture, 0.1f, 0.0f, 1.21f, 1000.0f);
-    fixture_look(fixture, 1.2f, 0.3f, 0.5f, 0.8f);
+    fixture_set_camera(fixture, 1.2f, 0.3f, 0.5f, 0.8f);
     const struct summary off = summary_of(fixture, 0.0f, 4), on = summary_of(fixture, 2.0f, 4);
     fixture->request.picture.exposure_stops = 1.0f; /* the limit is that of the picture's values */
     const struct summary exposed = summary_of(fixture, 4.0f, 4);
@@ -129,7 +129,7 @@ TEST(a_lamp_that_nearly_touches_a_surface_makes_no_specks)
     begin(fixture, INTEGRATOR_DISTRIBUTED, 1);
     a_square(fixture, 2.0f, 0.0f, 0.0f, 1.0f);
     a_lamp(fixture, 0.3f, 0.0f, 0.01f, 1.0f)->value.alpha_mode = ALPHA_OPAQUE;
-    fixture_look(fixture, 1.0f, 0.2f, 0.5f, 0.6f);
+    fixture_set_camera(fixture, 1.0f, 0.2f, 0.5f, 0.6f);
     const struct summary off = summary_of(fixture, 0.0f, 4), on = summary_of(fixture, 10.0f, 4);
     print_message("maximum %.3f, mean %.4f\n", off.most, off.mean);
     assert_true(off.most <= 4.0 && off.mean > 0.1);
@@ -168,7 +168,7 @@ TEST_LONG(mirrors_behind_rough_surfaces_cast_their_light_with_less_noise)
     plate->value.base_colour[0] = plate->value.base_colour[1] = plate->value.base_colour[2] = 0.0f;
     struct scene_light *light = fixture_light(fixture, LIGHT_SPHERE, 0.0f, 0.0f, 1.0f, 100.0f);
     light->value.size[0] = 0.05f;
-    fixture_look(fixture, 0.0f, 0.0f, 0.8f, 0.0f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 0.8f, 0.0f);
     fixture->request.camera.ortho_height = 6.0f;
     const double sharp = noise_of(fixture, 0.0f, 64, &mean), blurred = noise_of(fixture, 1e6f, 64, &means[1]);
     noise_of(fixture, 0.0f, 1024, &means[0]);

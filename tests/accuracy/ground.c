@@ -27,7 +27,7 @@ static void begin(struct fixture *fixture, enum integrator_kind integrator)
     fixture->request.picture.background = BACKGROUND_TRANSPARENT;
     fixture->request.ground = (struct frame_ground){
         .centre_world = {0.0f, (float)-HEIGHT, 0.0f}, .normal_world = {0.0f, 1.0f, 0.0f}, .radius = 40.0f};
-    fixture_look(fixture, 0.0f, 2.0f, 4.5f, 0.7f);
+    fixture_set_camera(fixture, 0.0f, 2.0f, 4.5f, 0.7f);
 }
 
 /* A light from straight above. */
@@ -193,7 +193,7 @@ TEST(a_ground_is_not_there_from_below_without_light_or_for_raycast)
         begin(fixture, k == 2 ? INTEGRATOR_RAYCAST : INTEGRATOR_DISTRIBUTED);
         sun(fixture, k == 1 ? 0.0f : 3.0f);
         if (k == 0)
-            fixture_look(fixture, 0.0f, -2.0f, 4.5f, 0.7f);
+            fixture_set_camera(fixture, 0.0f, -2.0f, 4.5f, 0.7f);
         struct frame_result with = fixture_render(fixture);
         fixture->request.ground.radius = 0.0f;
         struct frame_result without = fixture_render(fixture);

@@ -26,7 +26,7 @@ static void set_up(struct fixture *fixture, double plate_half, double plate)
     add_square(fixture, plate_half, plate, material);
     add_square(fixture, 4.0, WALL, material);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, -0.5f, 10.0f);
-    fixture_look(fixture, 0.0f, 0.0f, 1.0f, (float)(2.0 * atan(EDGE / 2.0 / FOCAL)));
+    fixture_set_camera(fixture, 0.0f, 0.0f, 1.0f, (float)(2.0 * atan(EDGE / 2.0 / FOCAL)));
     struct frame_request *request = &fixture->request;
     request->picture.width = request->picture.height = EDGE;
     request->light.integrator = INTEGRATOR_WHITTED;

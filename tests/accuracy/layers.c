@@ -276,7 +276,7 @@ TEST_LONG(openness_is_that_of_the_integrator_ao)
     const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -0.5f, 0, -1, 0, 0};
     fixture_square(fixture, 3, 0, floor);
     fixture_sphere(fixture, 0, 0, 0, 0.5f, 0);
-    fixture_look(fixture, 0, 2, 4, 0.7f);
+    fixture_set_camera(fixture, 0, 2, 4, 0.7f);
     fixture->request.sampling.samples = 2;
     fixture->request.light.ao_distance = 1.5f;
     fixture->request.light.ao_rays = 24;
@@ -334,7 +334,7 @@ TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is)
 {
     struct fixture *fixture = *state;
     add_glass(fixture);
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    fixture_set_camera(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.tracing.tracer = TRACER_BVH;
     fixture->request.sampling.samples = 3;
     struct frame_result layers = render(fixture, BIT(LAYER_NORMAL) | BIT(LAYER_DEPTH));
@@ -375,7 +375,7 @@ TEST_LONG(neither_the_picture_nor_the_layers_depend_on_each_other)
     struct fixture *fixture = *state;
     const size_t plane_bytes = 32 * 32 * 16;
     add_glass(fixture);
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    fixture_set_camera(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.sampling.samples = 3;
     fixture->request.tracing.tracer = TRACER_BVH;
     for (int integrator = INTEGRATOR_WHITTED; integrator <= INTEGRATOR_PATH; integrator++) {
@@ -404,7 +404,7 @@ TEST_LONG(frames_that_go_on_hold_what_one_of_all_samples_does)
 {
     struct fixture *fixture = *state;
     add_mirrors(fixture);
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    fixture_set_camera(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.tracing.tracer = TRACER_BVH;
     fixture->request.sampling.accumulate = true;
     fixture->request.sampling.samples = 6;
@@ -434,7 +434,7 @@ TEST(places_agree_with_depths_through_a_lens)
 {
     struct fixture *fixture = *state;
     add_mirrors(fixture);
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    fixture_set_camera(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.tracing.tracer = TRACER_BVH;
     fixture->request.sampling.samples = 8;
     fixture->request.aperture = 0.2f;

@@ -127,7 +127,7 @@ static void build_things(struct fixture *fixture)
     }
     fixture_square(fixture, 3.0f, fixture_material(fixture)->base.id, wall); /* out of view, seen in a mirror */
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
-    fixture_look(fixture, 0, 0, 5, 0);
+    fixture_set_camera(fixture, 0, 0, 5, 0);
     fixture->request.camera.ortho_height = 2;
     fixture->request.picture.width = 8 * THINGS;
     fixture->request.picture.height = 8;

@@ -30,7 +30,7 @@ static struct scene_material *a_floor(struct fixture *fixture, float eye_height)
 {
     struct scene_material *material = fixture_material(fixture);
     fixture_square(fixture, 50.0f, material->base.id, NULL);
-    fixture_look(fixture, 0.0f, 0.0f, eye_height, 0.0f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, eye_height, 0.0f);
     fixture->request.camera.ortho_height = VIEW;
     fixture_light(fixture, LIGHT_RECTANGLE, 0.0f, 0.0f, 9.0f, 0.0f);
     return material;
@@ -381,7 +381,7 @@ TEST_LONG(the_default_sky_brings_what_its_harmonics_say)
         const float level[12] = {1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0}; /* looks along +y */
         path_begin(fixture, TRACER_REFERENCE, 1);
         fixture_square(fixture, 50.0f, fixture_material(fixture)->base.id, level);
-        fixture_look(fixture, 0.0f, 5.0f, 0.0f, 0.0f);
+        fixture_set_camera(fixture, 0.0f, 5.0f, 0.0f, 0.0f);
         fixture->request.camera.ortho_height = VIEW;
         if (!path) /* its ambient term is the irradiance of the sky; the default light is in both */
             fixture->request.light.integrator = INTEGRATOR_WHITTED;
@@ -482,7 +482,7 @@ static void a_box(struct fixture *fixture, enum inside inside, bool sampled)
     for (int i = 0; i < 5; i++)
         fixture_square(fixture, 1.0f, material->base.id, walls[i]);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 0.0f);
-    fixture_look(fixture, 0.0f, 0.0f, 3.5f, 0.6f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 3.5f, 0.6f);
     if (inside == BESIDE_LIGHTS) {
         fixture_light(fixture, LIGHT_RECTANGLE, 0.4f, 0.0f, 0.9f, 5.0f);
         fixture_light(fixture, LIGHT_POINT, -0.5f, 0.3f, 0.5f, 0.3f);
@@ -652,7 +652,7 @@ TEST(a_scene_that_a_lamp_lights_has_no_sky_where_lamps_are_lights)
         path_begin(fixture, TRACER_BVH, 2);
         fixture->request.light.integrator = cases[i].integrator;
         a_glow(fixture, 0.1f, cases[i].radiance, true, place);
-        fixture_look(fixture, 0.0f, 0.0f, 3.5f, 0.6f);
+        fixture_set_camera(fixture, 0.0f, 0.0f, 3.5f, 0.6f);
         struct frame_result result = fixture_render(fixture);
         const float *corner = fixture_pixel(&result, 0, 0);
         if ((corner[1] > 0.0f) != cases[i].sky)
@@ -689,7 +689,7 @@ static void a_rough_mirror(struct fixture *fixture, unsigned integrator, enum mi
     floor->value.anisotropy = look[2];
     floor->value.anisotropy_rotation = 0.5f;
     floor->value.ior = 1.5f;
-    fixture_look(fixture, 1.5f, -1.5f, 1.2f, 0.8f);
+    fixture_set_camera(fixture, 1.5f, -1.5f, 1.2f, 0.8f);
     if (what >= SUN)
         an_image(fixture, 0x2c00, 3, 13, 0x6400); /* 1/16 and 1024 */
     if (what == RECTANGLE_LIGHT)

@@ -99,7 +99,7 @@ static void all_materials(struct fixture *fixture, float roughness, float base, 
         else
             fixture_sphere(fixture, x, y, z, 0.49f, material);
     }
-    fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.0f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 5.0f, 0.0f);
     fixture->request.camera.ortho_height = (float)SIDE;
     fixture->request.picture.width = fixture->request.picture.height = WIDTH;
     fixture->request.light.layer_opacity = 1.0f; /* raycast shows what it meets first, as the others */
@@ -283,7 +283,7 @@ TEST_LONG(normals_that_lean_lose_no_light)
                     texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
                 fixture_square(fixture, 100.0f, material->base.id, NULL);
                 fixture->request.picture.width = fixture->request.picture.height = 3;
-                fixture_look(fixture, (float)(5.0 * sin(from)), 0.0f, (float)(5.0 * cos(from)), 0.01f);
+                fixture_set_camera(fixture, (float)(5.0 * sin(from)), 0.0f, (float)(5.0 * cos(from)), 0.01f);
                 struct frame_result result = fixture_render(fixture);
                 for (uint32_t i = 0; i < 9; i++) {
                     const double value = (double)fixture_pixel(&result, i % 3, i / 3)[1];
@@ -319,7 +319,7 @@ static struct scene_material *a_leaf(struct fixture *fixture, float share)
     leaf->value.diffuse_transmission_colour[1] = 0.5f;
     leaf->value.diffuse_transmission_colour[2] = 1.0f;
     fixture_square(fixture, 500.0f, leaf->base.id, NULL);
-    fixture_look(fixture, 0.0f, 0.0f, 4.0f, 0.01f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 4.0f, 0.01f);
     return leaf;
 }
 
@@ -380,7 +380,7 @@ static void look_at_a_mark(struct fixture *fixture, double slant, double angle)
     mark->value.unlit = true;
     fixture_sphere(fixture, (float)(-5.0 * sin(angle)), 0.0f, (float)(-5.0 * cos(angle)), 0.0085f, mark->base.id);
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 900.0f, 1e-9f); /* else there is a sky */
-    fixture_look(fixture, (float)(3.0 * sin(slant)), 0.0f, (float)(3.0 * cos(slant)), 0.0005f);
+    fixture_set_camera(fixture, (float)(3.0 * sin(slant)), 0.0f, (float)(3.0 * cos(slant)), 0.0005f);
 }
 
 /* From both of its sides, at a slant, what is straight ahead is seen, less what one boundary mirrors, in its

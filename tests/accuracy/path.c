@@ -23,7 +23,7 @@ static void a_glowing_room(struct fixture *fixture, float albedo)
     material->value.alpha_mode = ALPHA_MASK;
     for (int i = 0; i < 6; i++)
         fixture_square(fixture, 1.0f, material->base.id, walls[i]);
-    fixture_look(fixture, 0.4f, 0.2f, 0.7f, 1.2f);
+    fixture_set_camera(fixture, 0.4f, 0.2f, 0.7f, 1.2f);
 }
 
 /* Light that was reflected up to n times: 1 + a + .. + a^n. */

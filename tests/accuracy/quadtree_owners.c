@@ -87,9 +87,9 @@ TEST(another_viewers_structure_is_never_used)
     assert_non_null(other);
     for (int round = 0; round < 2; round++) {
         /* By turns, each from its own place: each is built once, and shows what is there from its place. */
-        fixture_look(fixture, 0.3f, 0.1f, 5.0f, 0.6f);
+        fixture_set_camera(fixture, 0.3f, 0.1f, 5.0f, 0.6f);
         assert_int_equal(shows_what_is_there(fixture, fixture->renderer, NULL), round == 0);
-        fixture_look(fixture, 2.5f, 1.0f, 3.0f, 0.7f);
+        fixture_set_camera(fixture, 2.5f, 1.0f, 3.0f, 0.7f);
         assert_int_equal(shows_what_is_there(fixture, other, NULL), round == 0);
     }
     frame_renderer_destroy(other);
@@ -103,7 +103,7 @@ TEST(a_moved_camera_outdates_the_structure_and_an_unmoved_one_does_not)
     fixture_commit(fixture);
     assert_true(shows_what_is_there(fixture, fixture->renderer, NULL));
     assert_false(shows_what_is_there(fixture, fixture->renderer, NULL));
-    fixture_look(fixture, 0.4f, 0.1f, 4.5f, 0.6f);
+    fixture_set_camera(fixture, 0.4f, 0.1f, 4.5f, 0.6f);
     assert_true(shows_what_is_there(fixture, fixture->renderer, NULL));
     assert_false(shows_what_is_there(fixture, fixture->renderer, NULL));
     fixture->request.picture.width = 80;

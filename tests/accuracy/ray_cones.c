@@ -293,14 +293,14 @@ static void checkered_floor(struct fixture *fixture, float metallic, float rough
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.2f, ball->base.id);
     fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
     fixture->request.picture.width = fixture->request.picture.height = 64;
-    fixture_look(fixture, 0.0f, 0.8f, 7.0f, 0.34f);
+    fixture_set_camera(fixture, 0.0f, 0.8f, 7.0f, 0.34f);
 }
 
 static struct frame_result render_samples(struct fixture *fixture, uint32_t samples, uint64_t seed, float x)
 {
     fixture->request.sampling.samples = samples;
     fixture->request.sampling.seed = seed;
-    fixture_look(fixture, x, 0.8f, 7.0f, 0.34f);
+    fixture_set_camera(fixture, x, 0.8f, 7.0f, 0.34f);
     return fixture_render(fixture);
 }
 

@@ -44,7 +44,7 @@ static inline struct blob *fixture_blob(const void *data, size_t size_bytes)
     return blob;
 }
 
-static inline void fixture_look(struct fixture *fixture, float x, float y, float z, float fov_y)
+static inline void fixture_set_camera(struct fixture *fixture, float x, float y, float z, float fov_y)
 {
     const float eye[3] = {x, y, z}, target[3] = {0.0f, 0.0f, 0.0f};
     const float up[3] = {0.0f, x == 0.0f && z == 0.0f ? 0.0f : 1.0f, x == 0.0f && z == 0.0f ? -1.0f : 0.0f};
@@ -92,7 +92,7 @@ static inline int fixture_clear(void **state)
                                               .light.depth = 4,
                                               .tracing.tracer = TRACER_BVH,
                                               .picture.format = PIXEL_FORMAT_RGBA32F};
-    fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.6f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 5.0f, 0.6f);
     return 0;
 }
 
@@ -224,7 +224,7 @@ static inline void fixture_mixture(struct fixture *fixture)
     sphere->value.size[0] = 0.4f;
     fixture->request.picture.width = 96;
     fixture->request.picture.height = 72;
-    fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
+    fixture_set_camera(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
 }
 
 static inline void fixture_commit(struct fixture *fixture)

@@ -27,7 +27,7 @@ static void a_corner(struct fixture *fixture)
 /* Aside by a pixel a frame, and by a part of one that is not the same in each. */
 static void look(struct fixture *fixture, int frame)
 {
-    fixture_look(fixture, 0.137f * (float)frame, 0.05f * (float)frame, 5.0f, 0.6f);
+    fixture_set_camera(fixture, 0.137f * (float)frame, 0.05f * (float)frame, 5.0f, 0.6f);
 }
 
 static struct frame_result rendered(struct fixture *fixture, enum frame_history history, uint32_t samples)

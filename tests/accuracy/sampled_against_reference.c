@@ -99,7 +99,7 @@ TEST_LONG(textures_glass_spheres_and_cutouts_are_like_the_references)
 static void expect_occlusion_like_the_references(struct fixture *fixture, const char *name)
 {
     struct frame_request *request = &fixture->request;
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    fixture_set_camera(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     request->picture.width = request->picture.height = SIDE / 2;
     request->picture.format = PIXEL_FORMAT_RGBA8;
     request->light.integrator = INTEGRATOR_AO;

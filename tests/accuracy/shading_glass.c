@@ -57,7 +57,7 @@ TEST(glass_at_a_slant_follows_fresnels_equations)
     fixture_square(fixture, 100.0f, glass->base.id, NULL);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     fixture->request.picture.width = fixture->request.picture.height = 9;
-    fixture_look(fixture, 5.0f * (float)sin(1.2), 0.0f, 5.0f * (float)cos(1.2), 0.01f);
+    fixture_set_camera(fixture, 5.0f * (float)sin(1.2), 0.0f, 5.0f * (float)cos(1.2), 0.01f);
     struct frame_result result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 4, 4)[0], fresnel(cos(1.2), 1.5), NORMAL_TOLERANCE);
     frame_result_finish(&result);
@@ -78,7 +78,7 @@ TEST(a_mirror_may_be_weaker_and_coloured)
         fixture_square(fixture, 100.0f, glass->base.id, NULL);
         fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
         fixture->request.picture.width = fixture->request.picture.height = 9;
-        fixture_look(fixture, 5.0f * (float)sin(angle), 0.0f, 5.0f * (float)cos(angle), 0.01f);
+        fixture_set_camera(fixture, 5.0f * (float)sin(angle), 0.0f, 5.0f * (float)cos(angle), 0.01f);
         struct frame_result result = fixture_render(fixture);
         double rise = (fresnel(cos(angle), 1.5) - 0.04) / 0.96;
         for (int channel = 0; channel < 3; channel++) {
@@ -109,7 +109,7 @@ TEST(a_body_takes_light_by_the_way_through_it)
             fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
             fixture->request.light.integrator = integrators[i];
             fixture->request.picture.width = fixture->request.picture.height = 3;
-            fixture_look(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
+            fixture_set_camera(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
             struct frame_result result = fixture_render(fixture);
             for (int channel = 0; channel < 3; channel++)
                 /* a pixel's half is 1.7e-4 of the angle, whose tangent is up to 6 */
@@ -145,7 +145,7 @@ static float lit_through(struct fixture *fixture, float metallic, bool has_textu
     light->value.colour[0] = light->value.colour[1] = light->value.colour[2] = (float)PI;
     fixture_node(fixture, NODE_LIGHT, light->base.id, down);
     fixture->request.light.integrator = INTEGRATOR_WHITTED;
-    fixture_look(fixture, 0.0f, 0.0f, 1.0f, 0.5f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 1.0f, 0.5f);
     struct frame_result result = fixture_render(fixture);
     const float value = fixture_pixel(&result, 16, 16)[0];
     frame_result_finish(&result);
@@ -168,12 +168,12 @@ TEST(light_is_totally_reflected_inside_glass)
     fixture_environment(fixture, 1.0f, 0.5f, 0.25f);
     fixture->request.picture.width = fixture->request.picture.height = 9;
     /* from behind the square, which is inside; the critical angle is 41.8 degrees */
-    fixture_look(fixture, 5.0f * (float)sin(0.9), 0.0f, -5.0f * (float)cos(0.9), 0.01f);
+    fixture_set_camera(fixture, 5.0f * (float)sin(0.9), 0.0f, -5.0f * (float)cos(0.9), 0.01f);
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.secondary_rays, 9 * 9);
     assert_near(fixture_pixel(&result, 4, 4)[1], 0.5, 1e-5);
     frame_result_finish(&result);
-    fixture_look(fixture, 5.0f * (float)sin(0.5), 0.0f, -5.0f * (float)cos(0.5), 0.01f);
+    fixture_set_camera(fixture, 5.0f * (float)sin(0.5), 0.0f, -5.0f * (float)cos(0.5), 0.01f);
     result = fixture_render(fixture);
     assert_int_equal(result.secondary_rays, 2 * 9 * 9);
     frame_result_finish(&result);
@@ -195,7 +195,7 @@ static void expect_bent(struct fixture *fixture, double n, double before, double
     fixture_sphere(fixture, (float)x, 0.0f, (float)z, 0.0035f, light_material(fixture));
     no_sky(fixture);
     fixture->request.picture.width = fixture->request.picture.height = 9;
-    fixture_look(fixture, (float)(4.0 * sin(before)), 0.0f, (float)(4.0 * side * cos(before)), 0.001f);
+    fixture_set_camera(fixture, (float)(4.0 * sin(before)), 0.0f, (float)(4.0 * side * cos(before)), 0.001f);
     struct frame_result result = fixture_render(fixture);
     double share = 1.0 - fresnel(cos(side > 0 ? before : after), n);
     assert_near(fixture_pixel(&result, 4, 4)[0], share, 1e-5); /* float, at slopes of Fresnel's curve up to 10 */
@@ -247,7 +247,7 @@ TEST(a_pane_of_glass_shares_light_out_as_the_series_of_its_reflections)
                 fixture->request.picture.width = fixture->request.picture.height = 3;
                 fixture->request.light.depth = depth;
                 double angle = slant * PI / 180.0;
-                fixture_look(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
+                fixture_set_camera(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
                 struct frame_result result = fixture_render(fixture);
                 double expected = pane_series(fresnel(cos(angle), 2.4), depth, through);
                 worst = fmax(worst, fabs((double)fixture_pixel(&result, 1, 1)[0] - expected));

@@ -44,16 +44,16 @@ TEST(an_environment_image_lights_by_its_irradiance)
     environment->value.height = HEIGHT;
     environment->texels = fixture_blob(texels, sizeof(texels));
     fixture->request.camera.fov_y = 0.02f;
-    fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.01f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 5.0f, 0.01f);
     struct frame_result result = fixture_render(fixture);
     /* A surface that looks at the horizon sees half of the sky: exactly 1/2 also to order 2. */
     assert_near(fixture_pixel(&result, 16, 16)[0], 0.5, 0.01);
     frame_result_finish(&result);
-    fixture_look(fixture, 0.0f, 5.0f, 0.0f, 0.01f);
+    fixture_set_camera(fixture, 0.0f, 5.0f, 0.0f, 0.01f);
     result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 16, 16)[0], 1.0, 0.01);
     frame_result_finish(&result);
-    fixture_look(fixture, 0.0f, -5.0f, 0.0f, 0.01f);
+    fixture_set_camera(fixture, 0.0f, -5.0f, 0.0f, 0.01f);
     result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 16, 16)[0], 0.0, 0.01);
     frame_result_finish(&result);
@@ -77,13 +77,13 @@ TEST(an_environment_image_stands_the_right_way_round)
     environment->value.height = HEIGHT;
     environment->texels = fixture_blob(texels, sizeof(texels));
     fixture->request.picture.width = fixture->request.picture.height = 9;
-    fixture_look(fixture, -3.0f, -3.0f, 3.0f, 0.01f); /* towards +x, +y, -z: the middle of a green column */
+    fixture_set_camera(fixture, -3.0f, -3.0f, 3.0f, 0.01f); /* towards +x, +y, -z: the middle of a green column */
     struct frame_result result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 4, 4)[0], 0.0, 0.01);
     assert_near(fixture_pixel(&result, 4, 4)[1], 1.0, 0.01);
     assert_true(fixture_pixel(&result, 4, 4)[2] > 0.6f);
     frame_result_finish(&result);
-    fixture_look(fixture, -3.0f, 3.0f, -3.0f, 0.01f); /* towards +x, -y, +z */
+    fixture_set_camera(fixture, -3.0f, 3.0f, -3.0f, 0.01f); /* towards +x, -y, +z */
     result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 4, 4)[0], 1.0, 0.01);
     assert_true(fixture_pixel(&result, 4, 4)[2] < 0.4f);
@@ -128,7 +128,7 @@ static double light_below_panes(struct fixture *fixture, int count, float transm
         fixture_square(fixture, 10.0f, pane->base.id, transform);
     }
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 9.0f, (float)PI);
-    fixture_look(fixture, 0.0f, 0.0f, 1.0f, 0.5f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, 1.0f, 0.5f);
     struct frame_result result = fixture_render(fixture);
     const double light = (double)fixture_pixel(&result, 16, 16)[0];
     frame_result_finish(&result);

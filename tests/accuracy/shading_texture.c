@@ -185,7 +185,7 @@ TEST(the_environment_turns_about_y_for_the_eye_and_for_surfaces_alike)
     assert_near(fixture_pixel(&result, 0, 0)[0], 1.0, 1e-6);
     assert_near(fixture_pixel(&result, 16, 16)[0], 0.0, 0.03);
     frame_result_finish(&result);
-    fixture_look(fixture, 0.0f, 0.0f, -5.0f, 0.6f);
+    fixture_set_camera(fixture, 0.0f, 0.0f, -5.0f, 0.6f);
     result = fixture_render(fixture);
     assert_near(fixture_pixel(&result, 0, 0)[0], 0.0, 1e-6);
     assert_near(fixture_pixel(&result, 16, 16)[0], 1.0, 0.03);

@@ -45,7 +45,7 @@ static void set_up(struct fixture *fixture, float power)
     fixture->request.picture.width = WIDTH;
     fixture->request.picture.height = HEIGHT;
     fixture->request.attachments = 1u << ATTACHMENT_STICKING;
-    fixture_look(fixture, 0.0f, 0.0f, (float)EYE_Z, FOV_Y);
+    fixture_set_camera(fixture, 0.0f, 0.0f, (float)EYE_Z, FOV_Y);
     fixture_commit(fixture);
 }
 

@@ -210,7 +210,7 @@ TEST(bvh_is_updated_by_what_it_depends_on_and_by_nothing_else)
     assert_true(updates_for(fixture, fixture->renderer) > 0);
     assert_int_equal(counts.changed, tracer_bvh_impl.depends_on); /* the first structure */
     assert_int_equal(updates_for(fixture, fixture->renderer), 0);
-    fixture_look(fixture, 1.0f, 0.0f, 5.0f, 0.6f);
+    fixture_set_camera(fixture, 1.0f, 0.0f, 5.0f, 0.6f);
     assert_int_equal(updates_for(fixture, fixture->renderer), 0);
     move_node(fixture, ids.light_node, NODE_LIGHT, ids.light, 1.0f);
     updates_for(fixture, fixture->renderer);
@@ -259,7 +259,7 @@ TEST(a_structure_of_the_scene_serves_all_viewers)
     stand_in(fixture, fixture->renderer, &tracer_naive_impl, TRACER_NAIVE, 0, false);
     stand_in(fixture, other, &tracer_naive_impl, TRACER_NAIVE, 0, false);
     assert_int_equal(updates_for(fixture, fixture->renderer), 1);
-    fixture_look(fixture, 1.0f, 0.0f, 5.0f, 0.6f);
+    fixture_set_camera(fixture, 1.0f, 0.0f, 5.0f, 0.6f);
     assert_int_equal(updates_for(fixture, other), 0);
     assert_int_equal(counts.creates, 1);
     frame_renderer_destroy(other);
@@ -276,7 +276,7 @@ TEST(each_viewer_has_a_structure_of_its_view)
     const struct frame_request first = fixture->request;
     assert_int_equal(updates_for(fixture, fixture->renderer), 1);
     assert_true(counts.changed & CHANGED_VIEW);
-    fixture_look(fixture, 2.0f, 0.0f, 5.0f, 0.6f);
+    fixture_set_camera(fixture, 2.0f, 0.0f, 5.0f, 0.6f);
     const struct frame_request second = fixture->request;
     assert_int_equal(updates_for(fixture, other), 1);
     assert_int_equal(counts.creates, 2);
@@ -287,7 +287,7 @@ TEST(each_viewer_has_a_structure_of_its_view)
     assert_int_equal(updates_for(fixture, other), 0);
     fixture->request = first;
     assert_int_equal(updates_for(fixture, fixture->renderer), 0);
-    fixture_look(fixture, 0.0f, 0.5f, 5.0f, 0.6f);
+    fixture_set_camera(fixture, 0.0f, 0.5f, 5.0f, 0.6f);
     assert_int_equal(updates_for(fixture, fixture->renderer), 1);
     assert_int_equal(counts.changed, CHANGED_VIEW);
     fixture->request.picture.width = 40;

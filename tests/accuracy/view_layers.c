@@ -340,7 +340,7 @@ static void panels(struct fixture *fixture)
     fixture_environment(fixture, 0.3f, 0.4f, 0.5f);
     fixture->request.picture.width = 320;
     fixture->request.picture.height = 240;
-    fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
+    fixture_set_camera(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
 }
 
 TEST_LONG(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)

@@ -102,7 +102,7 @@ static void on_room(void *context)
     }
 }
 
-static bool on_owed(const void *context)
+static bool on_awaited(const void *context)
 {
     (void)context;
     return true;
@@ -130,7 +130,7 @@ static void accept_one(void *context, uint32_t epoll_events)
                                                       .message = on_message,
                                                       .invalid = on_invalid,
                                                       .room = on_room,
-                                                      .owed = on_owed,
+                                                      .awaited = on_awaited,
                                                       .closed = on_closed};
     const struct connection_entry entry = {.keys = &served.key, .key_count = 1};
     (void)context, (void)epoll_events;

@@ -2,7 +2,7 @@
 #include "tests/fuzz/engine_recorder.h"
 
 #include "base/clock.h"
-#include "engine/view_wishes.h"
+#include "engine/view_mailbox.h"
 #include "tests/fixtures/engine_port.h"
 #include "tests/fuzz/fuzz.h"
 
@@ -36,7 +36,7 @@ struct recorded_job {
     uint32_t width, height, samples, pass_samples;
     enum encoding encoding, still_encoding;
     uint64_t next, last, step, credit, made;
-    struct view_wishes *wishes;
+    struct view_mailbox *mailbox;
     uint32_t shown_samples;
     uint64_t shown_command, shown_revision;
 };
@@ -100,7 +100,7 @@ static void add_reference(const struct engine_command *command, struct recorded_
 
 static void end_job(struct recorded_job *job)
 {
-    view_wishes_unref(job->wishes);
+    view_mailbox_unref(job->mailbox);
     *job = (struct recorded_job){0};
 }
 
@@ -264,17 +264,17 @@ static bool has_credit(const struct recorded_job *job)
 static void go_on_with_view(struct recorded_job *job)
 {
     uint64_t revision = job->reference->scene->scene->revision;
-    struct view_wish wish = view_wishes_latest(job->wishes);
-    if (wish.camera.command != job->shown_command || revision != job->shown_revision)
+    struct view_request request = view_mailbox_latest(job->mailbox);
+    if (request.camera.command != job->shown_command || revision != job->shown_revision)
         job->shown_samples = 0;
     while (has_credit(job) && job->shown_samples < job->samples) {
-        wish = view_wishes_begin_frame(job->wishes);
+        request = view_mailbox_begin_frame(job->mailbox);
         job->shown_samples += job->pass_samples;
-        if (job->shown_samples > job->samples || wish.camera.moving)
+        if (job->shown_samples > job->samples || request.camera.moving)
             job->shown_samples = job->samples;
-        job->shown_command = wish.camera.command;
+        job->shown_command = request.camera.command;
         job->shown_revision = revision;
-        say_frame(job, job->shown_samples, &wish.camera);
+        say_frame(job, job->shown_samples, &request.camera);
     }
 }
 
@@ -297,11 +297,11 @@ static void start_job(struct engine_command *command, struct recorded_reference 
     const struct engine_job *asked = &command->job;
     struct recorded_job *job = find_job(0, 0);
     FUZZ_REQUIRE(job && asked->frame_step > 0 && asked->view.pass_samples > 0);
-    FUZZ_REQUIRE((asked->kind == JOB_VIEW) == (asked->wishes != NULL));
+    FUZZ_REQUIRE((asked->kind == JOB_VIEW) == (asked->mailbox != NULL));
     uint64_t first = asked->first_frame;
-    for (size_t i = 0; asked->wishes && i < JOBS_MAX; i++) {
+    for (size_t i = 0; asked->mailbox && i < JOBS_MAX; i++) {
         struct recorded_job *before = &recorder.jobs[i];
-        if (!before->client || before->wishes != asked->wishes)
+        if (!before->client || before->mailbox != asked->mailbox)
             continue;
         first = before->next;
         say(ENGINE_DONE, before->client, before->request);
@@ -322,7 +322,7 @@ static void start_job(struct engine_command *command, struct recorded_reference 
         .last = asked->last_frame,
         .step = asked->frame_step,
         .credit = asked->credit,
-        .wishes = asked->wishes ? view_wishes_ref(asked->wishes) : NULL,
+        .mailbox = asked->mailbox ? view_mailbox_ref(asked->mailbox) : NULL,
     };
     go_on(job);
 }

@@ -138,12 +138,12 @@ bool frame_request_same_radiance(const struct frame_request *a, const struct fra
            frame_request_hides_environment(a) == frame_request_hides_environment(b);
 }
 
-bool frame_request_goes_on(const struct frame_request *request)
+bool frame_request_is_open_ended(const struct frame_request *request)
 {
     return request->sampling.accumulate || request->sampling.noise > 0.0f;
 }
 
-/* What the sum of the samples depends on: not on what is done with it. */
+/* The members that the sum of the samples depends on: not those for its display. */
 static struct record_picture summed_picture(const struct frame_request *request)
 {
     struct record_picture picture = request->picture;

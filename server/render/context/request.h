@@ -114,7 +114,7 @@ float frame_request_radiance_limit(const struct frame_request *request);
 /* Whether the same ray brings the same radiance. */
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b);
 /* Whether it is not known beforehand how many samples a pixel will have. */
-bool frame_request_goes_on(const struct frame_request *request);
+bool frame_request_is_open_ended(const struct frame_request *request);
 /* Whether the samples of `b` may be added to those of `a`: they are equal but for their number and the use of the
  * sum, and `b` does not start anew. */
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b);

@@ -196,11 +196,11 @@ static bool set_up(struct frame_renderer *renderer, struct error *error)
     work->frame.uniforms.far_width[2] = frame_request_hides_environment(request) ? 1.0f : 0.0f;
     /* Samples of a layer's texel all pass through its middle. */
     work->frame.spread =
-        !frame_is_layer_pass(renderer) && (request->sampling.samples > 1 || frame_request_goes_on(request));
+        !frame_is_layer_pass(renderer) && (request->sampling.samples > 1 || frame_request_is_open_ended(request));
     work->frame.uniforms.far_width[1] =
-        work->frame.spread
-            ? 1.0f / sqrtf(frame_request_goes_on(request) ? SAMPLES_GOING_ON : (float)request->sampling.samples)
-            : 1.0f;
+        work->frame.spread ? 1.0f / sqrtf(frame_request_is_open_ended(request) ? SAMPLES_GOING_ON
+                                                                               : (float)request->sampling.samples)
+                           : 1.0f;
     fill_filter(&work->frame);
     work->frame.uniforms.seed = (uint32_t)(request->sampling.seed ^ request->sampling.seed >> 32);
     return size_frame(renderer, error);

@@ -51,7 +51,7 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
     work->frame.uniforms.sample_shift = shift < sample_shift_max ? shift : sample_shift_max;
     /* A sample that is added to others has no group of its own. */
     work->frame.uniforms.group_shift =
-        frame_request_goes_on(&work->frame.request)
+        frame_request_is_open_ended(&work->frame.request)
             ? 0
             : slices_group_shift(work->frame.request.sampling.samples, renderer->sample);
     for (uint32_t i = 0; i < 1u << work->frame.uniforms.sample_shift; i++)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The engine with the real renderer: frames of clients that take turns are those that each would get alone. */
 #include "engine/backend.h"
-#include "engine/view_wishes.h"
+#include "engine/view_mailbox.h"
 #include "tests/fixtures/structure.h"
 #include "tests/fixtures/frame_hooks.h"
 #include "tests/harness/test.h"
@@ -458,13 +458,13 @@ TEST(views_beside_each_other_come_to_the_pictures_of_single_frames)
     assert_true(expected[0] != expected[1]);
     for (uint32_t i = 0; i < 2; i++) {
         struct engine_command made = picture(20 + i, &keys[1 - i]); /* where it does not look from */
-        struct view_wishes *wishes = view_wishes_create();
-        assert_non_null(wishes);
-        view_wishes_set_camera(wishes, &(struct view_camera){.command = 1, .key = keys[i]});
+        struct view_mailbox *mailbox = view_mailbox_create();
+        assert_non_null(mailbox);
+        view_mailbox_set_camera(mailbox, &(struct view_camera){.command = 1, .key = keys[i]});
         made.job.kind = JOB_VIEW;
         made.job.last_frame = UINT32_MAX;
         made.job.view.pass_samples = 2;
-        made.job.wishes = wishes;
+        made.job.mailbox = mailbox;
         submit(made);
     }
     while (!seen[0] || !seen[1]) {

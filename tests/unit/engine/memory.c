@@ -52,21 +52,21 @@ TEST(views_go_on_while_batches_wait_for_memory)
     wait_until(&fake.frames_begun, 1);
     submit(taking(2, 20, 60000));
     expect_silence();
-    struct view_wishes *wishes = view_wishes_create();
+    struct view_mailbox *mailbox = view_mailbox_create();
     struct engine_command *view = render(3, 30, 0, UINT32_MAX);
     view->job.view.pass_samples = 1;
     view->job.kind = JOB_VIEW;
     view->job.view.still_encoding = ENCODING_RAW;
-    view->job.wishes = view_wishes_ref(wishes);
+    view->job.mailbox = view_mailbox_ref(mailbox);
     submit(view);
     const struct view_camera camera = {.command = 7,
                                        .key = {.eye_world = {0, 0, 5}, .up_world = {0, 1, 0}, .fov_y = 1}};
-    assert_true(view_wishes_set_camera(wishes, &camera));
+    assert_true(view_mailbox_set_camera(mailbox, &camera));
     submit(command(ENGINE_VIEW_CHANGED, 3, 0));
     engine_event_destroy(expect_event(ENGINE_FRAME, 3, 30));
     submit_target(ENGINE_JOB_CANCEL, 3, 31, 30, 0);
     for (int i = 0; i < 2; i++)
         engine_event_destroy(next_event());
     open_gate(2);
-    view_wishes_unref(wishes);
+    view_mailbox_unref(mailbox);
 }

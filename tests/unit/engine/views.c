@@ -12,8 +12,8 @@
 
 #define MS UINT64_C(1000000)
 
-/* The wishes of client 1, which has opened scene 1. */
-static struct view_wishes *wishes;
+/* The requests of client 1, which has opened scene 1. */
+static struct view_mailbox *mailbox;
 
 static struct engine_frame *taken[256]; /* until the test ends */
 static size_t taken_count;
@@ -31,7 +31,7 @@ static int begin(void **state)
 {
     (void)state;
     start((struct engine_options){.encode_threads = 4});
-    wishes = view_wishes_create();
+    mailbox = view_mailbox_create();
     open_scene(1, 1);
     return 0;
 }
@@ -44,12 +44,12 @@ static int end(void **state)
         free(frame->bytes);
         free(frame);
     }
-    view_wishes_unref(wishes);
+    view_mailbox_unref(mailbox);
     return stop_engine(state);
 }
 
 /* Frames need 1 sample of 4, so that they refine; the bound of frames a second is out of the way. */
-static struct engine_command *view_of(uint32_t request, struct view_wishes *wanted)
+static struct engine_command *view_of(uint32_t request, struct view_mailbox *wanted)
 {
     struct engine_command *made = render(1, request, 0, UINT32_MAX);
     made->job.kind = JOB_VIEW;
@@ -60,13 +60,13 @@ static struct engine_command *view_of(uint32_t request, struct view_wishes *want
     made->job.encoding = ENCODING_JPEG;
     made->job.quality = 80;
     made->job.view.still_encoding = ENCODING_RAW;
-    made->job.wishes = view_wishes_ref(wanted);
+    made->job.mailbox = view_mailbox_ref(wanted);
     return made;
 }
 
 static struct engine_command *view(uint32_t request)
 {
-    return view_of(request, wishes);
+    return view_of(request, mailbox);
 }
 
 /* From 5 m away, at the height of the command's number. */
@@ -82,7 +82,7 @@ static struct view_camera camera(uint64_t number, bool moving)
 
 static void set_eye(const struct view_camera *from)
 {
-    if (view_wishes_set_camera(wishes, from))
+    if (view_mailbox_set_camera(mailbox, from))
         submit(command(ENGINE_VIEW_CHANGED, 1, 0));
 }
 
@@ -326,7 +326,7 @@ TEST(a_complete_picture_comes_again_as_a_key_frame_and_not_with_more_samples)
     for (uint32_t number = 0; number < 3; number++)
         expect_key(take(expect_frame(1, 2, number)), false);
     for (uint32_t number = 3; number < 5; number++) {
-        assert_true(view_wishes_request_key_frame(wishes));
+        assert_true(view_mailbox_request_key_frame(mailbox));
         submit(command(ENGINE_VIEW_CHANGED, 1, 0));
         struct engine_frame *frame = take(expect_frame(1, 2, number));
         assert_true(frame->wants_key);
@@ -367,7 +367,7 @@ TEST(a_stream_continues_over_frames_at_rest_and_restarts_on_request)
     /* A camera at rest has a frame at once, and the stream begins again with the next motion. */
     look(5, false);
     expect_encoded(take(next_event()), ENCODING_RAW, true);
-    assert_true(view_wishes_request_key_frame(wishes));
+    assert_true(view_mailbox_request_key_frame(mailbox));
     submit(command(ENGINE_VIEW_CHANGED, 1, 0));
     expect_encoded(take(next_event()), ENCODING_RAW, true);
     expect_encoded(take_next(6, true), ENCODING_H264, true);
@@ -383,7 +383,7 @@ TEST(a_stream_continues_over_frames_at_rest_and_restarts_on_request)
 
 TEST(a_view_takes_the_place_of_another_and_goes_on_from_it)
 {
-    struct view_wishes *others = view_wishes_create();
+    struct view_mailbox *others = view_mailbox_create();
     open_scene(1, 7);
     submit(with_samples(view(2), 1, 1));
     expect_picture(2, 0, 0, 1, ENCODING_RAW);
@@ -405,7 +405,7 @@ TEST(a_view_takes_the_place_of_another_and_goes_on_from_it)
     expect_failed(1, 5, ERROR_UNSUPPORTED, "render.tracer");
     look(6, true);
     expect_picture(4, 3, 6, 1, ENCODING_ZSTD);
-    view_wishes_unref(others);
+    view_mailbox_unref(others);
 }
 
 TEST(a_frame_in_progress_ends_with_the_view_that_is_replaced)
@@ -469,7 +469,7 @@ TEST(effort_counts_for_a_view_that_moves_and_asked_for_it)
         made->job.frame.light.depth = 8;
         made->job.frame.picture.width = 80;
         made->job.frame.picture.height = 48;
-        view_wishes_set_effort(wishes, &rows[i].effort);
+        view_mailbox_set_effort(mailbox, &rows[i].effort);
         look(number, false);
         submit(made);
         float fov_y = 0;
@@ -571,8 +571,8 @@ TEST(less_is_made_for_views_of_the_client_where_time_or_the_link_is_short)
     made->job.view.margin = 0.25f;
     made->job.view.hidden_layers = 1;
     made->job.frame.picture.width = made->job.frame.picture.height = 64;
-    view_wishes_set_effort(wishes,
-                           &(struct view_effort){.samples = 2, .margin_halves_less = 1, .no_hidden = true});
+    view_mailbox_set_effort(mailbox,
+                            &(struct view_effort){.samples = 2, .margin_halves_less = 1, .no_hidden = true});
     look(1, true);
     submit(made);
     struct engine_frame *frame = take(expect_frame(1, 2, 0));
@@ -584,7 +584,7 @@ TEST(less_is_made_for_views_of_the_client_where_time_or_the_link_is_short)
     assert_int_equal(frame->request.hidden_layer, 1);
     assert_int_equal(frame->request.picture.width, 40);       /* half of 64 and its margins */
     assert_true(frame->applied_ns - rendered_ns >= 100 * MS); /* nobody has wished anything since */
-    view_wishes_set_effort(wishes, &(struct view_effort){.margin_halves_less = 2});
+    view_mailbox_set_effort(mailbox, &(struct view_effort){.margin_halves_less = 2});
     look(2, true);
     frame = take(expect_frame(1, 2, 2));
     assert_int_equal(frame->margin_x, 0);
@@ -621,14 +621,14 @@ TEST(frames_come_in_the_form_that_their_encoder_takes)
 {
     struct engine_command *made = with_samples(view(2), 2, 1);
     made->job.view.adapt = true;
-    view_wishes_set_effort(wishes, &(struct view_effort){.quality = 95, .sparing = true});
+    view_mailbox_set_effort(mailbox, &(struct view_effort){.quality = 95, .sparing = true});
     submit(made);
     /* Only its samples tell whether a frame at rest will be lossy. */
     expect_form(take(expect_frame(1, 2, 0)), ENCODING_JPEG, YCBCR_NONE);
     expect_form(take(expect_frame(1, 2, 1)), ENCODING_RAW, YCBCR_NONE);
     look(1, true);
     expect_form(take(expect_frame(1, 2, 2)), ENCODING_JPEG, YCBCR_NONE); /* full chroma */
-    view_wishes_set_effort(wishes, &(struct view_effort){.quality = 55, .sparing = true});
+    view_mailbox_set_effort(mailbox, &(struct view_effort){.quality = 55, .sparing = true});
     look(2, true);
     expect_form(take(expect_frame(1, 2, 3)), ENCODING_JPEG, YCBCR_JPEG);
     look(3, false);
@@ -650,7 +650,7 @@ TEST(a_camera_that_spans_no_view_ends_it)
     expect_picture(2, 0, 0, 1, ENCODING_RAW);
     struct view_camera nowhere = camera(1, true);
     memcpy(nowhere.key.look_at_world, nowhere.key.eye_world, sizeof(nowhere.key.eye_world));
-    assert_true(view_wishes_set_camera(wishes, &nowhere));
+    assert_true(view_mailbox_set_camera(mailbox, &nowhere));
     submit(command(ENGINE_VIEW_CHANGED, 1, 0));
     expect_failed(1, 2, ERROR_INVALID, "view_camera.up_world");
 }
@@ -660,13 +660,13 @@ TEST(a_camera_that_spans_no_view_ends_it)
 TEST_WITH(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free, NULL, NULL)
 {
     struct queue *events = queue_create(4, false);
-    struct view_wishes *own = view_wishes_create();
+    struct view_mailbox *own = view_mailbox_create();
     struct scene *scene = scene_create("", &(struct scene_limits){0});
     struct engine_scene held = {.scene = scene};
     struct job job = {
         .scene = &held,
         .output = job_output_create(&(struct job_output_options){.events = events, .window = 3, .credit = 100}),
-        .spec = {.wishes = own, .frame.sampling.samples = 1, .view.pass_samples = 1},
+        .spec = {.mailbox = own, .frame.sampling.samples = 1, .view.pass_samples = 1},
         .view = {.credit = 10, .due_ns = 7 * MS, .render_ns = 3 * MS, .rendered_ns = 10 * MS},
     };
     assert_int_equal(view_due_ns(&job), 7 * MS);
@@ -687,7 +687,7 @@ TEST_WITH(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free, NULL, NULL
     engine_event_destroy(queue_try_pop(events));
     queue_destroy(events, NULL);
     scene_destroy(scene);
-    view_wishes_unref(own);
+    view_mailbox_unref(own);
 }
 
 TEST(a_view_goes_on_after_the_device_was_lost)

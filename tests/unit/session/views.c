@@ -8,7 +8,7 @@
 #include "encode/stream.h"
 
 #include "base/clock.h"
-#include "engine/view_wishes.h"
+#include "engine/view_mailbox.h"
 #include "tests/harness/test.h"
 
 #include <linux/sockios.h>
@@ -188,7 +188,7 @@ static struct engine_command *start_view(uint32_t request, uint32_t credit)
     struct engine_command *command = told(ENGINE_JOB_START);
     assert_int_equal(command->request, request);
     assert_int_equal(command->job.kind, JOB_VIEW);
-    assert_non_null(command->job.wishes);
+    assert_non_null(command->job.mailbox);
     return command;
 }
 
@@ -273,7 +273,7 @@ SESSION_TEST(a_frame_names_the_camera_that_it_shows)
     uint64_t before_ns = clock_now_ns();
     send_camera(7, true);
     told(ENGINE_VIEW_CHANGED);
-    struct view_camera camera = view_wishes_begin_frame(start->job.wishes).camera;
+    struct view_camera camera = view_mailbox_begin_frame(start->job.mailbox).camera;
     assert_int_equal(camera.command, 7);
     assert_true(camera.moving);
     assert_true(before_ns <= camera.received_ns && camera.received_ns <= clock_now_ns());
@@ -342,10 +342,10 @@ SESSION_TEST(a_flood_of_cameras_wakes_the_engine_once)
     expect_alive(9);
     told(ENGINE_VIEW_CHANGED);
     told_nothing();
-    assert_int_equal(view_wishes_begin_frame(start->job.wishes).camera.command, 1000);
+    assert_int_equal(view_mailbox_begin_frame(start->job.mailbox).camera.command, 1000);
     send_camera(1001, false);
     told(ENGINE_VIEW_CHANGED);
-    assert_false(view_wishes_begin_frame(start->job.wishes).camera.moving);
+    assert_false(view_mailbox_begin_frame(start->job.mailbox).camera.moving);
 }
 
 SESSION_TEST(a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not)
@@ -367,8 +367,8 @@ SESSION_TEST(a_request_for_a_key_frame_reaches_the_engine)
     struct engine_command *start = start_acknowledged_view(2, 1);
     send_ack(0, true, true);
     told(ENGINE_VIEW_CHANGED);
-    assert_true(view_wishes_begin_frame(start->job.wishes).key_frame);
-    assert_false(view_wishes_begin_frame(start->job.wishes).key_frame);
+    assert_true(view_mailbox_begin_frame(start->job.mailbox).key_frame);
+    assert_false(view_mailbox_begin_frame(start->job.mailbox).key_frame);
 }
 
 /* Frame 1 is on its way and not acknowledged, and the link was slow before, so that frame 2 has waited for it when
@@ -606,7 +606,7 @@ SESSION_TEST(a_frame_in_parts_comes_whole_if_nothing_overtakes_it)
     assert_int_equal(take_cut(0), LARGE_FRAME_BYTES);
 }
 
-SESSION_TEST(frames_are_wished_in_parts_where_the_link_takes_long_for_them)
+SESSION_TEST(frames_are_requested_in_parts_where_the_link_takes_long_for_them)
 {
     struct engine_command *start = start_view_in_parts(100);
     clock_stop();
@@ -615,11 +615,11 @@ SESSION_TEST(frames_are_wished_in_parts_where_the_link_takes_long_for_them)
     clock_let_pass(100 * MS);
     send_ack(0, true, false); /* so long it took, as far as the daemon knows */
     told(ENGINE_JOB_CREDIT);
-    assert_false(view_wishes_latest(start->job.wishes).effort.parts);
+    assert_false(view_mailbox_latest(start->job.mailbox).effort.parts);
     say_frame(2, 1, 3);
     take_frame(2, 1);
-    assert_true(view_wishes_latest(start->job.wishes).effort.parts);
-    assert_false(view_wishes_latest(start->job.wishes).effort.still_parts);
+    assert_true(view_mailbox_latest(start->job.mailbox).effort.parts);
+    assert_false(view_mailbox_latest(start->job.mailbox).effort.still_parts);
 }
 
 /* Who moves on each time just before the picture at rest is there sees one now and then. */
@@ -676,7 +676,7 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     told_credit(2, 2);
     say_frame(2, 1, 3);
     take_frame(2, 1);
-    const struct view_effort effort = view_wishes_latest(start->job.wishes).effort;
+    const struct view_effort effort = view_mailbox_latest(start->job.mailbox).effort;
     assert_true(effort.scale_32nds < 32);
     assert_true(effort.quality < 90);
     assert_true(effort.bytes < FRAME_BYTES);
@@ -685,11 +685,11 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     clock_let_pass(100 * MS);
     send_ack(1, true, false);
     take_frame(2, 2);
-    assert_false(view_wishes_latest(start->job.wishes).effort.sparing);
+    assert_false(view_mailbox_latest(start->job.mailbox).effort.sparing);
     say_large_frame(2, 3); /* more than a second */
-    for (unsigned i = 0; !view_wishes_latest(start->job.wishes).effort.sparing && i < 2000; i++)
+    for (unsigned i = 0; !view_mailbox_latest(start->job.mailbox).effort.sparing && i < 2000; i++)
         usleep(10000);
-    assert_true(view_wishes_latest(start->job.wishes).effort.sparing);
+    assert_true(view_mailbox_latest(start->job.mailbox).effort.sparing);
 }
 
 /* A frame of 100 ns is in time for no rate that can be asked for; this one took a second. */
@@ -708,7 +708,7 @@ SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
     slow->frame->encoded_ns = slow->frame->rendered_ns + 100;
     port_say(slow);
     take_frame(2, 0);
-    struct view_effort effort = view_wishes_latest(start->job.wishes).effort;
+    struct view_effort effort = view_mailbox_latest(start->job.mailbox).effort;
     assert_int_equal(effort.scale_32nds, 5); /* 49 ms of 85 % of 50, so bounces go as well */
     assert_int_equal(effort.depth_less, 6);
     assert_int_equal(effort.quality, 0); /* the link is not followed */
@@ -723,7 +723,7 @@ SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
     told(ENGINE_JOB_CREDIT);
     say_frame(2, 1, 3);
     take_frame(2, 1);
-    const struct view_effort effort = view_wishes_latest(start->job.wishes).effort;
+    const struct view_effort effort = view_mailbox_latest(start->job.mailbox).effort;
     assert_int_equal(effort.margin_halves_less, 2);
     assert_true(effort.bytes > FRAME_BYTES / 4); /* at twenty a second */
     assert_true(effort.quality < 90);
@@ -751,7 +751,7 @@ SESSION_TEST(a_view_takes_the_place_of_another_on_its_channel)
     send_camera(7, true);
     told(ENGINE_VIEW_CHANGED);
     struct engine_command *change = replace_view(3, 17);
-    assert_ptr_equal(change->job.wishes, start->job.wishes);
+    assert_ptr_equal(change->job.mailbox, start->job.mailbox);
     say_frame(2, 1, 7); /* the engine has not seen it yet */
     take_frame(2, 1);
     told_credit(2, 5);
@@ -1094,7 +1094,7 @@ SESSION_TEST(views_have_room_for_their_frames_or_are_refused)
 static struct {
     uint64_t chance;
     struct {
-        struct view_wishes *wishes; /* not owned; NULL: there is no view */
+        struct view_mailbox *mailbox; /* not owned; NULL: there is no view */
         uint32_t request, next_frame;
         uint64_t credit, made;
     } views[VIEWS];
@@ -1116,9 +1116,9 @@ static void start_or_refuse(struct engine_command *command)
 {
     unsigned place = VIEWS, empty = VIEWS;
     for (unsigned i = 0; i < VIEWS; i++) {
-        if (play.views[i].wishes == command->job.wishes)
+        if (play.views[i].mailbox == command->job.mailbox)
             place = i;
-        else if (!play.views[i].wishes)
+        else if (!play.views[i].mailbox)
             empty = i;
     }
     if (!roll(4)) {
@@ -1130,7 +1130,7 @@ static void start_or_refuse(struct engine_command *command)
     else
         place = empty;
     assert_true(place < VIEWS);
-    play.views[place].wishes = command->job.wishes;
+    play.views[place].mailbox = command->job.mailbox;
     play.views[place].request = command->request;
     play.views[place].credit = command->job.credit;
     play.views[place].made = 0;
@@ -1139,9 +1139,9 @@ static void start_or_refuse(struct engine_command *command)
 static void end_view(uint32_t request, enum error_code why)
 {
     for (unsigned i = 0; i < VIEWS; i++) {
-        if (play.views[i].wishes && play.views[i].request == request) {
+        if (play.views[i].mailbox && play.views[i].request == request) {
             say(ENGINE_FAILED, request, why);
-            play.views[i].wishes = NULL;
+            play.views[i].mailbox = NULL;
         }
     }
 }
@@ -1156,13 +1156,13 @@ static void play_engine(void)
             say(ENGINE_DONE, command->request, ERROR_NONE);
         }
         for (unsigned i = 0; i < VIEWS && command->kind == ENGINE_JOB_CREDIT; i++) {
-            if (play.views[i].wishes && play.views[i].request == command->target_request)
+            if (play.views[i].mailbox && play.views[i].request == command->target_request)
                 play.views[i].credit = command->credit;
         }
         engine_command_destroy(command);
     }
     for (unsigned i = 0; i < VIEWS; i++) {
-        if (!play.views[i].wishes)
+        if (!play.views[i].mailbox)
             continue;
         if (!roll(40)) {
             end_view(play.views[i].request, ERROR_OUT_OF_MEMORY);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* The latest wishes of a view's client: its camera, and whether the next frame must be a key frame. Newer wishes
- * replace older ones, so none can queue however fast they arrive. */
-#ifndef FARLIGHT_ENGINE_VIEW_WISHES_H
-#define FARLIGHT_ENGINE_VIEW_WISHES_H
+/* The latest requests of a view's client: its camera, and whether the next frame must be a key frame. Newer
+ * requests replace older ones, so none can queue however fast they arrive. */
+#ifndef FARLIGHT_ENGINE_VIEW_MAILBOX_H
+#define FARLIGHT_ENGINE_VIEW_MAILBOX_H
 
 #include "engine/engine.h"
 
@@ -14,16 +14,16 @@ struct view_camera {
     uint32_t node;                /* node whose camera overrides the key's, except for the time; 0: none */
 };
 
-struct view_wishes;
+struct view_mailbox;
 
-struct view_wishes *view_wishes_create(void); /* NULL: out of memory */
-struct view_wishes *view_wishes_ref(struct view_wishes *wishes);
-void view_wishes_unref(struct view_wishes *wishes); /* accepts NULL */
+struct view_mailbox *view_mailbox_create(void); /* NULL: out of memory */
+struct view_mailbox *view_mailbox_ref(struct view_mailbox *mailbox);
+void view_mailbox_unref(struct view_mailbox *mailbox); /* accepts NULL */
 
 /* True: the caller must notify the engine by ENGINE_VIEW_CHANGED. False: it was notified, and has not read the
- * wishes since. */
-bool view_wishes_set_camera(struct view_wishes *wishes, const struct view_camera *camera);
-bool view_wishes_request_key_frame(struct view_wishes *wishes);
+ * requests since. */
+bool view_mailbox_set_camera(struct view_mailbox *mailbox, const struct view_camera *camera);
+bool view_mailbox_request_key_frame(struct view_mailbox *mailbox);
 
 /* Effort for frames of views that adapt to the link or keep a rate. */
 struct view_effort {
@@ -44,16 +44,16 @@ struct view_effort {
     bool parts, still_parts;
 };
 /* Sets the effort without notifying the engine: it applies when the next frame begins for another reason. */
-void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort);
+void view_mailbox_set_effort(struct view_mailbox *mailbox, const struct view_effort *effort);
 
-struct view_wish {
+struct view_request {
     struct view_camera camera;
     bool key_frame;
     struct view_effort effort;
 };
-/* The latest wishes, which stay in force. */
-struct view_wish view_wishes_latest(struct view_wishes *wishes);
-/* The latest wishes for a frame that is about to begin; clears the request for a key frame. */
-struct view_wish view_wishes_begin_frame(struct view_wishes *wishes);
+/* The latest mailbox, which stay in force. */
+struct view_request view_mailbox_latest(struct view_mailbox *mailbox);
+/* The latest requests for a frame that is about to begin; clears the request for a key frame. */
+struct view_request view_mailbox_begin_frame(struct view_mailbox *mailbox);
 
 #endif
