@@ -94,7 +94,7 @@ static const struct row {
 };
 #define ROW_COUNT (sizeof(rows) / sizeof(rows[0]))
 
-static struct field_desc leaves[FIELDS_MAX]; /* fields of the message and its records, with offsets in the message */
+static struct field_desc leaves[FIELDS_MAX]; /* fields of the message and its records, at offsets in it */
 static size_t leaf_count;
 static struct cli_field fields[FIELDS_MAX];
 static size_t field_count;

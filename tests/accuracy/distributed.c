@@ -148,7 +148,7 @@ TEST_LONG(where_all_is_smooth_the_mean_is_whitteds_picture)
     double own[PIXELS], whitted[PIXELS], blocks[BLOCKS][SEEDS] = {{0}}, whole[SEEDS] = {0};
     begin(fixture, smooth_things);
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
-        fixture->request.light.integrator = INTEGRATOR_WHITTED; /* the same places in the pixels */
+        fixture->request.light.integrator = INTEGRATOR_WHITTED; /* equal places in the pixels */
         picture(fixture, SAMPLES, seed, whitted);
         fixture->request.light.integrator = INTEGRATOR_DISTRIBUTED;
         picture(fixture, SAMPLES, seed, own);

@@ -374,7 +374,7 @@ TEST(what_shows_something_else_begins_from_new)
     const struct frame_request first = fixture->request;
     expect_from_new(fixture, 2, "the first frame");
     expect_from_new(fixture, 4, "the second");
-    fixture->request.picture.exposure_stops = 1.0f; /* of what is done with the sum */
+    fixture->request.picture.exposure_stops = 1.0f; /* a change of the display only */
     expect_from_new(fixture, 6, "another exposure");
     fixture->request.camera.world_from_view[3] += 0.01f;
     expect_from_new(fixture, 2, "another camera");

@@ -345,7 +345,7 @@ TEST(imprecise_distances_are_hits_with_an_error)
     assert_near(figures->relative_median * 65536.0f, 1.0, 1.0 / 512 + 1.0 / 256);
     assert_true(figures->distance_max > 0.0f && figures->distance_max < 1e-4f);
     frame_result_finish(&result);
-    fixture->request.comparison.compare_far = 1e-6f; /* to whom that is too far */
+    fixture->request.comparison.compare_far = 1e-6f; /* smaller than the distance between the two */
     result = fixture_render(fixture);
     figures = find(&result, 0, RAY_PRIMARY);
     assert_int_equal(figures->far, figures->both_hit);

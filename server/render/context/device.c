@@ -22,8 +22,8 @@ void context_span_end(struct render_device *device)
         context_collect_done(device);
 }
 
-/* A frame of many slices and samples has more spans than a record holds; what is of one stage, clock and wave
- * becomes one, which begins where the first of them did. */
+/* A frame of many slices and samples has more spans than a record holds; spans of one stage, clock and wave
+ * are added up to one, which begins where the first of them did. */
 static void add_span(struct stage_times *times, uint64_t origin_ns, const struct record_stage_time *span)
 {
     for (uint32_t i = 0; i < times->count; i++) {

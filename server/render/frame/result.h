@@ -53,7 +53,8 @@ struct frame_result {
     uint64_t uploaded_bytes, structure_bytes;
     struct structure_rows structure; /* rows of the tracer about its structure and its waves */
     struct stage_times times;
-    struct record_wave_comparison *comparisons; /* owned; ascending by wave and kind; NULL: nothing was compared */
+    struct record_wave_comparison
+        *comparisons; /* owned; ascending by wave and kind; NULL: tracers were not compared */
     uint32_t comparison_count;
 };
 void frame_result_finish(struct frame_result *result);

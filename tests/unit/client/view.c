@@ -260,7 +260,7 @@ static void play_changes(struct daemon *daemon)
         const struct message_frame_begin frame = some_frame(number, seen.last_command);
         if (asked.type == MESSAGE_RENDER) {
             if (request != 0 && asked.render.picture.width > EDGE)
-                tell_frame(daemon, request, &frame);
+                send_frame(daemon, request, &frame);
             number += request != 0 && asked.render.picture.width > EDGE;
             if (request != 0)
                 send_type(daemon, request, MESSAGE_OK);
@@ -280,7 +280,7 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
     options.tracing.tracer = PROTOCOL_TRACER_LDC;
     for (unsigned i = 0; i < 40; i++) {
         options.picture.width = i >= 20 ? 2 * EDGE : EDGE;
-        if (!fl_view_change(view, &options, &error) || !fl_view_look(view, &some_camera, NULL, &error))
+        if (!fl_view_change(view, &options, &error) || !fl_view_set_camera(view, &some_camera, NULL, &error))
             fail_msg("%s", error.text);
         for (unsigned frames = i >= 20 ? 2 : 1; frames > 0; frames--) {
             struct fl_frame *frame = next_frame(view);

@@ -289,7 +289,7 @@ TEST(clips_move_the_view_of_a_camera_with_keys)
     assert_true(request->camera.world_from_view[3] == 3.0f && request->camera.world_from_view[11] == 6.0f);
     assert_true(fabsf(request->camera.fov_y - 0.6f) < 1e-6f);
     assert_true(request->aperture == 3.0f && request->picture.exposure_stops == 2.5f);
-    /* It looks at the origin still, sqrt(45) m away. */
+    /* The camera still looks at the origin, sqrt(45) m away. */
     assert_true(fabsf(request->focus - sqrtf(45)) < 1e-5f);
     shot_finish(&shot);
     job.clip_count = 2;
@@ -474,7 +474,7 @@ TEST(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does)
     struct scene *scene = turning_scene(90);
     struct record_clip_use use = {.clip = 1, .speed = 1};
     struct engine_job along = job_of(CAMERA_NODE, &use, 1), watched = job_of(CAMERA_KEYS, &use, 1);
-    along.camera.aperture = watched.camera.aperture = 0.5f; /* it is focused alike */
+    along.camera.aperture = watched.camera.aperture = 0.5f; /* both have the same focus */
     for (uint32_t frame = 0; frame <= 10; frame += 5) {
         struct shot expected = shot_at(&along, scene, frame), look;
         struct view_camera from = {.command = 1, .key = home, .node = 3};

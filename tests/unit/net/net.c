@@ -358,7 +358,7 @@ TEST(timers_come_in_their_order_and_deferred_calls_once)
     clock_let_pass(20000000);
     assert_true(loop_run(scene.loop, &error));
     assert_string_equal(scene.order, "edl");
-    clock_go_on();
+    clock_start();
     loop_destroy(scene.loop);
 }
 

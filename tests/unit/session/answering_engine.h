@@ -21,7 +21,7 @@ static struct {
     uint32_t job_request, next_frame, last_frame;
     struct engine_job job; /* the last one, but for what it owns */
     struct record_clip_use job_clips[16];
-    struct structure_rows structure; /* of the frames that it renders */
+    struct structure_rows structure; /* reported with each frame */
     uint64_t credit_seen, commits;
     atomic_uint edits, gone;
 } engine;

@@ -18,7 +18,7 @@ float denoise_strength(const struct frame_request *request, uint32_t samples)
 {
     if (request->picture.denoise != DENOISE_AUTO)
         return request->picture.denoise == DENOISE_ON ? 1.0f : 0.0f;
-    if (request->sampling.noise > 0.0f) /* the picture is rendered until its noise is below what was asked for */
+    if (request->sampling.noise > 0.0f) /* the requested noise is the end of sampling */
         return 0.0f;
     const float left = 2.0f - 2.0f * (float)samples / (float)AUTO_SAMPLES;
     return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
