@@ -6,7 +6,10 @@
 #include "tree/layout.h"
 
 /* Place where an invocation resumes in the next dispatch, uvec4: element; the instance that its packet is in;
- * element of the top tree; bit 0: finished; above it a bit for each ray of this packet and of those to come. */
+ * element of the top tree; bit 0: finished; above it a bit for each ray of this packet and of those to come.
+ * A ray through wide nodes has more texels behind it: its group of nodes and the height of its stack, then the
+ * stack's groups in pairs. */
+#define BVH_WIDE_PLACE_TEXELS (2u + BVH_WIDE_DEPTH_MAX / 2u)
 #define BIND_BVH_PLACES BIND_TRACER_1
 #define BIND_BVH_UNFINISHED BIND_PASS_4
 #define BVH_UNFINISHED WAVE_STOPPED_LONG

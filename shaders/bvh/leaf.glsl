@@ -42,7 +42,7 @@ float end_of(trace_ray r, answer found)
 #endif
 }
 
-#if defined BVH_DEFORMS && !defined ANY_HIT
+#if !defined ANY_HIT && defined ASK_MATERIALS
 // Order of surfaces at one distance: lower numbers first, a disc before all, and nothing at the ray's end (disc and miss
 // have numbers that wrap to 0).
 bool is_before(candidate a, candidate b)
@@ -50,6 +50,19 @@ bool is_before(candidate a, candidate b)
     bool has_lower_numbers = a.instance_index == b.instance_index ? a.primitive + 1u < b.primitive + 1u
                                                                   : a.instance_index + 1u < b.instance_index + 1u;
     return a.distance < b.distance || (a.distance == b.distance && has_lower_numbers);
+}
+#elif !defined ANY_HIT
+#define ORDER_HITS
+// This order among primitives of the entered instance is the same: those with lower numbers are hit at the distance of what was found.
+// Two whole numbers compare faster than four.
+int hit_below[PACKET_RAYS];
+
+void order_hits(uint instance_index, candidate found[PACKET_RAYS])
+{
+    for (int k = 0; k < PACKET_RAYS; k++) {
+        uint before = found[k].instance_index + 1u; // 0: a disc, or nothing
+        hit_below[k] = before <= instance_index ? 0 : before == instance_index + 1u ? int(found[k].primitive) : 0x7fffffff;
+    }
 }
 #endif
 
@@ -61,11 +74,9 @@ void offer(inout trace_ray r, candidate c, inout answer found)
         found = vec3(OPTICAL_DEPTH_MAX);
         put_out(r);
     }
-#elif defined BVH_DEFORMS
+#elif defined ASK_MATERIALS
     if (c.distance > r.t_min && is_before(c, found) && !is_cut_out(c, r.origin, r.direction, time_of(r)))
         found = c;
-#else
-    offer_closest(r, c, found);
 #endif
 }
 
@@ -92,8 +103,15 @@ void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found,
         hits.barycentrics = c.barycentrics;
         bits |= 1u << bit;
     }
-#else
+#elif defined ANY_HIT
     offer(r, c, found);
+#else
+    // Bits of distances beyond t_min, which is not negative, are in their order.
+    int k = int(bit >> 1), nearer = floatBitsToInt(c.distance) + (int(c.primitive) < hit_below[k] ? -1 : 0);
+    if (c.distance > r.t_min && nearer < floatBitsToInt(found.distance)) {
+        found = c;
+        hit_below[k] = int(c.primitive);
+    }
 #endif
 }
 

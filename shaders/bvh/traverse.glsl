@@ -6,11 +6,11 @@
 //   BVH_SPHERES  the paper's form: bounds are spheres, there is one order for all directions, and the rays of a packet
 //                stay together, however they diverge
 //   BVH_PACKED   boxes are on a grid
+//   BVH_WIDE     trees of geometries have wide nodes (wide.glsl), and rays go one by one; the top tree has links
 //   BVH_ONE_INSTANCE  there is one instance: no top tree is traversed
 //   SHARED_ORIGIN     all rays of the wave begin at one point, also in each instance: terms of the origin alone are
 //                     computed once for a packet
-//   BVH_DEFORMS       there are meshes that deform, whose trees may have several histories
-//   BVH_DEFORMS_IN_SHUTTER  some of these deform while the shutter is open
+//   BVH_DEFORMS_IN_SHUTTER  some meshes deform while the shutter is open
 //   BVH_BUDGET        a ray, or a packet, stops at the maximum number of elements per dispatch, and reports it
 //   BVH_RESUMES       it resumes in the next dispatch
 //
@@ -20,10 +20,9 @@
 // once and tested against all. The octant is that of the first live ray; the others' answers do not depend on the order,
 // but less is pruned.
 //
-// Answers do not depend on the top tree: a refitted and a rebuilt one give the same answers, to the bit. The intersection
-// with a primitive depends on the ray and the packet's leading ray alone (leaf.glsl); of instances at one distance the
-// first by number is hit (favour_instance), within one the first in the order of its tree, which is that of its shape
-// (with BVH_DEFORMS: the first by number, is_before); optical depths are summed exactly (optical_depth_of).
+// Answers do not depend on the trees: refitted and rebuilt ones, of elements and of wide nodes, give the same answers, to the
+// bit. The intersection with a primitive depends on the ray and the packet's leading ray alone (leaf.glsl); of surfaces at
+// one distance the first by instance and primitive is hit (leaf.glsl); optical depths are summed exactly (optical_depth_of).
 //
 // Three loops are nested: over elements until a leaf, over leaves until an instance is entered or left, over instances.
 // All invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY): software
@@ -66,6 +65,11 @@ uint budget_left = min(bvh_budget_max, BVH_DISPATCH_ELEMENTS_MAX / max(ray_end -
 uvec4 place_of_ray; // bvh/layout.h
 #ifdef BVH_RESUMES
 #define RAYS_GO_ON
+#ifdef BVH_WIDE
+#define PLACE_TEXELS BVH_WIDE_PLACE_TEXELS
+#else
+#define PLACE_TEXELS 1u
+#endif
 uniform uint resumes;
 layout(std430, binding = BIND_BVH_PLACES) buffer place_block { uvec4 places[]; };
 #endif
@@ -199,6 +203,11 @@ void enter_tree(object_ray o[PACKET_RAYS], trace_ray r[PACKET_RAYS], int leading
     rays = relative_to(centre, o);
 }
 
+// Link that no leaf has: an intersection is noted, and the current leaf is not finished.
+#define LEAF_NOTED 1u
+
+#include "bvh/wide.glsl"
+
 // A transform element: the rays continue in the instance's space.
 void enter_instance(uint instance_index, trace_ray r[PACKET_RAYS], int leading, out entered_instance inside,
                     out object_ray o[PACKET_RAYS], out tree_traversal traversal, out bundle b, out relative_rays rays)
@@ -208,11 +217,6 @@ void enter_instance(uint instance_index, trace_ray r[PACKET_RAYS], int leading, 
     vec4 rows[3] = vec4[3](uintBitsToFloat(texelFetch(bvh_transforms, texel)),
                            uintBitsToFloat(texelFetch(bvh_transforms, texel + 1)),
                            uintBitsToFloat(texelFetch(bvh_transforms, texel + 2)));
-#endif
-    tree_grid grid = NO_GRID;
-#ifdef BVH_PACKED
-    grid = tree_grid(uintBitsToFloat(texelFetch(bvh_transforms, texel + 3)).xyz,
-                     uintBitsToFloat(texelFetch(bvh_transforms, texel + 4)).xyz);
 #endif
     uvec4 tree = texelFetch(bvh_transforms, texel + 5);
     inside.index = instance_index;
@@ -233,12 +237,20 @@ void enter_instance(uint instance_index, trace_ray r[PACKET_RAYS], int leading, 
         o[k] = object_ray(affine_point(rows, r[k].origin), affine_vector(rows, r[k].direction));
 #endif
     }
+#ifdef BVH_WIDE
+    rays = relative_to(o[0].origin, o);
+    begin_wide(o[0], uintBitsToFloat(texelFetch(bvh_transforms, texel + 3).xyz), tree.x, tree.y);
+    traversal = tree_traversal(0u, 0u, 0u, 0u, 0u); // no elements
+#else
+    tree_grid grid = NO_GRID;
+#ifdef BVH_PACKED
+    grid = tree_grid(uintBitsToFloat(texelFetch(bvh_transforms, texel + 3)).xyz,
+                     uintBitsToFloat(texelFetch(bvh_transforms, texel + 4)).xyz);
+#endif
     enter_tree(o, r, leading, grid, OBJECT_SLACK, b, rays);
     begin_tree(traversal, tree.x, tree.y, b.octant);
+#endif
 }
-
-// Link that no leaf has: an intersection is noted, and the current leaf is not finished.
-#define LEAF_NOTED 1u
 
 // Traverses the leaves of the current tree. Returns the link of the next instance; 0: the tree is finished; or
 // LEAF_NOTED, where an intersection must be settled.
@@ -246,6 +258,13 @@ uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance insi
                  relative_rays rays, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS],
                  inout noted_primitive noted)
 {
+#ifdef BVH_WIDE
+#ifndef BVH_ONE_INSTANCE
+    if (inside.index == NOT_INSIDE)
+        return next_leaf(traversal, b, left_of(r, found), r, found);
+#endif
+    return test_wide_leaves(inside, o, rays, r, found, noted);
+#else
     for (;;) {
         uint leaf = next_leaf(traversal, b, left_of(r, found), r, found);
         if (leaf == 0u || leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_INSTANCE)
@@ -264,6 +283,7 @@ uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance insi
 #endif
 #endif
     }
+#endif
 }
 
 #ifdef ASK_MATERIALS
@@ -275,24 +295,22 @@ void settle_and_continue(inout tree_traversal traversal, inout noted_primitive n
     if (!is_alive_any(r)) {
         traversal.leaf = 0u;
         traversal.element = traversal.end;
+#ifdef BVH_WIDE
+        end_wide();
+#endif
     }
 #endif
 }
 #endif
 
-#if !defined ANY_HIT && !defined BVH_DEFORMS
-#define FAVOUR_INSTANCES
-// Inside an instance, a hit in one with a higher number counts as one float step farther away, so that a hit at the
-// same distance here comes before it. (Discs and misses have a number that wraps to 0.)
-void favour_instance(uint instance_index, int step_, inout answer found[PACKET_RAYS])
+bool is_finished(tree_traversal traversal)
 {
-    for (int k = 0; k < PACKET_RAYS; k++) {
-        int moved = floatBitsToInt(found[k].distance) + step_;
-        found[k].distance =
-            instance_index + 1u < found[k].instance_index + 1u ? intBitsToFloat(moved) : found[k].distance;
-    }
-}
+#ifdef BVH_WIDE
+    if (wide.nodes.y != 0u)
+        return false;
 #endif
+    return traversal.element >= traversal.end;
+}
 
 // The first tree of a packet: the top tree, or that of the one instance.
 void begin_packet(trace_ray r[PACKET_RAYS], int leading, out entered_instance inside, out object_ray o[PACKET_RAYS],
@@ -319,6 +337,9 @@ void begin_packet(trace_ray r[PACKET_RAYS], int leading, out entered_instance in
 #endif
     b = world_bundle;
     traversal = world_traversal;
+#ifdef BVH_WIDE
+    end_wide();
+#endif
 #endif
 }
 
@@ -341,14 +362,14 @@ bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversa
 {
     if (leaf != 0u) {
         world_traversal.element = traversal.element;
-#ifdef FAVOUR_INSTANCES
-        favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
-#endif
         enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, traversal, b, rays);
+#ifdef ORDER_HITS
+        order_hits(inside.index, found);
+#endif
         return true;
     }
 #ifdef BVH_BUDGET
-    if (traversal.element < traversal.end) // the top tree is not finished
+    if (!is_finished(traversal))
         return false;
 #endif
     bool all_done = inside.index == NOT_INSIDE;
@@ -357,9 +378,6 @@ bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversa
 #endif
     if (all_done)
         return false;
-#ifdef FAVOUR_INSTANCES
-    favour_instance(inside.index, -1, found);
-#endif
     inside.index = NOT_INSIDE;
     b = world_bundle;
     traversal = world_traversal;
@@ -395,17 +413,24 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], int leading, inout answer foun
     bundle b, world_bundle;
     relative_rays rays;
     begin_packet(r, leading, inside, o, traversal, world_traversal, b, world_bundle, rays);
+#if defined ORDER_HITS && defined BVH_ONE_INSTANCE
+    order_hits(inside.index, found);
+#endif
 #ifdef BVH_BUDGET
 #ifndef BVH_ONE_INSTANCE
     if (place_of_ray.y != NOT_INSIDE) {
         world_traversal.element = place_of_ray.z;
-#ifdef FAVOUR_INSTANCES
-        favour_instance(place_of_ray.y, 1, found);
-#endif
         enter_instance(place_of_ray.y, r, leading, inside, o, traversal, b, rays);
+#ifdef ORDER_HITS
+        order_hits(place_of_ray.y, found);
+#endif
     }
 #endif
     traversal.element = place_of_ray.x;
+#if defined BVH_WIDE && defined BVH_RESUMES
+    if (resumes != 0u)
+        load_wide();
+#endif
 #endif
     noted_primitive noted;
     noted.bits = 0u;
@@ -416,15 +441,10 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], int leading, inout answer foun
     traverse_instances(traversal, world_traversal, b, world_bundle, leading, inside, o, rays, r, found, noted);
 #endif
 #ifdef BVH_BUDGET
-    uint is_finished = traversal.element < traversal.end ? 0u : 1u;
 #ifdef BVH_ONE_INSTANCE
-    place_of_ray = uvec4(traversal.element, NOT_INSIDE, 0u, is_finished);
+    place_of_ray = uvec4(traversal.element, NOT_INSIDE, 0u, is_finished(traversal));
 #else
-    place_of_ray = uvec4(traversal.element, inside.index, world_traversal.element, is_finished);
-#ifdef FAVOUR_INSTANCES
-    if (is_finished == 0u && inside.index != NOT_INSIDE)
-        favour_instance(inside.index, -1, found);
-#endif
+    place_of_ray = uvec4(traversal.element, inside.index, world_traversal.element, is_finished(traversal));
 #endif
 #endif
 }
@@ -436,7 +456,7 @@ bool begin_budget()
     place_of_ray = uvec4(0u, NOT_INSIDE, 0u, 0u);
 #ifdef BVH_RESUMES
     if (resumes != 0u)
-        place_of_ray = places[item_index()];
+        place_of_ray = places[item_index() * PLACE_TEXELS];
 #endif
     return (place_of_ray.w & 1u) == 0u;
 #else
@@ -448,7 +468,11 @@ void end_budget()
 {
 #ifdef BVH_BUDGET
 #ifdef BVH_RESUMES
-    places[item_index()] = place_of_ray;
+    places[item_index() * PLACE_TEXELS] = place_of_ray;
+#ifdef BVH_WIDE
+    if ((place_of_ray.w & 1u) == 0u)
+        store_wide();
+#endif
 #endif
     if ((place_of_ray.w & 1u) == 0u && unfinished[unfinished_word] == 0u)
         atomicCompSwap(unfinished[unfinished_word], 0u, BVH_UNFINISHED);

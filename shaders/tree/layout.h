@@ -49,14 +49,39 @@ SHARED_SIZE(bvh_element, 32)
 #define BVH_LEAF_FIRST_MASK 0x07ffffffu
 #define BVH_LEAF_MAX 8u /* primitives */
 
+/* A wide node: the boxes of up to eight children, of a byte per plane, in cells of the node's own that are powers
+ * of two wide. Ylitie, Karras, Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG
+ * 2017, section 3.1. Five texels of an RGBA32UI texel buffer, stored once: a child lies in the slot whose number
+ * is the octant of directions that meet it first, so that a ray of octant o visits slots by descending slot ^ ~o.
+ */
+struct bvh_wide_node {
+    float origin_x, origin_y, origin_z; /* lower corner */
+    /* Bytes 0..2: exponents of the cells' width along x, y, z, signed; byte 3: a bit for each inner child. */
+    uint exponents;
+    uint first_child;     /* node of the first inner child; the others follow in the order of their slots */
+    uint first_primitive; /* first one of the leaves */
+    /* A byte a slot. 0: empty; inner child: 0x20 | 24 + slot; leaf: bits 5..7: its primitives in unary, bits 0..4:
+     * place of the first one behind first_primitive. */
+    uint meta_0123, meta_4567;
+    uvec4 planes[3]; /* a byte a slot: lower planes, x of slots 0..3, of 4..7, y, z; then upper ones */
+};
+SHARED_SIZE(bvh_wide_node, 80)
+#define BVH_WIDE_TEXELS 5u
+#define BVH_WIDE_SLOTS 8u
+#define BVH_WIDE_LEAF_MAX 3u /* primitives of a child */
+#define BVH_WIDE_INNER 0x20u
+/* Maximum of levels: a traversal remembers one group of children a level. */
+#define BVH_WIDE_DEPTH_MAX 28u
+
 /* Transform element: the data for entering an instance. Texels of an RGBA32UI buffer. */
 struct bvh_transform {
     vec4 object_from_world[3];
-    float grid_lower_x, grid_lower_y, grid_lower_z; /* object space; packed elements count cells from here */
-    uint close_texels;   /* offset from a triangle to itself at shutter close; 0: the shape stays meanwhile */
-    vec4 cells_per_unit; /* w unused */
-    uint first_element;  /* first element of the geometry's tree, in the element buffer */
-    uint element_count;
+    /* Object space; packed elements count cells from here. Of wide nodes: the largest coordinates by magnitude. */
+    float grid_lower_x, grid_lower_y, grid_lower_z;
+    uint close_texels;    /* offset from a triangle to itself at shutter close; 0: the shape stays meanwhile */
+    vec4 cells_per_unit;  /* w unused */
+    uint first_element;   /* first element of the geometry's tree, in the element buffer */
+    uint element_count;   /* elements of the tree; the kind of the leaves where it has wide nodes */
     uint first_texel;     /* first texel of the geometry's primitives, in the primitive buffer */
     uint first_primitive; /* scene-wide */
 };

@@ -26,7 +26,7 @@
 struct bench_contender *bench_contest_add(struct bench_contest *contest, struct tracer *tracer, enum bench_way way)
 {
     struct bench_contender *added = &contest->contenders[contest->contender_count++];
-    *added = (struct bench_contender){.tracer = tracer, .way = way};
+    *added = (struct bench_contender){.name = tracer->impl->name, .tracer = tracer, .way = way};
     return added;
 }
 

@@ -19,6 +19,7 @@ enum bench_way {
 };
 
 struct bench_contender {
+    const char *name;
     struct tracer *tracer;
     enum bench_way way;
     bool is_exact; /* its disagreement is a fault, not a property */
@@ -44,7 +45,8 @@ struct bench_wave {
     uint32_t ray_count;
 };
 
-/* The one that is added, zeroed but for the arguments; the array has room for BENCH_CONTENDERS_MAX. */
+/* The one that is added, zeroed but for its tracer, the tracer's name and its way; the array has room for
+ * BENCH_CONTENDERS_MAX. */
 struct bench_contender *bench_contest_add(struct bench_contest *contest, struct tracer *tracer,
                                           enum bench_way way);
 /* A warm-up, which keeps hardware at work until its clock has risen, then the runs; fills what the contenders know

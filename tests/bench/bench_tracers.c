@@ -28,7 +28,7 @@ static const char usage[] =
     "all\n"
     "  --waves LIST          of primary,reflection,shadow,occlusion,bounce; default: all\n"
     "  --rays-per-pixel N    of every wave but primary; default 1\n"
-    "  --tracers LIST        default: all but naive\n"
+    "  --tracers LIST        default: all but naive; bvh-links and bvh-eight: bvh by nodes of one kind\n"
     "  --runs N              after one warm-up; default 5, at most 64\n"
     "  --device N            which OpenGL device; default: the first hardware, else software\n";
 
@@ -41,6 +41,7 @@ struct options {
 
 /* A tracer and the times of its builds. */
 struct structure {
+    const char *name;
     struct tracer *made;
     struct bench_runs builds;
 };
@@ -77,12 +78,12 @@ static struct trace_view view_of(const struct bench *bench)
 }
 
 static bool build(struct bench *bench, struct structure *structure, const struct tracer_impl *impl,
-                  struct error *error)
+                  const struct tracer_options *options, struct error *error)
 {
     const struct trace_view view = view_of(bench);
     for (unsigned i = 0; i < BUILDS_MAX && i < bench->options.runs; i++) {
         tracer_destroy(structure->made);
-        structure->made = tracer_create(impl, bench->device, NULL, error);
+        structure->made = tracer_create(impl, bench->device, options, error);
         if (!structure->made)
             return false;
         const uint64_t start_ns = clock_now_ns();
@@ -95,21 +96,41 @@ static bool build(struct bench *bench, struct structure *structure, const struct
     return true;
 }
 
+static bool add_structure(struct bench *bench, const char *name, const struct tracer_impl *impl,
+                          const struct tracer_options *options, struct error *error)
+{
+    fprintf(stderr, "    building %s\n", name);
+    struct structure *structure = &bench->structures[bench->structure_count++];
+    structure->name = name;
+    if (!build(bench, structure, impl, options, error))
+        return false;
+    /* Tracers that traverse a tree of the scene itself answer exactly, and have intersections. */
+    const bool is_exact = is_named("bvh,reference,naive", impl->name);
+    for (enum bench_way way = BENCH_INTERFACE; way <= (is_exact ? BENCH_TRAVERSAL : BENCH_INTERFACE); way++) {
+        struct bench_contender *contender = bench_contest_add(&bench->contest, structure->made, way);
+        contender->name = name;
+        contender->is_exact = is_exact;
+    }
+    return true;
+}
+
 static bool build_all(struct bench *bench, struct error *error)
 {
+    static const struct {
+        const char *name;
+        struct tracer_options options;
+    } nodes[] = {{"bvh-links", {.bvh.nodes = BVH_NODES_LINKS}}, {"bvh-eight", {.bvh.nodes = BVH_NODES_EIGHT}}};
+    for (size_t i = 0; bench->options.tracers && i < sizeof(nodes) / sizeof(*nodes); i++)
+        if (is_named(bench->options.tracers, nodes[i].name) &&
+            !add_structure(bench, nodes[i].name, &tracer_bvh_impl, &nodes[i].options, error))
+            return false;
     for (unsigned number = 0; number < TRACERS_MAX; number++) {
         const struct tracer_impl *impl = tracer_impl_by_number(number);
         if (!impl ||
             (bench->options.tracers ? !is_named(bench->options.tracers, impl->name) : impl == &tracer_naive_impl))
             continue;
-        fprintf(stderr, "    building %s\n", impl->name);
-        struct structure *structure = &bench->structures[bench->structure_count++];
-        if (!build(bench, structure, impl, error))
+        if (!add_structure(bench, impl->name, impl, NULL, error))
             return false;
-        /* Tracers that traverse a tree of the scene itself answer exactly, and have intersections. */
-        const bool is_exact = is_named("bvh,reference,naive", impl->name);
-        for (enum bench_way way = BENCH_INTERFACE; way <= (is_exact ? BENCH_TRAVERSAL : BENCH_INTERFACE); way++)
-            bench_contest_add(&bench->contest, structure->made, way)->is_exact = is_exact;
     }
     return true;
 }
@@ -129,7 +150,7 @@ static json_t *structures_json(const struct bench *bench)
     json_t *list = json_array();
     for (unsigned i = 0; i < bench->structure_count; i++) {
         const struct structure *structure = &bench->structures[i];
-        json_array_append_new(list, json_pack("{s:s, s:o, s:I}", "tracer", structure->made->impl->name, "build",
+        json_array_append_new(list, json_pack("{s:s, s:o, s:I}", "tracer", structure->name, "build",
                                               figure_json(&structure->builds), "memory_bytes",
                                               (json_int_t)structure->made->stats.device_bytes));
     }
@@ -140,8 +161,8 @@ static json_t *contender_json(const struct bench_contender *contender, uint32_t 
 {
     static const char *const ways[] = {"interface", "traversal"};
     const double median_ns = bench_figure(&contender->runs).median_ns;
-    json_t *made = json_pack("{s:s, s:s, s:o, s:f}", "tracer", contender->tracer->impl->name, "way",
-                             ways[contender->way], "time", figure_json(&contender->runs), "rays_per_s",
+    json_t *made = json_pack("{s:s, s:s, s:o, s:f}", "tracer", contender->name, "way", ways[contender->way],
+                             "time", figure_json(&contender->runs), "rays_per_s",
                              median_ns > 0 ? 1e9 * (double)ray_count / median_ns : 0.0);
     const double device_ns = bench_figure(&contender->device_runs).median_ns;
     if (device_ns > 0) {
@@ -167,9 +188,8 @@ static json_t *wave_json(struct bench *bench, const struct bench_wave *wave)
         json_array_append_new(list, contender_json(contender, wave->ray_count));
         if (!bench_contender_failed(contender, wave->ray_count))
             continue;
-        fprintf(stderr, "bench tracers: %s: %u of %u %s rays differ, %u of them at edges\n",
-                contender->tracer->impl->name, contender->differing, wave->ray_count, fact->name,
-                contender->edges);
+        fprintf(stderr, "bench tracers: %s: %u of %u %s rays differ, %u of them at edges\n", contender->name,
+                contender->differing, wave->ray_count, fact->name, contender->edges);
         bench->failed = true;
     }
     return json_pack("{s:s, s:s, s:b, s:i, s:o}", "kind", fact->name, "order", fact->order, "any", fact->is_any,

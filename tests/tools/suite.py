@@ -24,12 +24,13 @@ WAYS = {
 
 # Tables of patterns, each of which must match the whole name of a test that there is.
 
-# Tests that depend on the device and its driver run in every way; forms of a tracer, which differ in settings, in one.
-ON_DEVICE = (r"accuracy/.*", r"contract/\w+", r"unit/gpu/.*", r"unit/gpu_scene/.*", r"unit/render/.*", r"unit/trace/.*", r"test_stacks")
+# Tests that depend on the device and its driver run in every way; forms of a tracer, which differ in settings, in one, but for
+# nodes, of which `auto` chooses by the device.
+ON_DEVICE = (r"accuracy/.*", r"contract/\w+(, nodes of \w+)?", r"unit/gpu/.*", r"unit/gpu_scene/.*", r"unit/render/.*", r"unit/trace/.*", r"test_stacks")
 # Compares zink with llvmpipe.
 ZINK_ALONE = (r"test_stacks",)
 # What `make test` runs as GPUs do it.
-LIKE_GPU = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)", r"accuracy/(render_frame|frame_steps|frame_shared)")
+LIKE_GPU = (r"contract/(naive|bvh(, nodes of \w+)?|ldc|abuffer|rayspace|quadtree)", r"accuracy/(render_frame|frame_steps|frame_shared)")
 # Left to `make test-all`: breadth that costs much, beside what others see of the same kind.
 LEFT = (r"contract/(naive|bvh|ldc|abuffer|rayspace|quadtree)", r"contract/\w+(,| in | with | by ).*", r"test_bench")
 

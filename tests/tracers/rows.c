@@ -22,6 +22,7 @@ static const struct tracer_row rows[] = {
         .name = "bvh" form, .number = 0, __VA_ARGS__                                                              \
     }
     BVH("", .is_form = false),
+    BVH(", nodes of eight", .is_form = true, .options.bvh.nodes = BVH_NODES_EIGHT),
     BVH(", as in the paper", .is_form = true, .options.bvh.form = TRACER_FORM_PAPER),
     {.name = "reference",
      .number = 2,

@@ -142,7 +142,7 @@ static bool is_paper(const struct bvh *bvh)
 
 uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave)
 {
-    if (wave->apart && !wave->shared_origin)
+    if (bvh->tree.store.settings.wide || (wave->apart && !wave->shared_origin))
         return 1;
     if (is_paper(bvh))
         return PACKET_RAYS_PAPER;
@@ -155,7 +155,7 @@ uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const s
 {
     uint32_t counts[2];
     /* The intersections of a packet of several origins are rounded by its leading ray. */
-    if (wave->apart && (!wave->shared_origin || scene->has_motion))
+    if (bvh->tree.store.settings.wide || (wave->apart && (!wave->shared_origin || scene->has_motion)))
         return 1;
     if (is_paper(bvh))
         return PACKET_RAYS_PAPER;

@@ -19,7 +19,8 @@ static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_
         return NULL;
     }
     const bool is_paper = options->bvh.form == TRACER_FORM_PAPER;
-    const struct bvh_form settings = {.spheres = is_paper, .one_order = is_paper};
+    const bool is_wide = options->bvh.nodes == BVH_NODES_EIGHT && !is_paper;
+    const struct bvh_form settings = {.spheres = is_paper, .one_order = is_paper, .wide = is_wide};
     scene_tree_init(&bvh->tree, device, &settings, &bvh->base.stats);
     return &bvh->base;
 }
@@ -114,7 +115,7 @@ static void set_uniforms(const struct bvh *bvh, const struct gpu_program *progra
         return;
     }
     gpu_uniform_uint(program, "bvh_top_count", bvh->tree.top.element_count);
-    if (bvh_is_packed(&bvh->tree.store.settings)) {
+    if (bvh_is_packed(&bvh->tree.top.settings)) {
         gpu_uniform_vec(program, "bvh_top_grid_lower", 3, bvh->tree.top.grid.lower);
         gpu_uniform_vec(program, "bvh_top_cells_per_unit", 3, bvh->tree.top.grid.cells_per_unit);
     }
@@ -158,9 +159,11 @@ static bool run_once(struct bvh *bvh, const struct gpu_program *program, const s
     const uint32_t count = rays->end - rays->first;
     const bool is_new = own->unfinished_rays == 0;
     uint32_t unfinished = 0;
-    if (is_new && (!gpu_buffer_reserve(device, &own->places, count * sizeof(uvec4), error) ||
-                   !gpu_buffer_reserve(device, &own->depths, count * TRACE_DEPTH_BYTES, error) ||
-                   !gpu_buffer_reserve(device, &own->unfinished, sizeof(unfinished), error)))
+    const uint32_t place_texels = bvh->tree.store.settings.wide ? BVH_WIDE_PLACE_TEXELS : 1;
+    if (is_new &&
+        (!gpu_buffer_reserve(device, &own->places, (size_t)count * place_texels * sizeof(uvec4), error) ||
+         !gpu_buffer_reserve(device, &own->depths, count * TRACE_DEPTH_BYTES, error) ||
+         !gpu_buffer_reserve(device, &own->unfinished, sizeof(unfinished), error)))
         return false;
     gpu_buffer_clear(device, &own->unfinished, 0);
     gpu_buffer_bind_storage(&own->unfinished, BIND_BVH_UNFINISHED);
@@ -209,15 +212,15 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     size_t n = 0;
     if (settings->spheres)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
-    if (bvh_is_packed(settings))
+    if (settings->wide)
+        defines[n++] = (struct gpu_define){"BVH_WIDE", "1"};
+    if (bvh_is_packed(&(struct bvh_form){.spheres = settings->spheres, .whole = settings->whole}))
         defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
     if (scene_tree_only_instance(&bvh->tree) != BVH_NONE)
         defines[n++] = (struct gpu_define){"BVH_ONE_INSTANCE", "1"};
     /* A common origin in the world becomes many in the object spaces of moving instances. */
     if (wave->shared_origin && packet_rays > 1 && !scene->has_motion)
         defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
-    if (bvh->tree.store.deforms)
-        defines[n++] = (struct gpu_define){"BVH_DEFORMS", "1"};
     if (bvh->tree.store.deforms_in_shutter && wave->times) /* otherwise all rays meet the vertices of the first
                                                               pose */
         defines[n++] = (struct gpu_define){"BVH_DEFORMS_IN_SHUTTER", "1"};

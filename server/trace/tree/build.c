@@ -224,9 +224,9 @@ INLINED bool split_range(struct builder *builder, struct place *place, struct cu
     const struct extents extents = cut ? extents_together(cut) : find_extents(boxes, count);
     float area = builder->tree->areas[range->node] = half_area(&extents.all);
     struct bvh_split split = {.axis = -1};
-    if (cut)
+    if (cut && !costs->halves)
         split = bvh_split_find_together(boxes, count, &extents.centres, builder->threads, cut->bins, cut->lefts);
-    else if (count > 1)
+    else if (count > (costs->primitive > 0 ? 1 : costs->leaf_max) && !costs->halves)
         split = bvh_split_find(boxes, count, &extents.centres);
     bool pays = split.axis >= 0 &&
                 2 * costs->element * area + costs->primitive * split.cost < costs->primitive * (float)count * area;

@@ -43,10 +43,12 @@ struct bvh_binary {
     uint32_t place_count; /* maximum in memory: some places between nodes stay empty */
 };
 
-/* Costs of an element test and of a primitive test, in arbitrary units; their ratio was measured. */
+/* Costs of an element test and of a primitive test, in arbitrary units; their ratio was measured. Where a
+ * primitive costs nothing, every range that fits a leaf becomes one. */
 struct bvh_costs {
     float element, primitive;
     uint32_t leaf_max; /* 1 .. BVH_LEAF_MAX */
+    bool halves;       /* ranges are cut in the middle, in the order of their numbers: a tree of few levels */
 };
 
 /* Builds a tree over boxes[0..count-1], which it overwrites; boxes has room for as many again behind them. 1 <=
@@ -89,6 +91,7 @@ struct bvh_form {
     bool spheres;            /* bounds are spheres, not boxes */
     bool one_order;          /* every direction has the same order */
     bool whole;              /* boxes in floats, not on a grid */
+    bool wide;               /* wide nodes: of the trees over geometries; the top tree has elements */
     unsigned threads;        /* maximum; small shapes take one */
     const atomic_bool *stop; /* makes a build fail soon once it is set; NULL: never */
 };
@@ -123,7 +126,10 @@ struct bvh_tree {
     struct bvh_draft *draft;    /* kept until the tree is written */
 };
 
-/* Sizes that follow from the settings. */
+/* The form of the top tree. */
+struct bvh_form bvh_top_form(const struct bvh_form *settings);
+
+/* Sizes that follow from the settings. Of wide nodes an element is a node. */
 uint32_t bvh_octants(const struct bvh_form *settings); /* copies: BVH_OCTANTS or 1 */
 bool bvh_is_packed(const struct bvh_form *settings);
 uint32_t bvh_element_words(const struct bvh_form *settings); /* uint32_t per element and copy */

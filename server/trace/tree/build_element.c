@@ -16,18 +16,27 @@
 /* An axis along which a tree has (almost) no extent gets cells of this share of its largest one. */
 #define GRID_FLATNESS 0x1p-20
 
+struct bvh_form bvh_top_form(const struct bvh_form *settings)
+{
+    struct bvh_form form = *settings;
+    form.wide = false;
+    return form;
+}
+
 uint32_t bvh_octants(const struct bvh_form *settings)
 {
-    return settings->one_order ? 1 : BVH_OCTANTS;
+    return settings->one_order || settings->wide ? 1 : BVH_OCTANTS;
 }
 
 bool bvh_is_packed(const struct bvh_form *settings)
 {
-    return !settings->spheres && !settings->whole;
+    return !settings->spheres && !settings->whole && !settings->wide;
 }
 
 uint32_t bvh_element_words(const struct bvh_form *settings)
 {
+    if (settings->wide)
+        return sizeof(struct bvh_wide_node) / 4;
     return bvh_is_packed(settings) ? sizeof(struct bvh_packed_element) / 4 : sizeof(struct bvh_element) / 4;
 }
 

@@ -4,6 +4,7 @@
 
 #include "base/parallel.h"
 #include "trace/tree/build_split.h"
+#include "trace/tree/build_wide.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,7 +22,8 @@ static const struct bvh_costs costs = {.element = 1, .primitive = 0.5f, .leaf_ma
 struct bvh_draft {
     struct bvh_binary binary;
     struct bvh_baked baked;
-    float (*spheres)[4]; /* for each node of the binary tree: centre, radius; NULL with boxes */
+    struct bvh_wide wide; /* empty: the tree has elements */
+    float (*spheres)[4];  /* for each node of the binary tree: centre, radius; NULL with boxes */
 };
 
 struct work {
@@ -202,23 +204,45 @@ static struct bvh_bound bound_of(const struct work *work, uint32_t n)
     return bvh_bound_of_box(node->lower, node->upper);
 }
 
+static uint32_t leaf_kind(const struct bvh_shape *shape)
+{
+    return shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
+}
+
+/* Link of a leaf; 0: an inner element. */
+static uint32_t leaf_of(const struct work *work, uint32_t e)
+{
+    const struct bvh_draft *draft = work->draft;
+    if (work->settings->wide)
+        return draft->wide.link[e] >> BVH_LEAF_KIND_SHIFT != 0 ? draft->wide.link[e] : 0;
+    const struct bvh_binary_node *node = &draft->binary.nodes[draft->baked.node[e]];
+    const uint32_t count = node->count_axis >> 2;
+    return count > 0 ? bvh_leaf(leaf_kind(work->shape), node->link, count) : 0;
+}
+
+static void write_element(const struct work *work, uint32_t e)
+{
+    const struct bvh_draft *draft = work->draft;
+    if (work->settings->wide) {
+        bvh_wide_write((struct bvh_wide_node *)(void *)work->elements + e, e, &draft->wide, &draft->baked,
+                       &draft->binary);
+        return;
+    }
+    const struct bvh_bound bound = bound_of(work, draft->baked.node[e]);
+    bvh_write_element(work->elements, work->settings, &draft->baked, &work->tree->grid, e, &bound,
+                      leaf_of(work, e));
+}
+
 static void chunk_elements(void *context, uint32_t chunk)
 {
     struct work *work = context;
-    const struct bvh_baked *baked = &work->draft->baked;
-    uint32_t kind = work->shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
     uint32_t begin = chunk * CHUNK, end = begin + CHUNK;
     if (is_stopped(work))
         return;
-    if (end > baked->element_count)
-        end = baked->element_count;
-    for (uint32_t e = begin; e < end; e++) {
-        const struct bvh_binary_node *node = &work->draft->binary.nodes[baked->node[e]];
-        struct bvh_bound bound = bound_of(work, baked->node[e]);
-        uint32_t count = node->count_axis >> 2;
-        bvh_write_element(work->elements, work->settings, baked, &work->tree->grid, e, &bound,
-                          count > 0 ? bvh_leaf(kind, node->link, count) : 0);
-    }
+    if (end > work->tree->element_count)
+        end = work->tree->element_count;
+    for (uint32_t e = begin; e < end; e++)
+        write_element(work, e);
 }
 
 /* Finds statistics of the tree from a sample of its elements. The grid's cost is the mean over elements, each
@@ -227,12 +251,12 @@ static void survey(struct work *work)
 {
     const struct bvh_baked *baked = &work->draft->baked;
     struct bvh_tree *tree = work->tree;
-    bool has_grid = !work->settings->spheres;
+    bool has_grid = !work->settings->spheres && !work->settings->wide;
     uint32_t step = baked->element_count / SURVEYED_ELEMENTS + 1, count = 0, leaf_count = 0;
     float cost_sum = 0, extent_sum = 0;
     for (uint32_t e = 0; e < baked->element_count; e += step, count++) {
         const struct bvh_binary_node *node = &work->draft->binary.nodes[baked->node[e]];
-        if (node->count_axis >> 2 > 0) {
+        if (leaf_of(work, e) != 0) {
             extent_sum += distance(node->lower, node->upper);
             leaf_count++;
         }
@@ -280,18 +304,17 @@ static bool list_corners(struct work *work)
 static bool make_plan(struct work *work)
 {
     const struct bvh_baked *baked = &work->draft->baked;
-    uint32_t kind = work->shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
     uint32_t *leaves = calloc(baked->element_count, sizeof(*leaves));
     bool ok = leaves != NULL;
-    for (uint32_t e = 0; ok && e < baked->element_count; e++) {
-        const struct bvh_binary_node *node = &work->draft->binary.nodes[baked->node[e]];
-        uint32_t count = node->count_axis >> 2;
-        leaves[e] = count > 0 ? bvh_leaf(kind, node->link, count) : 0;
-    }
+    for (uint32_t e = 0; ok && e < baked->element_count; e++)
+        leaves[e] = leaf_of(work, e);
     ok = ok && bvh_refit_plan_make(&work->tree->plan, baked, leaves);
+    struct bvh_refit_plan *plan = &work->tree->plan;
+    for (uint32_t i = plan->leaf_count; ok && work->settings->wide && i < plan->record_count; i++)
+        plan->records[i].places_0123[0] = work->draft->wide.link[plan->records[i].element];
     free(leaves);
     work->tree->wear = tree_wear(work);
-    return ok && (work->tree->plan.record_count == 0 || list_corners(work));
+    return ok && (plan->record_count == 0 || list_corners(work));
 }
 
 static uint32_t chunk_count(uint32_t count)
@@ -299,14 +322,14 @@ static uint32_t chunk_count(uint32_t count)
     return count / CHUNK + (count % CHUNK > 0);
 }
 
-static bool build_binary(struct work *work)
+static bool build_binary(struct work *work, const struct bvh_costs *by)
 {
     const uint32_t count = work->shape->primitive_count;
     work->boxes = aligned_alloc(32, 2 * (size_t)count * sizeof(*work->boxes));
     if (!work->boxes)
         return false;
     parallel_run(work->threads, chunk_count(count), chunk_boxes, work);
-    const bool ok = !is_stopped(work) && bvh_binary_build(&work->draft->binary, work->boxes, count, &costs,
+    const bool ok = !is_stopped(work) && bvh_binary_build(&work->draft->binary, work->boxes, count, by,
                                                           work->threads, work->settings->stop);
     free(work->boxes);
     return ok;
@@ -318,23 +341,42 @@ static size_t bvh_primitive_texels(const struct bvh_shape *shape)
     return shape->primitive_count * each * (shape->deforms ? 2 : 1);
 }
 
+static bool make_elements(struct work *work)
+{
+    struct bvh_draft *draft = work->draft;
+    if (!build_binary(work, &costs) || (work->settings->spheres && !make_spheres(work)) || is_stopped(work) ||
+        !bvh_bake(&draft->baked, &draft->binary, draft->binary.areas, bvh_octants(work->settings), work->threads))
+        return false;
+    work->tree->element_count = draft->baked.element_count;
+    return true;
+}
+
+static bool make_wide_nodes(struct work *work)
+{
+    struct bvh_draft *draft = work->draft;
+    const struct bvh_costs halves = {.leaf_max = 1, .halves = true};
+    enum bvh_wide_result result = BVH_WIDE_TOO_DEEP;
+    for (unsigned turn = 0; turn < 2 && result == BVH_WIDE_TOO_DEEP; turn++) {
+        bvh_binary_finish(&draft->binary);
+        if (!build_binary(work, turn == 0 ? &bvh_wide_costs : &halves) || is_stopped(work))
+            return false;
+        result = bvh_wide_make(&draft->wide, &draft->baked, &draft->binary, leaf_kind(work->shape));
+    }
+    work->tree->element_count = draft->wide.node_count;
+    return result == BVH_WIDE_MADE;
+}
+
 static bool plan(struct work *work)
 {
     struct bvh_tree *tree = work->tree;
     struct bvh_draft *draft = work->draft;
-    if (!draft || !build_binary(work))
-        return false;
-    if (work->settings->spheres && !make_spheres(work))
-        return false;
-    if (is_stopped(work) ||
-        !bvh_bake(&draft->baked, &draft->binary, draft->binary.areas, bvh_octants(work->settings), work->threads))
+    if (!draft || !(work->settings->wide ? make_wide_nodes(work) : make_elements(work)))
         return false;
     memcpy(tree->lower, draft->binary.nodes[0].lower, sizeof(tree->lower));
     memcpy(tree->upper, draft->binary.nodes[0].upper, sizeof(tree->upper));
     bvh_pad_box(tree->lower, tree->upper);
     tree->grid = bvh_grid_over(tree->lower, tree->upper, 0);
     survey(work);
-    tree->element_count = draft->baked.element_count;
     tree->primitive_texels = bvh_primitive_texels(work->shape);
     if (is_stopped(work))
         return false;
@@ -348,6 +390,7 @@ static void free_draft(struct bvh_tree *tree)
     free(tree->draft->spheres);
     bvh_binary_finish(&tree->draft->binary);
     bvh_baked_finish(&tree->draft->baked);
+    bvh_wide_finish(&tree->draft->wide);
     free(tree->draft);
     tree->draft = NULL;
 }

@@ -91,6 +91,8 @@ bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const s
 {
     struct gpu_define defines[3] = {{NULL, NULL}};
     size_t n = 0;
+    if (settings->wide)
+        defines[n++] = (struct gpu_define){"BVH_WIDE", "1"};
     if (settings->spheres)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
     else if (bvh_is_packed(settings))
@@ -105,12 +107,14 @@ bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const s
     gpu_buffer_bind_texels(device, place->boxes, UNIT_TRACER_1, GL_RGBA32UI);
     uint64_t each = bvh_element_bytes(settings) / TEXEL_BYTES;
     uint32_t first_texel =
-        bind_part(BIND_TRACER_0, place->elements, place->first_element * each, refit->record_count * each);
-    gpu_uniform_uint(program, "record_count", refit->record_count);
+        bind_part(BIND_TRACER_0, place->elements, place->first_element * each, place->element_count * each);
     gpu_uniform_uint(program, "first_box", place->first_box);
     gpu_uniform_uint(program, "first_texel", first_texel);
-    gpu_uniform_vec(program, "grid_lower", 3, grid->lower);
-    gpu_uniform_vec(program, "cells_per_unit", 3, grid->cells_per_unit);
-    gpu_dispatch(device, program, refit->record_count);
+    if (bvh_is_packed(settings)) {
+        gpu_uniform_vec(program, "grid_lower", 3, grid->lower);
+        gpu_uniform_vec(program, "cells_per_unit", 3, grid->cells_per_unit);
+    }
+    const uint32_t first = settings->wide ? refit->leaf_count : 0; /* a leaf has no node */
+    dispatch(device, program, first, refit->record_count - first);
     return true;
 }

@@ -40,7 +40,7 @@ struct bvh_refit_place {
     uint32_t first_vertex; /* in the scene's positions, which are bound */
     uint32_t close_offset; /* offset of the vertices at shutter close; 0: the shape stays while the shutter is
                               open */
-    uint32_t first_element;
+    uint32_t first_element, element_count;
 };
 #define BVH_REFIT_BOX_BYTES (BVH_REFIT_BOX_TEXELS * 16u)
 

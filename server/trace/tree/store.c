@@ -164,10 +164,13 @@ static bool pack(struct bvh_store *store, uint32_t top_capacity, uint64_t elemen
 
 bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error)
 {
-    if (element_count <= store->top_capacity && store->elements.name)
+    const struct bvh_form form = bvh_top_form(&store->settings);
+    const size_t each_bytes = bvh_element_bytes(&store->settings);
+    const uint64_t needed = (element_count * bvh_element_bytes(&form) + each_bytes - 1) / each_bytes;
+    if (needed <= store->top_capacity && store->elements.name)
         return true;
     uint32_t capacity = store->top_capacity < TOP_CAPACITY_MIN ? TOP_CAPACITY_MIN : store->top_capacity;
-    while (capacity < element_count)
+    while (capacity < needed)
         capacity *= 2;
     return pack(store, capacity, 0, 0, error);
 }
@@ -563,7 +566,7 @@ bool bvh_store_waits(struct bvh_store *store)
 static uint64_t write_top_copy(struct bvh_store *store, const struct bvh_top *top, uint32_t octant,
                                const bool *moved)
 {
-    size_t each_bytes = bvh_element_words(&store->settings) * sizeof(*top->elements);
+    size_t each_bytes = bvh_element_words(&top->settings) * sizeof(*top->elements);
     size_t first = (size_t)octant * top->element_count;
     uint64_t bytes = 0;
     for (uint32_t begin = 0; begin < top->element_count;) {
@@ -587,7 +590,7 @@ uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top,
     for (uint32_t e = 0; !all && e < count; e++)
         moved_count += top->moved[e];
     if (all || moved_count * WRITE_WHOLE > count || moved_count > WRITE_RUNS_MAX) {
-        size_t whole_bytes = count * bvh_element_bytes(&store->settings);
+        size_t whole_bytes = count * bvh_element_bytes(&top->settings);
         if (count > 0)
             gpu_buffer_write(store->device, &store->elements, 0, top->elements, whole_bytes);
         return whole_bytes;
@@ -595,7 +598,7 @@ uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top,
     bool *moved = moved_count == 0 ? NULL : malloc(count);
     if (moved_count == 0)
         return 0;
-    for (uint32_t octant = 0; octant < bvh_octants(&store->settings); octant++) {
+    for (uint32_t octant = 0; octant < bvh_octants(&top->settings); octant++) {
         for (uint32_t e = 0; moved && e < count; e++)
             moved[top->baked.place ? top->baked.place[(size_t)octant * count + e] : e] = top->moved[e];
         bytes += write_top_copy(store, top, octant, moved); /* without memory for the marks, all elements */

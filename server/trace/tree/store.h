@@ -55,9 +55,8 @@ struct bvh_store {
     uint32_t entry_count;
     uint32_t *entry_of; /* entry of each geometry of the scene; BVH_NONE: without primitives */
     uint32_t geometry_count;
-    bool deforms;            /* some geometry's vertices may move */
     bool deforms_in_shutter; /* some move while the shutter is open */
-    uint32_t top_capacity;   /* elements reserved before the first entry */
+    uint32_t top_capacity;   /* room before the first entry, in elements of the entries' form */
     bool top_lost;           /* the top tree must be written again; its writer clears this */
     struct gpu_buffer elements, primitives;
     struct gpu_buffer boxes, roots; /* buffers of refits */
@@ -91,7 +90,7 @@ bool bvh_store_deform(struct bvh_store *store, struct gpu_scene *scene, struct b
 bool bvh_store_rebuild(struct bvh_store *store, const struct gpu_scene *scene, struct bvh_job *jobs,
                        uint32_t *which, uint32_t count, struct bvh_store_report *report, struct stage_times *times,
                        struct error *error);
-/* Reserves a top tree of `element_count` elements. */
+/* Reserves a top tree of `element_count` elements of the top tree's form. */
 bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
 /* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes written. */
 uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all);

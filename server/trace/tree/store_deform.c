@@ -57,6 +57,7 @@ static struct bvh_refit_place place_of(struct bvh_store *store, const struct gpu
         .first_vertex = geometry->first_vertex,
         .close_offset = geometry->close_offset,
         .first_element = entry->first_element,
+        .element_count = entry->element_count,
     };
 }
 
@@ -189,11 +190,9 @@ bool bvh_store_deform(struct bvh_store *store, struct gpu_scene *scene, struct b
 {
     struct deforming deforming = {0};
     uint64_t start_ns = clock_now_ns();
-    store->deforms = store->deforms_in_shutter = false;
-    for (uint32_t g = 0; g < scene->geometry_count; g++) {
-        store->deforms = store->deforms || scene->geometries[g].node != 0;
+    store->deforms_in_shutter = false;
+    for (uint32_t g = 0; g < scene->geometry_count; g++)
         store->deforms_in_shutter = store->deforms_in_shutter || scene->geometries[g].device.close_offset != 0;
-    }
     if (!list_moved(&deforming, store, scene))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
                          scene->geometry_count);

@@ -89,6 +89,12 @@ static struct bvh_world_box world_box(const struct bvh_entry *entry, const struc
     return box;
 }
 
+/* The largest coordinate by magnitude. */
+static float extent_of(const struct bvh_entry *entry, int axis)
+{
+    return fmaxf(fabsf(entry->lower[axis]), fabsf(entry->upper[axis]));
+}
+
 /* Makes the transform of instance i. The box is empty if its geometry has no primitives. */
 static struct bvh_transform describe(const struct scene_tree *tree, const struct gpu_scene *scene, uint32_t i,
                                      struct bvh_world_box *box)
@@ -102,12 +108,19 @@ static struct bvh_transform describe(const struct scene_tree *tree, const struct
         return transform;
     transform.first_element = entry->first_element;
     transform.element_count = entry->element_count;
+    if (tree->store.settings.wide)
+        transform.element_count = entry->is_mesh ? BVH_LEAF_TRIANGLES : BVH_LEAF_SPHERES;
     transform.first_texel = entry->first_texel;
     transform.first_primitive = scene->geometries[instance->geometry].device.first_primitive;
     transform.grid_lower_x = entry->grid.lower[0];
     transform.grid_lower_y = entry->grid.lower[1];
     transform.grid_lower_z = entry->grid.lower[2];
     memcpy(transform.cells_per_unit, entry->grid.cells_per_unit, sizeof(entry->grid.cells_per_unit));
+    if (tree->store.settings.wide) {
+        transform.grid_lower_x = extent_of(entry, 0);
+        transform.grid_lower_y = extent_of(entry, 1);
+        transform.grid_lower_z = extent_of(entry, 2);
+    }
     if (scene->geometries[instance->geometry].device.close_offset)
         transform.close_texels = entry->texel_count / 2;
     *box = world_box(entry, scene, instance);
@@ -146,7 +159,8 @@ static bool rebuild_top(struct scene_tree *tree, const struct gpu_scene *scene, 
     for (uint32_t i = 0; ok && i < count; i++)
         transforms[i] = describe(tree, scene, i, &boxes[i]);
     bvh_top_finish(&tree->top);
-    ok = ok && bvh_top_build(&tree->top, boxes, count, &tree->store.settings);
+    const struct bvh_form form = bvh_top_form(&tree->store.settings);
+    ok = ok && bvh_top_build(&tree->top, boxes, count, &form);
     free(boxes);
     if (!ok) {
         free(transforms);

@@ -142,10 +142,14 @@ static void expect_like_brute_force(struct fixture *fixture)
 
 ALL_TESTS(open_device, close_device)
 
-TEST(a_mesh_that_deforms_is_refitted)
+/* By nodes of each kind. */
+static const struct tracer_options kinds[] = {{.bvh.nodes = BVH_NODES_LINKS}, {.bvh.nodes = BVH_NODES_EIGHT}};
+#define KINDS (sizeof(kinds) / sizeof(*kinds))
+
+static void expect_refits(const struct tracer_options *options)
 {
     struct fixture fixture;
-    fixture_init(&fixture, NULL, 0);
+    fixture_init(&fixture, options, 0);
     const struct tracer_stats *stats = &fixture.tracer->stats;
     for (int step = 1; step <= 2; step++) {
         pose(&fixture, 0.2f * (float)step, 0.2f * (float)step);
@@ -154,6 +158,12 @@ TEST(a_mesh_that_deforms_is_refitted)
         expect_like_brute_force(&fixture);
     }
     fixture_finish(&fixture);
+}
+
+TEST(a_mesh_that_deforms_is_refitted)
+{
+    for (size_t kind = 0; kind < KINDS; kind++)
+        expect_refits(&kinds[kind]);
 }
 
 TEST(a_pose_that_stays_costs_nothing)
@@ -169,37 +179,46 @@ TEST(a_pose_that_stays_costs_nothing)
 
 TEST(a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time)
 {
-    struct fixture fixture;
-    fixture_init(&fixture, NULL, 0);
-    pose(&fixture, 0.2f, 0.9f);
-    expect_like_brute_force(&fixture);
-    expect_like_brute_force_at(&fixture, false); /* rays without a time are as the shutter opens */
-    fixture_finish(&fixture);
+    for (size_t kind = 0; kind < KINDS; kind++) {
+        struct fixture fixture;
+        fixture_init(&fixture, &kinds[kind], 0);
+        pose(&fixture, 0.2f, 0.9f);
+        expect_like_brute_force(&fixture);
+        expect_like_brute_force_at(&fixture, false); /* rays without a time are as the shutter opens */
+        fixture_finish(&fixture);
+    }
 }
 
 /* At 8 times of each triangle's way neighbours have nothing to do with each other. */
-TEST(a_tree_that_is_worn_out_is_built_anew)
+static void expect_rebuilds(const struct tracer_options *options, uint32_t nodes_min)
 {
     struct fixture fixture;
-    fixture_init(&fixture, NULL, 0);
+    fixture_init(&fixture, options, 0);
     const struct tracer_stats *stats = &fixture.tracer->stats;
     pose(&fixture, 8, 8);
-    assert_in_range(stats->nodes_rebuilt, TRIANGLES / 4, 4 * TRIANGLES);
+    assert_in_range(stats->nodes_rebuilt, nodes_min, 4 * TRIANGLES);
     expect_like_brute_force(&fixture);
     pose(&fixture, 8.01f, 8.01f);
     assert_int_equal(stats->nodes_rebuilt, 0); /* good as new */
     expect_like_brute_force(&fixture);
     pose(&fixture, 0, 0); /* neighbours in this pose were far apart in the tree's own */
-    assert_in_range(stats->nodes_rebuilt, TRIANGLES / 4, 4 * TRIANGLES);
+    assert_in_range(stats->nodes_rebuilt, nodes_min, 4 * TRIANGLES);
     expect_like_brute_force(&fixture);
     fixture_finish(&fixture);
 }
 
+TEST(a_tree_that_is_worn_out_is_built_anew)
+{
+    expect_rebuilds(&kinds[0], TRIANGLES / 4);
+    expect_rebuilds(&kinds[1], TRIANGLES / 24); /* a node has at most 24 triangles */
+}
+
 TEST(answers_do_not_depend_on_earlier_poses)
 {
-    for (unsigned form = TRACER_FORM_FAST; form <= TRACER_FORM_PAPER; form++) {
+    const struct tracer_options all[] = {kinds[0], kinds[1], {.bvh.form = TRACER_FORM_PAPER}};
+    for (unsigned form = 0; form < sizeof(all) / sizeof(*all); form++) {
         struct fixture straight, roundabout;
-        const struct tracer_options options = {.bvh.form = form};
+        const struct tracer_options options = all[form];
         fixture_init(&straight, &options, 0.3f);
         struct hit *expected = trace(&straight, straight.tracer, true);
         fixture_init(&roundabout, &options, 0);
@@ -217,4 +236,20 @@ TEST(answers_do_not_depend_on_earlier_poses)
         fixture_finish(&roundabout);
         fixture_finish(&straight);
     }
+}
+
+/* Refitted trees, in which every hit is a tie of two triangles. */
+TEST(nodes_of_each_kind_give_the_same_answers_to_the_bit)
+{
+    struct hit *hits[KINDS];
+    for (size_t kind = 0; kind < KINDS; kind++) {
+        struct fixture fixture;
+        fixture_init(&fixture, &kinds[kind], 0);
+        pose(&fixture, 0.2f, 0.5f);
+        hits[kind] = trace(&fixture, fixture.tracer, true);
+        fixture_finish(&fixture);
+    }
+    assert_memory_equal(hits[1], hits[0], RAY_COUNT * sizeof(*hits[0]));
+    for (size_t kind = 0; kind < KINDS; kind++)
+        free(hits[kind]);
 }

@@ -392,14 +392,39 @@ static struct ray *rays_for_packets(uint64_t seed)
  * paper's form has; the next test has rays alone. */
 TEST(answers_do_not_depend_on_how_many_elements_a_dispatch_has)
 {
-    const struct tracer_options options = {.bvh.form = TRACER_FORM_PAPER};
+    static const struct tracer_options all[] = {{.bvh.form = TRACER_FORM_PAPER}, {.bvh.nodes = BVH_NODES_EIGHT}};
+    static const uint32_t tests[] = {50, 2};
     struct ray *rays = rays_for_packets(36);
-    void *expected = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &options, 0);
-    void *got = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &options, 50);
-    assert_memory_equal(got, expected, RAY_COUNT * sizeof(uint32_t));
-    free(got);
-    free(expected);
+    for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++) {
+        void *expected = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &all[i], 0);
+        void *got = trace_as_hardware(test_scene_translucent(), rays, WAVE_ANY, &all[i], tests[i]);
+        assert_memory_equal(got, expected, RAY_COUNT * sizeof(uint32_t));
+        free(got);
+        free(expected);
+    }
     free(rays);
+}
+
+/* Closest hits and transmittances, in one dispatch and in many. */
+TEST(nodes_of_each_kind_give_the_same_answers)
+{
+    static const struct tracer_options links = {.bvh.nodes = BVH_NODES_LINKS},
+                                       eight = {.bvh.nodes = BVH_NODES_EIGHT};
+    struct scene *(*const scenes[])(void) = {scene_of_instances, test_scene_translucent};
+    for (size_t i = 0; i < sizeof(scenes) / sizeof(*scenes); i++) {
+        struct ray *rays = rays_for_packets(40 + i);
+        for (enum wave_kind kind = WAVE_CLOSEST; kind <= WAVE_ANY; kind++) {
+            void *expected = trace_as_hardware(scenes[i](), rays, kind, &links, 65000);
+            for (uint32_t tests = 3; tests <= 65000; tests += 64997) {
+                void *got = trace_as_hardware(scenes[i](), rays, kind, &eight, tests);
+                assert_memory_equal(got, expected,
+                                    RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit)));
+                free(got);
+            }
+            free(expected);
+        }
+        free(rays);
+    }
 }
 
 /* Rays that need many dispatches: a step ends between two of them, and others are traced before the next one. */
@@ -446,6 +471,7 @@ TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
 TEST(an_unknown_form_is_refused)
 {
     expect_options_refused(TRACER_BVH, &(struct refused_options){"options.bvh_form", {.bvh = {.form = 5}}}, 1);
+    expect_options_refused(TRACER_BVH, &(struct refused_options){"options.bvh_nodes", {.bvh = {.nodes = 3}}}, 1);
 }
 
 /* Rays of the first step of a wave, of which nothing was learnt. */

@@ -327,8 +327,95 @@ static void expect_sound_in_form(const struct input *input, const struct bvh_for
     bvh_tree_finish(&tree);
 }
 
+/* ---- wide nodes ---- */
+
+static const struct bvh_form of_wide = {.wide = true, .threads = 2};
+
+struct wide_walk {
+    const struct input *input;
+    const struct bvh_tree *tree;
+    uint8_t *is_seen; /* primitives */
+    uint32_t nodes, deepest;
+};
+
+static uint32_t byte_of(const uint32_t *words, uint32_t slot)
+{
+    return words[slot / 4] >> slot % 4 * 8 & 0xff;
+}
+
+static struct decoded decode_slot(const struct bvh_wide_node *node, uint32_t slot)
+{
+    const float origin[3] = {node->origin_x, node->origin_y, node->origin_z};
+    uint32_t planes[12];
+    struct decoded box = {0};
+    memcpy(planes, node->planes, sizeof(planes));
+    for (uint32_t k = 0; k < 3; k++) {
+        const double cell = ldexp(1, (int8_t)(node->exponents >> 8 * k));
+        box.lower[k] = (double)origin[k] + cell * byte_of(planes + 2 * k, slot);
+        box.upper[k] = (double)origin[k] + cell * byte_of(planes + 6 + 2 * k, slot);
+    }
+    return box;
+}
+
+/* Visits a node as a ray would that hits everything. All primitives below it lie within the `bounds` of the nodes
+ * above; none was seen before. */
+static void walk_wide(struct wide_walk *walk, uint32_t n, const struct decoded *bounds, uint32_t depth)
+{
+    assert_in_range(n, 0, walk->tree->element_count - 1);
+    assert_in_range(depth, 1, BVH_WIDE_DEPTH_MAX);
+    const struct bvh_wide_node *node = (const struct bvh_wide_node *)(const void *)walk->tree->elements + n;
+    uint32_t child = node->first_child;
+    const uint32_t meta_words[2] = {node->meta_0123, node->meta_4567};
+    walk->nodes++;
+    walk->deepest = depth > walk->deepest ? depth : walk->deepest;
+    for (uint32_t slot = 0; slot < BVH_WIDE_SLOTS; slot++) {
+        const uint32_t meta = byte_of(meta_words, slot), is_inner = node->exponents >> (24 + slot) & 1;
+        struct decoded all[BVH_WIDE_DEPTH_MAX];
+        if (meta == 0) {
+            assert_int_equal(is_inner, 0);
+            continue;
+        }
+        for (uint32_t i = 0; i + 1 < depth; i++)
+            all[i] = bounds[i];
+        all[depth - 1] = decode_slot(node, slot);
+        if (is_inner) {
+            assert_int_equal(meta, BVH_WIDE_INNER | (24 + slot));
+            walk_wide(walk, child++, all, depth + 1);
+            continue;
+        }
+        const uint32_t unary = meta >> 5, count = unary == 1 ? 1 : unary == 3 ? 2 : 3;
+        assert_int_equal(unary, (1u << count) - 1);
+        for (uint32_t i = 0; i < count; i++) {
+            const uint32_t place = node->first_primitive + (meta & 31) + i;
+            assert_in_range(place, 0, walk->input->shape.primitive_count - 1);
+            const uint32_t number = primitive_number(walk->input, walk->tree, place);
+            assert_in_range(number, 0, walk->input->shape.primitive_count - 1);
+            assert_int_equal(walk->is_seen[number]++, 0);
+            for (uint32_t d = 0; d < depth; d++)
+                if (!bound_contains(walk->input, &all[d], number, false))
+                    fail_msg("node %u, slot %u: primitive %u is not within level %u of %u", n, slot, number, d,
+                             depth);
+        }
+    }
+}
+
+/* Every primitive is met once, within all boxes on the way to it; every node is. Returns the number of levels. */
+static uint32_t expect_wide_sound(const struct input *input)
+{
+    struct bvh_tree tree = build(input, &of_wide);
+    struct wide_walk walk = {input, &tree, calloc(input->shape.primitive_count, 1), 0, 0};
+    walk_wide(&walk, 0, NULL, 1);
+    assert_int_equal(walk.nodes, tree.element_count);
+    for (uint32_t i = 0; i < input->shape.primitive_count; i++)
+        assert_int_equal(walk.is_seen[i], 1);
+    free(walk.is_seen);
+    bvh_tree_finish(&tree);
+    return walk.deepest;
+}
+
 static void expect_sound(const struct input *input)
 {
+    expect_wide_sound(input);
     for (size_t form = 0; form < COUNT(forms); form++)
         expect_sound_in_form(input, forms[form]);
 }
@@ -382,6 +469,7 @@ TEST(coordinates_at_the_end_of_the_range_do_no_harm)
     /* Boxes alone: surfaces and extents are infinite, and so would the spheres be. */
     expect_sound_in_form(&input, &packed);
     expect_sound_in_form(&input, &whole);
+    expect_wide_sound(&input);
     input_finish(&input);
 }
 
@@ -408,6 +496,7 @@ TEST(single_points_lie_within_their_grid)
         scale_and_move(&input, (float[3]){0, 0, 0}, points[i]);
         expect_sound_in_form(&input, &packed);
         expect_sound_in_form(&input, &whole);
+        expect_wide_sound(&input);
         input_finish(&input);
     }
 }
@@ -491,14 +580,13 @@ TEST(a_tree_that_degenerates_to_a_list_is_built)
     input_finish(&input);
 }
 
-TEST(the_tree_does_not_depend_on_the_threads)
+static void expect_same_by_any_threads(const struct input *input, const struct bvh_form *form)
 {
-    struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
-    struct bvh_form settings = packed;
+    struct bvh_form settings = *form;
     settings.threads = 1;
-    struct bvh_tree one = build(&input, &settings);
+    struct bvh_tree one = build(input, &settings);
     for (settings.threads = 2; settings.threads < 5; settings.threads++) {
-        struct bvh_tree several = build(&input, &settings);
+        struct bvh_tree several = build(input, &settings);
         assert_int_equal(several.element_count, one.element_count);
         assert_memory_equal(several.elements, one.elements, one.element_count * bvh_element_bytes(&settings));
         assert_memory_equal(&several.grid, &one.grid, sizeof(one.grid));
@@ -507,11 +595,18 @@ TEST(the_tree_does_not_depend_on_the_threads)
         bvh_tree_finish(&several);
     }
     const struct view view = view_of(&one, &settings);
-    for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
-        expect_each_primitive_once(&input, &one, &view, octant);
+    for (uint32_t octant = 0; octant < BVH_OCTANTS && !settings.wide; octant++) {
+        expect_each_primitive_once(input, &one, &view, octant);
         expect_links_right(&view, octant);
     }
     bvh_tree_finish(&one);
+}
+
+TEST(the_tree_does_not_depend_on_the_threads)
+{
+    struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
+    expect_same_by_any_threads(&input, &packed);
+    expect_same_by_any_threads(&input, &of_wide);
     input_finish(&input);
 }
 
@@ -584,6 +679,32 @@ TEST(each_form_takes_the_bytes_it_promises)
     assert_int_equal(bvh_element_bytes(&whole), BVH_OCTANTS * sizeof(struct bvh_element));
     assert_int_equal(bvh_element_bytes(&one_order), sizeof(struct bvh_packed_element));
     assert_int_equal(bvh_element_bytes(&of_spheres), sizeof(struct bvh_element));
+    assert_int_equal(bvh_element_bytes(&of_wide), sizeof(struct bvh_wide_node));
+}
+
+/* Points at ever smaller distances, along one axis after the other: each cut takes one away, and a tree that
+ * follows the cuts has more levels than a traversal remembers. */
+TEST(wide_nodes_have_few_levels_however_a_shape_is_cut)
+{
+    struct input input = triangles(720, 0, 0, 27);
+    for (uint32_t t = 0; t < 720; t++)
+        for (uint32_t v = 3 * t; v < 3 * t + 3; v++)
+            input.positions[3 * v + t / 240] = ldexpf(1, 120 - (int)(t % 240));
+    expect_wide_sound(&input);
+    input_finish(&input);
+}
+
+TEST(wide_nodes_take_a_fifth_of_the_memory_of_links)
+{
+    struct input input = triangles(20000, 10, 0.1f, 28);
+    struct bvh_tree links = build(&input, &packed), wide = build(&input, &of_wide);
+    const size_t of_links = links.element_count * bvh_element_bytes(&packed);
+    const size_t of_nodes = wide.element_count * bvh_element_bytes(&of_wide);
+    assert_in_range(of_nodes, 1, of_links / 5);
+    assert_in_range(expect_wide_sound(&input), 4, 12);
+    bvh_tree_finish(&links);
+    bvh_tree_finish(&wide);
+    input_finish(&input);
 }
 
 TEST(a_shape_without_primitives_is_refused)
