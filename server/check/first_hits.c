@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Measures first hits both ways, and derives the limit between them. */
+/* Measures first hits both ways and rays by both kinds of nodes, and derives the limits between them. */
 #include "check/first_hits.h"
 
 #include "base/log.h"
@@ -13,14 +13,17 @@
 #define ACROSS 128u
 #define AROUND_FEW 16u
 #define ACROSS_FEW 8u
+/* A mesh whose links leave the caches of small cards. */
+#define AROUND_MANY 512u
+#define ACROSS_MANY 256u
 #define SAMPLES_SEVERAL 16u
 #define REPEATS                                                                                                   \
     4u /* frames per measurement: the first compiles; the fastest counts, as others may use the                   \
           device too */
 /* Relative difference of depths that count as the same: some roundings of a distance. */
 #define DEPTH_SHARE 1e-4f
-/* Share of the time at which tracing counts as faster: clearly, so that devices of a kind decide the same,
- * though measurements differ from run to run. */
+/* Share of the time at which tracing, or the other nodes, count as faster: clearly, so that devices of a kind
+ * decide the same, though measurements differ from run to run. */
 #define TRACED_SHARE 0.8
 #define NEVER 1e9 /* primitives a pixel */
 
@@ -96,6 +99,27 @@ static bool measure_few(struct check_frames *frames, struct first_hits *measured
     return ok;
 }
 
+/* Rays that go apart: bounces of paths, and ambient occlusion's, which anything stops. */
+static bool measure_nodes(struct check_frames *frames, uint32_t nodes, uint64_t *sum_ns, struct error *error)
+{
+    static const uint32_t integrators[] = {INTEGRATOR_PATH, INTEGRATOR_AO};
+    *sum_ns = 0;
+    for (size_t i = 0; i < sizeof(integrators) / sizeof(*integrators); i++) {
+        struct frame_request request = request_of(frames->device, false, FIRST_HITS_RASTERISED);
+        struct frame_result result = {0};
+        uint64_t ns = 0;
+        request.picture.layers = 0;
+        request.light.integrator = integrators[i];
+        request.tracer_options.bvh.nodes = nodes;
+        const bool ok = measure(frames, &request, &ns, &result, error);
+        frame_result_finish(&result);
+        if (!ok)
+            return false;
+        *sum_ns += ns;
+    }
+    return true;
+}
+
 bool first_hits_measure(struct gpu_device *device, struct first_hits *measured, struct error *error)
 {
     struct check_frames frames;
@@ -106,6 +130,10 @@ bool first_hits_measure(struct gpu_device *device, struct first_hits *measured, 
     ok = ok && check_frames_init(&frames, device, check_scene_torus(AROUND_FEW, ACROSS_FEW, error), error) &&
          measure_few(&frames, measured, error);
     check_frames_finish(&frames);
+    ok = ok && check_frames_init(&frames, device, check_scene_torus(AROUND_MANY, ACROSS_MANY, error), error) &&
+         measure_nodes(&frames, BVH_NODES_LINKS, &measured->links_ns, error) &&
+         measure_nodes(&frames, BVH_NODES_EIGHT, &measured->eight_ns, error);
+    check_frames_finish(&frames);
     return ok;
 }
 
@@ -114,7 +142,9 @@ bool first_hits_measure(struct gpu_device *device, struct first_hits *measured, 
  * primitives as for few, it always is the faster way. */
 struct gpu_measured first_hits_limits(const struct first_hits *measured)
 {
-    struct gpu_measured limits = {.known = measured->few_ns > 0};
+    struct gpu_measured limits = {.known = measured->few_ns > 0,
+                                  .nodes_of_eight =
+                                      (double)measured->eight_ns < TRACED_SHARE * (double)measured->links_ns};
     for (int several = 0; several < 2; several++) {
         const double rasterised = (double)measured->ns[several][FIRST_HITS_RASTERISED],
                      traced = (double)measured->ns[several][FIRST_HITS_TRACED], few = (double)measured->few_ns,
@@ -151,7 +181,9 @@ void first_hits_decide(struct gpu_device *device)
     const bool kept = first_hits_keep(device, &measured);
     if (device->measured.known)
         log_write(LOG_INFO, "check",
-                  "first hits are traced from %.3g primitives a pixel on, from %.3g with several samples%s",
+                  "first hits are traced from %.3g primitives a pixel on, from %.3g with several samples, rays by "
+                  "%s%s",
                   (double)device->measured.traced_from[0], (double)device->measured.traced_from[1],
+                  device->measured.nodes_of_eight ? "nodes of eight" : "links",
                   kept ? "" : "; there is no cache folder to keep that in, so it is measured at each start");
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Comparison of rasterised and traced first hits, on this device. */
+/* Comparison of rasterised and traced first hits, and of the kinds of nodes of bvh, on this device. */
 #ifndef FARLIGHT_CHECK_FIRST_HITS_H
 #define FARLIGHT_CHECK_FIRST_HITS_H
 
@@ -15,10 +15,12 @@ struct first_hits {
     uint64_t ns[2][2]; /* time per pixel with one sample, with several; by way */
     uint64_t few_ns;   /* time to rasterise hardly any primitives */
     uint64_t primitives, pixels;
-    double agree; /* share of pixels with the same depth both ways */
+    uint64_t links_ns, eight_ns; /* time of rays that go apart, by nodes of bvh */
+    double agree;                /* share of pixels with the same depth both ways */
 };
 
-/* Measures: takes some frames of 65,536 triangles, and of few, and the compilation of their programs. */
+/* Measures: takes some frames of 65,536 triangles, of few and of 262,144, and the compilation of their programs.
+ */
 bool first_hits_measure(struct gpu_device *device, struct first_hits *measured, struct error *error);
 /* Decides by these measurements, also at the next start, if the device is unknown and no software GL. False:
  * they cannot be stored. */

@@ -297,6 +297,18 @@ static void check_first_hits(struct checking *checking)
                                          .bound = 100 * agree_min},
                      "%.3f %% of the pixels agree, %.1f %% needed", 100 * measured.agree, 100 * agree_min);
     report_ways(checking->report, device, &measured);
+    check_report_row(checking->report,
+                     &(struct check_row){.verdict = CHECK_NOTE,
+                                         .check = "nodes",
+                                         .name = "of bvh",
+                                         .unit = "of the time of links",
+                                         .value = measured.links_ns > 0
+                                                      ? (double)measured.eight_ns / (double)measured.links_ns
+                                                      : NAN,
+                                         .bound = NAN},
+                     "bounces and occlusion by links in %.2f ms, by nodes of eight in %.2f ms; %s",
+                     (double)measured.links_ns * 1e-6, (double)measured.eight_ns * 1e-6,
+                     device->measured.nodes_of_eight ? "nodes of eight" : "links");
 }
 
 static const char *program_key(const struct gpu_device *device, unsigned name)

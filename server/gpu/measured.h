@@ -15,10 +15,11 @@ struct gpu_measured {
      * per pixel, with several. Rasterising takes time for each primitive, tracing hardly any. */
     float traced_from[2];
     uint64_t primitives_min; /* with fewer in all they are rasterised */
+    bool nodes_of_eight;     /* rays are clearly faster through nodes of eight children than through links */
 };
 
-/* Reads the measurements. False: none are known. Software GL has a fixed rule and is never measured, so that
- * its pictures do not depend on the machine. */
+/* Reads the measurements. False: none are known. Software GL has fixed rules and is never measured, so that its
+ * pictures do not depend on the machine. */
 bool gpu_measured_load(const struct gpu_device_info *info, struct gpu_measured *measured);
 /* Writes the measurements. False: no cache is writable. */
 bool gpu_measured_store(const struct gpu_device_info *info, const struct gpu_measured *measured);

@@ -19,7 +19,8 @@ static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_
         return NULL;
     }
     const bool is_paper = options->bvh.form == TRACER_FORM_PAPER;
-    const bool is_wide = options->bvh.nodes == BVH_NODES_EIGHT && !is_paper;
+    const bool is_wide = !is_paper && (options->bvh.nodes == BVH_NODES_EIGHT ||
+                                       (options->bvh.nodes == BVH_NODES_AUTO && device->measured.nodes_of_eight));
     const struct bvh_form settings = {.spheres = is_paper, .one_order = is_paper, .wide = is_wide};
     scene_tree_init(&bvh->tree, device, &settings, &bvh->base.stats);
     return &bvh->base;

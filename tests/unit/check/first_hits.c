@@ -49,6 +49,29 @@ TEST(a_device_on_which_primitives_cost_nothing_rasterises)
     assert_false(gpu_measured_traces(&limits, false, 1000000000, 1000000));
 }
 
+TEST(nodes_of_eight_are_taken_where_they_take_less_than_four_fifths_of_the_time)
+{
+    struct first_hits hits = made(5000);
+    hits.links_ns = 1000;
+    hits.eight_ns = 801;
+    assert_false(first_hits_limits(&hits).nodes_of_eight);
+    hits.eight_ns = 799;
+    assert_true(first_hits_limits(&hits).nodes_of_eight);
+}
+
+TEST_LONG(both_kinds_of_nodes_are_measured)
+{
+    struct first_hits hits;
+    struct error error = {0};
+    if (device->facts.time_stamp_bits == 0) {
+        printf("skipped: the device measures no time\n");
+        skip();
+    }
+    if (!first_hits_measure(device, &hits, &error))
+        fail_msg("%s", error.text);
+    assert_true(hits.links_ns > 0 && hits.eight_ns > 0);
+}
+
 TEST(nothing_is_known_without_time_stamps)
 {
     const struct first_hits none = {.primitives = 1000, .pixels = 100};

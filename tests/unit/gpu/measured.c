@@ -49,7 +49,7 @@ static int remove_folder(void **state)
 ALL_TESTS(make_folder, remove_folder)
 
 static const struct gpu_device_info gpu = {.name = "A GPU", .vendor = "its maker", .version = "4.5 of today"};
-static const struct gpu_measured found = {.known = true, .traced_from = {1.5f, 0.25f}};
+static const struct gpu_measured found = {.known = true, .traced_from = {1.5f, 0.25f}, .nodes_of_eight = true};
 
 TEST(what_was_measured_is_there_at_the_next_start)
 {
@@ -60,6 +60,7 @@ TEST(what_was_measured_is_there_at_the_next_start)
     assert_true(gpu_measured_load(&gpu, &back));
     assert_true(back.known);
     assert_true(back.traced_from[0] == found.traced_from[0] && back.traced_from[1] == found.traced_from[1]);
+    assert_true(back.nodes_of_eight);
 }
 
 TEST(another_driver_version_is_another_device)
@@ -82,12 +83,14 @@ TEST(software_gl_has_a_rule_whatever_was_measured)
     assert_false(gpu_measured_traces(&back, false, 99999, 1000)); /* so few take no time either way */
     assert_false(gpu_measured_traces(&back, false, 100000, 200000));
     assert_true(gpu_measured_traces(&back, false, 100000, 100000));
+    assert_false(back.nodes_of_eight);
 }
 
 TEST(a_file_that_is_cut_or_makes_no_sense_is_as_good_as_none)
 {
     static const char *const contents[] = {
         "", "first hits are traced from ",
+        "first hits are traced from 1 primitives a pixel on, from 1 with several samples\n",
         "first hits are traced from nan primitives a pixel on, from 1 with several samples\n",
         "first hits are traced from -1 primitives a pixel on, from 1 with several samples\n"};
     for (size_t i = 0; i < sizeof(contents) / sizeof(contents[0]); i++) {
