@@ -152,6 +152,9 @@ struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *d
     const uint64_t deadline_ns = timeout_ms < UINT_MAX ? begin_ns + timeout_ms * 1000000ull : UINT64_MAX;
     *error = (struct fl_error){0};
     *done = false;
+    /* While frames come faster than the caller takes them, nothing below waits. */
+    if (!fl_check_interrupt(job->connection->interrupt_fd, error))
+        return NULL;
     while (job->done.count == 0 && !job->answered && job->failure.code == FL_ERROR_NONE) {
         struct fl_received ignored; /* a late answer to something given up */
         if (!fl_connection_check(job->connection, error) ||

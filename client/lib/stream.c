@@ -356,3 +356,10 @@ bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t dea
             return fl_error_set(error, FL_ERROR_TIMEOUT, "", "it timed out");
     }
 }
+
+bool fl_check_interrupt(int interrupt_fd, struct fl_error *error)
+{
+    struct pollfd polled = {.fd = interrupt_fd, .events = POLLIN};
+    return interrupt_fd <= 0 || poll(&polled, 1, 0) <= 0 ||
+           fl_error_set(error, FL_ERROR_INTERRUPTED, "", "interrupted");
+}

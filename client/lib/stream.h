@@ -68,5 +68,7 @@ bool fl_stream_has_remains(const struct fl_stream *stream);
 /* poll() until something is ready, the deadline passes (UINT64_MAX: never) or the interrupt descriptor (0: none)
  * becomes readable. At most 4 entries; those with events 0 are not waited for. */
 bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t deadline_ns, struct fl_error *error);
+/* False where the interrupt descriptor (0: none) is readable; for loops that may go on without a wait. */
+bool fl_check_interrupt(int interrupt_fd, struct fl_error *error);
 
 #endif

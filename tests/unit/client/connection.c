@@ -3,6 +3,7 @@
 #include "tests/unit/client/played_daemon.h"
 #include "tests/harness/test.h"
 
+#include <stdatomic.h>
 #include <sys/eventfd.h>
 #include <xxhash.h>
 
@@ -337,6 +338,8 @@ static void send_frame(struct daemon *daemon, uint32_t request, uint32_t number)
     tell(daemon, request, &message);
 }
 
+static atomic_bool has_sent_frames;
+
 /* Frames as far as credit goes, the answer after the last; a cancel is answered as the protocol says. */
 static void play_job(struct daemon *daemon)
 {
@@ -361,6 +364,8 @@ static void play_job(struct daemon *daemon)
         }
         for (; request != 0 && next <= last && sent < credit; next += step, sent++)
             send_frame(daemon, request, next);
+        if (sent > 0)
+            atomic_store(&has_sent_frames, true);
         if (request != 0 && next > last) {
             send_type(daemon, request, MESSAGE_OK);
             request = 0;
@@ -396,6 +401,31 @@ TEST(every_frame_of_a_job_comes_once_and_in_order)
     assert_null(fl_render_next(job, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
     fl_render_destroy(job);
+}
+
+TEST(an_interruption_is_seen_while_frames_are_there_without_a_wait)
+{
+    const int interrupt_fd = eventfd(0, EFD_CLOEXEC);
+    atomic_store(&has_sent_frames, false);
+    connect_to_played(play_job);
+    fl_connection_set_interrupt(connection, interrupt_fd);
+    struct fl_scene scene = {.connection = connection, .scene = 1};
+    struct fl_job *job = start_job(&scene, 0, 1000, 1);
+    while (!atomic_load(&has_sent_frames))
+        usleep(1000);
+    struct fl_frame *frame = fl_render_next(job, &error);
+    assert_non_null(frame); /* and the next one came with it */
+    fl_frame_destroy(frame);
+    assert_int_equal(eventfd_write(interrupt_fd, 1), 0);
+    assert_null(fl_render_next(job, &error));
+    check_error(FL_ERROR_INTERRUPTED, "");
+    fl_connection_set_interrupt(connection, 0);
+    frame = fl_render_next(job, &error);
+    assert_non_null(frame);
+    assert_int_equal(frame->frame, 1);
+    fl_frame_destroy(frame);
+    fl_render_destroy(job);
+    close(interrupt_fd);
 }
 
 TEST(after_a_cancel_the_connection_can_be_used_again)
