@@ -2,6 +2,7 @@
 """The parts of the benchmark that measure what a user waits for: programs, one command, frames, an animation."""
 import json
 import os
+import pathlib
 import shutil
 import subprocess
 import tempfile
@@ -49,6 +50,11 @@ class Daemon:
                 self.tcp = line.split()[-1] if self.tcp else None
                 return
         raise Failure("the daemon did not start")
+
+    def workers(self):
+        """Numbers of the processes that serve its users; one waits for the first client."""
+        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text()
+        return [int(child) for child in children.split()]
 
     def __exit__(self, *_):
         self.process.terminate()
