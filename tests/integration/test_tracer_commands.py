@@ -138,10 +138,9 @@ class Structures(OneDaemon):
             coarse, fine = (self.frame("--tracer", tracer, f"--{tracer}-resolution", resolution)["structure"]
                             for resolution in ("128", "512"))
             self.assertAlmostEqual(coarse[prefix + "cell_metres"] / fine[prefix + "cell_metres"], 4, delta=0.1, msg=tracer)
-        for turn in ("on", "off"):
-            said = self.frame("--tracer", "rayspace", "--rayspace-turn", turn, "--rayspace-sort", turn)["structure"]
-            wanted = said["shadow/waves"] if turn == "on" else 0
-            self.assertEqual((said["shadow/turned"], said["shadow/sorted"]), (wanted, wanted))
+        fast, paper = (self.frame("--tracer", "rayspace", "--rayspace-form", form)["structure"] for form in ("fast", "paper"))
+        self.assertEqual(paper["shadow/sorted"], 0)
+        self.assertGreater(paper["shadow/cone_tests_per_ray"], fast["shadow/cone_tests_per_ray"])  # it is flat
         said = self.frame("--stereo", "0.1", "--quadtree-layers", "2")["structure"]
         self.assertEqual((said["faces"], said["layers"]), (1, 2))
         self.assertIn("views/unknown_per_ray", said)
