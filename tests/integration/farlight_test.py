@@ -146,8 +146,11 @@ class Daemon:
         return [int(child) for child in pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()]
 
     def signal_all(self, number):
-        """Sends a signal to it and to its workers."""
-        for process in (self.process.pid, *self.workers()):
+        """Sends a signal to its workers and to it. It is stopped meanwhile if it is to be killed: a worker that sees its end
+        would end in order, and another one would be started in the place of one that has ended."""
+        if number == signal.SIGKILL:
+            os.kill(self.process.pid, signal.SIGSTOP)
+        for process in (*self.workers(), self.process.pid):
             with contextlib.suppress(ProcessLookupError):  # a worker that has ended meanwhile
                 os.kill(process, number)
 
