@@ -256,6 +256,17 @@ void front_counted(struct front *front)
         loop_timer_start(front->loop, &front->unused_timer, front->options.unused_ns);
 }
 
+static void print_ready(const struct front *front)
+{
+    for (size_t i = 0; i < front->listener_count; i++) {
+        char text[ADDRESS_TEXT_BYTES];
+        address_print(&front->listeners[i].address, text);
+        fprintf(front->ready_stream, "READY %s\n", text);
+    }
+    fflush(front->ready_stream);
+    notify_manager("READY=1");
+}
+
 /* The start is over when every first worker is ready or gone; one that is ready suffices. */
 void front_settled(struct front *front, const struct error *failure)
 {
@@ -268,6 +279,8 @@ void front_settled(struct front *front, const struct error *failure)
             return;
     }
     front->ready = front->workers != NULL;
+    if (front->ready && !front->stopping)
+        print_ready(front); /* before a client is served: it may ask where else the daemon listens */
     loop_stop(front->loop);
 }
 
@@ -325,7 +338,7 @@ static bool watch_all_listeners(struct front *front, struct error *error)
     return true;
 }
 
-/* Starts the workers of owners with kept scenes; without any, a worker that belongs to nobody yet, so that
+/* Starts the workers of owners with kept scenes; without any, a worker without an owner, so that
  * the device is tried and the first user need not wait. */
 static bool start_workers(struct front *front, struct error *error)
 {
@@ -358,19 +371,9 @@ static bool start(struct front *front, const struct front_options *options, stru
            (options->owner_fd < 0 || callers_add_owner(front, options->owner_fd, error));
 }
 
-static void print_ready(const struct front *front, FILE *stream)
-{
-    for (size_t i = 0; i < front->listener_count; i++) {
-        char text[ADDRESS_TEXT_BYTES];
-        address_print(&front->listeners[i].address, text);
-        fprintf(stream, "READY %s\n", text);
-    }
-    fflush(stream);
-    notify_manager("READY=1");
-}
-
 bool front_run(struct front *front, const struct front_options *options, FILE *stream, struct error *error)
 {
+    front->ready_stream = stream;
     /* This first run of the loop ends when the first workers are ready, or have failed. */
     if (!start(front, options, error) || !loop_run(front->loop, error))
         return false;
@@ -381,7 +384,6 @@ bool front_run(struct front *front, const struct front_options *options, FILE *s
     loop_timer_stop(front->loop, &front->extend_timer);
     if (front->stopping)
         return true;
-    print_ready(front, stream);
     front_counted(front);
     on_ping_timer(front);
     front->watchdog_ns = notify_watchdog_ns();

@@ -74,6 +74,7 @@ struct front {
     struct worker *workers;
     uint32_t workers_started;
     struct share_groups groups;
+    FILE *ready_stream;   /* where READY is said */
     bool ready;           /* whether a worker was ready: the device can be used */
     struct error failure; /* why the first worker could not start */
 

@@ -32,9 +32,6 @@
 #define LISTENS_MAX 8
 #define DAEMON_WORDS_MAX 28 /* limit of fl_connect */
 
-#define READY_TURN_US 10000 /* at most ten seconds in all */
-#define READY_TURNS 1000
-
 struct serving {
     struct cli_job job; /* model, environment, server, key file; and an option's error */
     const char *name;
@@ -239,12 +236,6 @@ static bool announce(const struct serving *serving, const struct cli_loading *lo
            (unsigned long long)bounds.spheres);
     if (serving->job.daemon.server)
         print_line(serving, name, serving->job.daemon.server);
-    /* The daemon serves us before it has said where it listens for others. */
-    for (unsigned turn = 0;
-         turn < READY_TURNS && serving->listen_count > 0 &&
-         !fl_connection_listens_at(loading->connection, serving->listen_count - 1, address, sizeof(address));
-         turn++)
-        usleep(READY_TURN_US);
     for (size_t i = 0; fl_connection_listens_at(loading->connection, i, address, sizeof(address)); i++)
         print_line(serving, name, address);
     if (fflush(stdout) != 0)
