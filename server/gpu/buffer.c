@@ -4,6 +4,7 @@
 
 #include "base/progress.h"
 #include "gpu/barrier.h"
+#include "gpu/readback.h"
 #include "gpu/registry.h"
 
 #include <epoxy/gl.h>
@@ -155,22 +156,18 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
     progress_report();
 }
 
-/* A copy in memory of the host; 0: there is no memory for it. A driver may move a buffer that is read directly
- * into the host's memory, and every later pass then reads it from there (NVIDIA's says "is being copied/moved from
- * VIDEO memory to HOST memory"). */
-static unsigned copy_for_host(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes,
-                              size_t size_bytes)
+/* Reads by way of a copy. A driver may move a buffer that is read directly into the host's memory, and every later
+ * pass then reads it from there (NVIDIA's says "is being copied/moved from VIDEO memory to HOST memory"). False:
+ * there is no memory for the copy. */
+static bool read_copy(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
+                      size_t size_bytes)
 {
-    const unsigned copy = gpu_object_create(device->registry, GPU_BUFFER);
-    if (!copy)
-        return 0;
-    glNamedBufferStorage(copy, (GLsizeiptr)size_bytes, NULL, GL_CLIENT_STORAGE_BIT | GL_MAP_READ_BIT);
-    if (glGetError() != GL_NO_ERROR) {
-        gpu_object_destroy(device->registry, GPU_BUFFER, copy);
-        return 0;
-    }
-    glCopyNamedBufferSubData(buffer->name, copy, (GLintptr)offset_bytes, 0, (GLsizeiptr)size_bytes);
-    return copy;
+    struct gpu_readback copy = {0};
+    struct error ignored;
+    const bool is_read = gpu_readback_copy(device, &copy, buffer, offset_bytes, size_bytes, &ignored) &&
+                         gpu_readback_fence(&copy, &ignored) && gpu_readback_take(device, &copy, data, &ignored);
+    gpu_readback_finish(device, &copy);
+    return is_read;
 }
 
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
@@ -178,13 +175,12 @@ void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer,
 {
     if (!size_bytes)
         return;
-    device->waits++;
-    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
-    const unsigned copy =
-        device->facts.shares_memory ? 0 : copy_for_host(device, buffer, offset_bytes, size_bytes);
-    glGetNamedBufferSubData(copy ? copy : buffer->name, copy ? 0 : (GLintptr)offset_bytes, (GLsizeiptr)size_bytes,
-                            data);
-    gpu_object_destroy(device->registry, GPU_BUFFER, copy);
+    const uint64_t waits = device->waits + 1; /* a read is one, also if the device is done already */
+    if (device->facts.shares_memory || !read_copy(device, buffer, offset_bytes, data, size_bytes)) {
+        gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+        glGetNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
+    }
+    device->waits = waits;
 }
 
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value)

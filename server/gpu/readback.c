@@ -61,14 +61,14 @@ static bool reserve(struct gpu_device *device, struct gpu_readback *readback, si
 }
 
 bool gpu_readback_copy(struct gpu_device *device, struct gpu_readback *readback, const struct gpu_buffer *from,
-                       size_t size_bytes, struct error *error)
+                       size_t offset_bytes, size_t size_bytes, struct error *error)
 {
     gpu_readback_drop(readback);
     if (!reserve(device, readback, size_bytes, error))
         return false;
     readback->size_bytes = size_bytes;
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
-    glCopyNamedBufferSubData(from->name, readback->name, 0, 0, (GLsizeiptr)size_bytes);
+    glCopyNamedBufferSubData(from->name, readback->name, (GLintptr)offset_bytes, 0, (GLsizeiptr)size_bytes);
     readback->copies++;
     glClearNamedBufferSubData(readback->name, GL_R32UI, (GLintptr)number_offset(readback->capacity_bytes),
                               sizeof(readback->copies), GL_RED_INTEGER, GL_UNSIGNED_INT, &readback->copies);

@@ -14,10 +14,10 @@ struct gpu_readback {
     void *fence;     /* fence behind the copy; NULL: no copy is pending */
 };
 
-/* Begins to copy the first bytes of a buffer, in their state after the commands queued so far. Drops a copy
- * that was not fetched. */
+/* Begins to copy a part of a buffer, in its state after the commands queued so far. Drops a copy that was not
+ * fetched. */
 bool gpu_readback_copy(struct gpu_device *device, struct gpu_readback *readback, const struct gpu_buffer *from,
-                       size_t size_bytes, struct error *error);
+                       size_t offset_bytes, size_t size_bytes, struct error *error);
 /* Sets the fence; call it once after the copy, and after other commands whose end is to be known with the
  * copy's. */
 bool gpu_readback_fence(struct gpu_readback *readback, struct error *error);

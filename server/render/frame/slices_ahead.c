@@ -50,7 +50,7 @@ bool slices_ahead_add(struct slices_ahead *ahead, struct gpu_device *device, con
     slice->rays = rays;
     ahead->count++;
     stamp(device, &slice->queries[1]);
-    return gpu_readback_copy(device, &slice->state, wave_state, sizeof(struct wave_state), error) &&
+    return gpu_readback_copy(device, &slice->state, wave_state, 0, sizeof(struct wave_state), error) &&
            gpu_readback_fence(&slice->state, error);
 }
 

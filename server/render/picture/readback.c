@@ -59,7 +59,7 @@ bool picture_copy_band(struct picture *picture, const struct render_frame *frame
                        uint32_t plane, uint32_t band, struct error *error)
 {
     context_span_begin(frame->device, STAGE_READBACK);
-    bool begun = gpu_readback_copy(frame->device->gpu, copy, &picture->resolved,
+    bool begun = gpu_readback_copy(frame->device->gpu, copy, &picture->resolved, 0,
                                    band_bytes(picture, frame, plane, band), error);
     context_span_end(frame->device);
     return begun && gpu_readback_fence(copy, error) && gpu_check(frame->device->gpu, "copying the picture", error);

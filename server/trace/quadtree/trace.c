@@ -48,7 +48,7 @@ uint64_t quadtree_state_device_bytes(const struct trace_state *state)
 bool quadtree_state_copy_counts(struct trace_state *state, struct error *error)
 {
     struct quadtree_state *own = (struct quadtree_state *)state;
-    return gpu_readback_copy(state->device, &own->copied_counts, &own->counts, sizeof(struct counts), error) &&
+    return gpu_readback_copy(state->device, &own->copied_counts, &own->counts, 0, sizeof(struct counts), error) &&
            gpu_readback_fence(&own->copied_counts, error);
 }
 

@@ -24,7 +24,7 @@ bool rayspace_counts_add(struct rayspace_state *state, struct gpu_scene *scene, 
 bool rayspace_counts_copy(struct trace_state *state, struct error *error)
 {
     struct rayspace_state *own = (struct rayspace_state *)state;
-    return gpu_readback_copy(state->device, &own->copied_counts, &own->counts, COUNTS_BYTES, error) &&
+    return gpu_readback_copy(state->device, &own->copied_counts, &own->counts, 0, COUNTS_BYTES, error) &&
            gpu_readback_fence(&own->copied_counts, error);
 }
 

@@ -108,8 +108,6 @@ static struct bvh_transform describe(const struct scene_tree *tree, const struct
         return transform;
     transform.first_element = entry->first_element;
     transform.element_count = entry->element_count;
-    if (tree->store.settings.wide)
-        transform.element_count = entry->is_mesh ? BVH_LEAF_TRIANGLES : BVH_LEAF_SPHERES;
     transform.first_texel = entry->first_texel;
     transform.first_primitive = scene->geometries[instance->geometry].device.first_primitive;
     transform.grid_lower_x = entry->grid.lower[0];
@@ -117,6 +115,7 @@ static struct bvh_transform describe(const struct scene_tree *tree, const struct
     transform.grid_lower_z = entry->grid.lower[2];
     memcpy(transform.cells_per_unit, entry->grid.cells_per_unit, sizeof(entry->grid.cells_per_unit));
     if (tree->store.settings.wide) {
+        transform.element_count = entry->is_mesh ? BVH_LEAF_TRIANGLES : BVH_LEAF_SPHERES;
         transform.grid_lower_x = extent_of(entry, 0);
         transform.grid_lower_y = extent_of(entry, 1);
         transform.grid_lower_z = extent_of(entry, 2);

@@ -175,7 +175,7 @@ bool key_view_count_anew(struct key_view *key, struct gpu_device *device, struct
 
 bool key_view_copy_count(struct key_view *key, struct gpu_device *device, struct error *error)
 {
-    return gpu_readback_copy(device, &key->copy, &key->counts, sizeof(uint32_t), error) &&
+    return gpu_readback_copy(device, &key->copy, &key->counts, 0, sizeof(uint32_t), error) &&
            gpu_readback_fence(&key->copy, error);
 }
 
