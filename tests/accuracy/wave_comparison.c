@@ -421,7 +421,7 @@ TEST(an_unknown_reference_is_refused_by_name)
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "compare_with");
-    fixture->request.comparison.compare = false; /* nobody asks for it */
+    fixture->request.comparison.compare = false; /* the default */
     assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     frame_abandon(fixture->renderer);
 }

@@ -180,7 +180,7 @@ class Paced:
     on any machine.
 
     The client says each file that is complete in a line that begins with `frame N:` and ends with its path. The path is
-    longer than half a page and the pipe has one page: while nobody reads, it holds one line and a part of the next. After
+    longer than half a page and the pipe has one page: until it is read, it holds one line and a part of the next. After
     until("frame N:") the client stops at the line of frame N + 2 at the latest, when it has received frame N + 3, and the
     daemon may have sent the two frames after that, for which the job has credit (protocol/messages.def)."""
 

@@ -240,7 +240,7 @@ class Lost(Animations):
                 daemon.stop(how)
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(daemon.path)
-                for _ in range(2):  # the first attempt finds nobody
+                for _ in range(2):  # the first attempt finds no daemon
                     client.until("trying again")
                 with Daemon(listen=daemon.address):
                     self.finish(client, 0)

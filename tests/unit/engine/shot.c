@@ -357,7 +357,13 @@ TEST(an_automatic_camera_shows_the_pose_at_time_0_in_all_frames)
     struct engine_job job = job_of(CAMERA_AUTO, &use, 1);
     struct animation_bounds bounds = {0};
     struct frame_camera expected;
-    frame_camera_auto(&expected, &usual_framing, (float[]){70, 0, 0}, (float[]){71, 1, 0}, 160.0f / 90);
+    const float degree = 0.017453293f;
+    const struct frame_framing framing = {.azimuth = job.camera.auto_azimuth * degree,
+                                          .elevation = job.camera.auto_elevation * degree,
+                                          .fov_y = job.camera.auto_fov * degree,
+                                          .margin = job.camera.auto_margin,
+                                          .zoom = job.camera.auto_zoom};
+    frame_camera_auto(&expected, &framing, (float[]){70, 0, 0}, (float[]){71, 1, 0}, 160.0f / 90);
     for (uint32_t frame = 0; frame < 20; frame += 3) {
         struct shot fresh = shot_at(&job, scene, frame), kept;
         assert_true(shot_make(&kept, &job, scene, frame, &bounds, NULL));

@@ -387,7 +387,8 @@ TEST(a_client_that_leaves_a_shared_scene_does_not_change_it)
     cut(stranger, witness);
     assert_int_equal(attach(witness, 1, "shared"), 1);
     assert_int_equal(render_frame(witness, 20, 1), 1);
-    /* Memory of the scene still counts, though nobody can name it; nobody can come back to the other scene. */
+    /* Memory of the scene still counts, though it has no name any more; no client can come back to the other
+     * scene. */
     struct message message = made(MESSAGE_STATS);
     send_message(witness, 21, 0, &message);
     expect(witness, MESSAGE_STATS_REPLY, 21);

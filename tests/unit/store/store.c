@@ -197,7 +197,7 @@ TEST(who_has_most_gives_way_with_what_was_written_first)
     expect_put('d', 2, 4, 20000);
     expect_put('e', 1, 5, 30000);
     expect_names("acde");
-    /* A scene that is too large alone evicts nobody; its predecessor is outdated. */
+    /* A scene that is too large alone evicts no other; its predecessor is outdated. */
     struct error error = {0};
     assert_false(put('c', 2, 6, 100000, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
